@@ -1,0 +1,187 @@
+//! Buses: what a CAN bus can do for the layers above, and everything that touches the outside world
+//! for it. The only place with sockets, clocks, signals and `unsafe`.
+
+pub mod memory;
+pub mod time;
+
+use crate::canopen::frame::Frame;
+use crate::canopen::id::CanId;
+use std::fmt;
+pub use time::{Mono, Stamp, Wall};
+
+/// A CAN bus: frames out, events in, time.
+///
+/// Nothing here blocks for longer than asked, and no call but [`Bus::receive`] waits.
+pub trait Bus {
+    /// What people call it, and what stands in a trace: `can0`, `sim`.
+    fn name(&self) -> &str;
+
+    /// The bit rate in bit/s, where the bus knows it.
+    fn bit_rate(&self) -> Option<u32>;
+
+    /// Where the wall time of received frames comes from.
+    fn timestamps(&self) -> TimestampSource;
+
+    /// The present moment.
+    fn now(&self) -> Stamp;
+
+    /// Tells which frames are wanted from now on; others may or may not be delivered.
+    /// A bus starts with every frame wanted.
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError>;
+
+    /// Hands one frame to the bus. [`BusError::QueueFull`] means: not sent, try again shortly.
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError>;
+
+    /// The next thing that happens, at the latest [`Event::Timeout`] once `deadline` is reached.
+    /// With a deadline in the past it returns what is there already, without waiting.
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError>;
+}
+
+/// What comes from a bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A frame of another participant.
+    Frame(Received),
+    /// The controller reports trouble on the wire.
+    Fault(Fault, Stamp),
+    /// The kernel had to drop this many frames since it last said so: the program read too slowly.
+    Dropped(u32),
+    /// The interface went down (`false`) or came back (`true`).
+    Link(bool),
+    /// The deadline was reached.
+    Timeout,
+    /// The user asked to stop (Ctrl-C, SIGTERM). Reported once a signal: what comes after it is
+    /// tidying up, which may use the bus again.
+    Interrupted,
+}
+
+/// A frame and the moment it was received.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Received {
+    /// What was received.
+    pub frame: Frame,
+    /// When.
+    pub at: Stamp,
+}
+
+/// Trouble that a CAN controller reports (Linux: an error frame).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Fault {
+    /// The controller has switched itself off after too many errors.
+    BusOff,
+    /// The controller may no longer signal errors actively.
+    ErrorPassive,
+    /// An error counter passed the warning level.
+    ErrorWarning,
+    /// The controller is error-active again.
+    ErrorActive,
+    /// The controller was restarted after bus-off.
+    Restarted,
+    /// Nobody acknowledged a frame.
+    NoAcknowledge,
+    /// A bit, stuff, form or CRC error on the wire: wrong bit rate, bad wiring, two senders.
+    Protocol,
+    /// The controller's own receive or transmit buffer ran over.
+    ControllerOverflow,
+    /// The transceiver reports a fault of the wires.
+    Transceiver,
+    /// A transmission took too long.
+    TransmitTimeout,
+    /// Anything else.
+    Other,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Fault::BusOff => "bus-off",
+            Fault::ErrorPassive => "error passive",
+            Fault::ErrorWarning => "error warning",
+            Fault::ErrorActive => "error active again",
+            Fault::Restarted => "restarted after bus-off",
+            Fault::NoAcknowledge => "no acknowledge: nobody else is listening at this bit rate",
+            Fault::Protocol => "protocol error on the wire",
+            Fault::ControllerOverflow => "controller buffer overflow",
+            Fault::Transceiver => "transceiver fault",
+            Fault::TransmitTimeout => "transmit time-out",
+            Fault::Other => "bus error",
+        })
+    }
+}
+
+/// Where the wall time of a received frame comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TimestampSource {
+    /// The interface's own clock.
+    Hardware,
+    /// The kernel, when the driver handed the frame over.
+    Kernel,
+    /// This program, when it read the frame.
+    Program,
+    /// The clock of the simulated bus.
+    Simulated,
+}
+
+impl fmt::Display for TimestampSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            TimestampSource::Hardware => "hardware",
+            TimestampSource::Kernel => "kernel",
+            TimestampSource::Program => "program",
+            TimestampSource::Simulated => "simulated",
+        })
+    }
+}
+
+/// Which frames are wanted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Filters {
+    /// Every frame.
+    All,
+    /// Data frames with exactly these identifiers.
+    Only(Vec<CanId>),
+}
+
+impl Filters {
+    /// Whether `frame` is wanted.
+    pub fn wants(&self, frame: &Frame) -> bool {
+        match self {
+            Filters::All => true,
+            Filters::Only(ids) => !frame.is_remote() && ids.contains(&frame.id()),
+        }
+    }
+}
+
+/// Why a bus does not do what was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// The transmit queue is full; nothing was sent.
+    #[error("the transmit queue is full")]
+    QueueFull,
+    /// No interface of that name.
+    #[error("there is no CAN interface \"{0}\"")]
+    NoInterface(String),
+    /// The interface exists and is down.
+    #[error("interface {0} is down")]
+    Down(String),
+    /// The interface is there and is no CAN interface.
+    #[error("{0} is not a CAN interface")]
+    NotCan(String),
+    /// The operating system forbids it.
+    #[error("no permission to {0}")]
+    Permission(String),
+    /// This bus only receives.
+    #[error("{0} is receive only")]
+    ReceiveOnly(String),
+    /// This system or this build has no such bus.
+    #[error("{0}")]
+    Unsupported(String),
+    /// Anything else, with what was being done.
+    #[error("{what}: {source}")]
+    Io {
+        /// What was being done.
+        what: String,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+}

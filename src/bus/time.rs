@@ -1,0 +1,82 @@
+//! The two time lines of a bus: a monotonic one for waiting and measuring, and the wall clock for files.
+
+use std::ops::{Add, Sub};
+use std::time::{Duration, SystemTime};
+
+/// A moment on a bus's monotonic time line, counted from when the bus was opened.
+///
+/// Its own type rather than [`std::time::Instant`], because a simulated bus has a virtual clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Mono(Duration);
+
+impl Mono {
+    /// The moment the bus was opened.
+    pub const START: Mono = Mono(Duration::ZERO);
+
+    /// The moment `since_start` after the bus was opened.
+    pub fn at(since_start: Duration) -> Mono {
+        Mono(since_start)
+    }
+
+    /// How long after the opening of the bus this is.
+    pub fn since_start(self) -> Duration {
+        self.0
+    }
+
+    /// How much later `self` is than `earlier`, zero if it is not later.
+    pub fn since(self, earlier: Mono) -> Duration {
+        self.0.saturating_sub(earlier.0)
+    }
+}
+
+impl Add<Duration> for Mono {
+    type Output = Mono;
+
+    fn add(self, by: Duration) -> Mono {
+        Mono(self.0.saturating_add(by))
+    }
+}
+
+impl Sub<Duration> for Mono {
+    type Output = Mono;
+
+    /// Never before the opening of the bus.
+    fn sub(self, by: Duration) -> Mono {
+        Mono(self.0.saturating_sub(by))
+    }
+}
+
+/// A moment on the wall clock: time since 1970-01-01 00:00 UTC.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Wall(Duration);
+
+impl Wall {
+    /// The moment `since_epoch` after 1970-01-01 00:00 UTC.
+    pub fn at(since_epoch: Duration) -> Wall {
+        Wall(since_epoch)
+    }
+
+    /// What the host's clock says now. A clock set before 1970 reads as 1970.
+    pub fn now() -> Wall {
+        Wall(SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default())
+    }
+
+    /// Time since 1970-01-01 00:00 UTC.
+    pub fn since_epoch(self) -> Duration {
+        self.0
+    }
+
+    /// The same moment for the standard library.
+    pub fn system_time(self) -> SystemTime {
+        SystemTime::UNIX_EPOCH + self.0
+    }
+}
+
+/// When something was received, on both time lines.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stamp {
+    /// For intervals and deadlines.
+    pub mono: Mono,
+    /// For people and files.
+    pub wall: Wall,
+}

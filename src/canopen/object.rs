@@ -1,0 +1,101 @@
+//! Addresses in the object dictionary.
+
+use super::id::parse_u32;
+use std::fmt;
+use std::str::FromStr;
+
+/// An entry of the object dictionary: index and sub-index (CiA 301, 7.4).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ObjectId {
+    /// 0000h to FFFFh.
+    pub index: u16,
+    /// 0 to 255.
+    pub sub: u8,
+}
+
+/// Text that is no object address.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("\"{0}\" is not an object (0x6130:1, 6130:1, 6130h:1 or 6130.1; the index is hexadecimal)")]
+pub struct ObjectIdError(String);
+
+impl ObjectId {
+    /// The entry at `index` and `sub`.
+    pub const fn new(index: u16, sub: u8) -> ObjectId {
+        ObjectId { index, sub }
+    }
+
+    /// The multiplexer as it stands in bytes 1 to 3 of an SDO frame.
+    pub fn multiplexer(self) -> [u8; 3] {
+        let [low, high] = self.index.to_le_bytes();
+        [low, high, self.sub]
+    }
+
+    /// The entry that bytes 1 to 3 of an SDO frame name.
+    pub fn from_multiplexer(bytes: [u8; 3]) -> ObjectId {
+        ObjectId { index: u16::from_le_bytes([bytes[0], bytes[1]]), sub: bytes[2] }
+    }
+
+    /// The same index with another sub-index.
+    pub fn with_sub(self, sub: u8) -> ObjectId {
+        ObjectId { sub, ..self }
+    }
+}
+
+impl fmt::Display for ObjectId {
+    /// `0x6130:1`, the index in hexadecimal and the sub-index in decimal.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "0x{:04X}:{}", self.index, self.sub)
+    }
+}
+
+impl FromStr for ObjectId {
+    type Err = ObjectIdError;
+
+    fn from_str(text: &str) -> Result<ObjectId, ObjectIdError> {
+        let parse = || {
+            let (index, sub) = match text.split_once([':', '.']) {
+                Some((index, sub)) => (index, Some(sub)),
+                None => (text, None),
+            };
+            let sub = match sub {
+                None => 0,
+                Some(sub) => match sub.strip_suffix(['h', 'H']) {
+                    Some(hex) => parse_u32(&format!("0x{hex}"))?,
+                    None => parse_u32(sub)?,
+                },
+            };
+            let index = index.strip_prefix("0x").or_else(|| index.strip_prefix("0X")).unwrap_or(index);
+            let index = index.strip_suffix(['h', 'H']).unwrap_or(index);
+            let index = parse_u32(&format!("0x{index}"))?;
+            Some(ObjectId { index: u16::try_from(index).ok()?, sub: u8::try_from(sub).ok()? })
+        };
+        parse().ok_or_else(|| ObjectIdError(text.to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_way_to_write_an_object() {
+        let pressure = ObjectId::new(0x6130, 1);
+        for text in ["0x6130:1", "6130:1", "6130h:1", "6130.1", "0X6130:0x01", "6130H.01h", "0x6130:1h"] {
+            assert_eq!(text.parse(), Ok(pressure), "{text}");
+        }
+        assert_eq!("1000".parse(), Ok(ObjectId::new(0x1000, 0)));
+        assert_eq!("1A03:16".parse(), Ok(ObjectId::new(0x1a03, 16)));
+        assert_eq!("1A03:10h".parse(), Ok(ObjectId::new(0x1a03, 16)));
+        for text in ["", "0x", "h", "12345", "6130:256", "6130:", "6130:x", "6130:1:2", "+130", "6130:+1", "6130:-1"] {
+            assert!(text.parse::<ObjectId>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn text_and_wire_form() {
+        let object = ObjectId::new(0x6130, 1);
+        assert_eq!(object.to_string(), "0x6130:1");
+        assert_eq!(object.multiplexer(), [0x30, 0x61, 0x01]);
+        assert_eq!(ObjectId::from_multiplexer(object.multiplexer()), object);
+    }
+}

@@ -1,0 +1,570 @@
+//! Data types of CiA 301 (7.1.6, 7.4.7) and values of them: bytes to value, text to value, and back.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// A data type of the object dictionary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DataType {
+    /// BOOLEAN, one byte in an SDO.
+    Boolean,
+    /// UNSIGNEDn, n a multiple of 8 from 8 to 64; here in bytes, 1 to 8.
+    Unsigned(u8),
+    /// INTEGERn, n a multiple of 8 from 8 to 64; here in bytes, 1 to 8.
+    Integer(u8),
+    /// REAL32.
+    Real32,
+    /// REAL64.
+    Real64,
+    /// VISIBLE_STRING.
+    VisibleString,
+    /// OCTET_STRING.
+    OctetString,
+    /// UNICODE_STRING, UTF-16 little endian.
+    UnicodeString,
+    /// TIME_OF_DAY: milliseconds after midnight (28 bits), days since 1984-01-01 (16 bits).
+    TimeOfDay,
+    /// TIME_DIFFERENCE: milliseconds (28 bits), days (16 bits).
+    TimeDifference,
+    /// DOMAIN: bytes of any length and meaning.
+    Domain,
+}
+
+impl DataType {
+    /// How many bytes a value has, where the type says.
+    pub fn width(self) -> Option<usize> {
+        match self {
+            DataType::Boolean => Some(1),
+            DataType::Unsigned(bytes) | DataType::Integer(bytes) => Some(usize::from(bytes)),
+            DataType::Real32 => Some(4),
+            DataType::Real64 => Some(8),
+            DataType::TimeOfDay | DataType::TimeDifference => Some(6),
+            DataType::VisibleString | DataType::OctetString | DataType::UnicodeString | DataType::Domain => None,
+        }
+    }
+
+    /// The type of a code in the object dictionary's type area (CiA 301, table 44), as EDS files use it.
+    pub fn from_code(code: u16) -> Option<DataType> {
+        Some(match code {
+            0x01 => DataType::Boolean,
+            0x02 => DataType::Integer(1),
+            0x03 => DataType::Integer(2),
+            0x04 => DataType::Integer(4),
+            0x05 => DataType::Unsigned(1),
+            0x06 => DataType::Unsigned(2),
+            0x07 => DataType::Unsigned(4),
+            0x08 => DataType::Real32,
+            0x09 => DataType::VisibleString,
+            0x0a => DataType::OctetString,
+            0x0b => DataType::UnicodeString,
+            0x0c => DataType::TimeOfDay,
+            0x0d => DataType::TimeDifference,
+            0x0f => DataType::Domain,
+            0x10 => DataType::Integer(3),
+            0x11 => DataType::Real64,
+            0x12 => DataType::Integer(5),
+            0x13 => DataType::Integer(6),
+            0x14 => DataType::Integer(7),
+            0x15 => DataType::Integer(8),
+            0x16 => DataType::Unsigned(3),
+            0x18 => DataType::Unsigned(5),
+            0x19 => DataType::Unsigned(6),
+            0x1a => DataType::Unsigned(7),
+            0x1b => DataType::Unsigned(8),
+            _ => return None,
+        })
+    }
+
+    /// A value of this type out of exactly its bytes.
+    ///
+    /// # Errors
+    /// When a type of fixed width is given another number of bytes.
+    pub fn decode(self, bytes: &[u8]) -> Result<Value, WidthError> {
+        if let Some(width) = self.width()
+            && width != bytes.len()
+        {
+            return Err(WidthError { expected: width, found: bytes.len() });
+        }
+        let mut wide = [0u8; 8];
+        if bytes.len() <= 8 {
+            wide[..bytes.len()].copy_from_slice(bytes);
+        }
+        let unsigned = u64::from_le_bytes(wide);
+        Ok(match self {
+            DataType::Boolean => Value::Bool(unsigned != 0),
+            DataType::Unsigned(_) => Value::Unsigned(unsigned),
+            DataType::Integer(width) => Value::Integer(sign_extend(unsigned, width)),
+            DataType::Real32 => Value::Real32(f32::from_le_bytes([wide[0], wide[1], wide[2], wide[3]])),
+            DataType::Real64 => Value::Real64(f64::from_le_bytes(wide)),
+            DataType::VisibleString => Value::Text(latin1(bytes)),
+            DataType::UnicodeString => Value::Text(utf16(bytes)),
+            DataType::OctetString | DataType::Domain => Value::Bytes(bytes.to_vec()),
+            DataType::TimeOfDay => Value::TimeOfDay(CanTime::from_bytes(&wide)),
+            DataType::TimeDifference => Value::TimeDifference(CanTime::from_bytes(&wide)),
+        })
+    }
+}
+
+/// The first `width` bytes of a two's complement number, sign extended.
+fn sign_extend(unsigned: u64, width: u8) -> i64 {
+    let unused = 64 - 8 * u32::from(width.clamp(1, 8));
+    (unsigned << unused).cast_signed() >> unused
+}
+
+/// VISIBLE_STRING is ISO 646, but devices send Latin-1; every byte has a character there. Zeros at the
+/// end are filling (an expedited string has four bytes, whatever its length).
+fn latin1(bytes: &[u8]) -> String {
+    let end = bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+    bytes[..end].iter().map(|&byte| char::from(byte)).collect()
+}
+
+fn utf16(bytes: &[u8]) -> String {
+    let units = bytes.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]]));
+    let text: String = char::decode_utf16(units).map(|unit| unit.unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
+    text.trim_end_matches('\0').to_owned()
+}
+
+impl fmt::Display for DataType {
+    /// The names of CiA 309-3: `u8`, `i16`, `r32`, `vs` …
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            DataType::Boolean => f.write_str("b"),
+            DataType::Unsigned(bytes) => write!(f, "u{}", 8 * bytes),
+            DataType::Integer(bytes) => write!(f, "i{}", 8 * bytes),
+            DataType::Real32 => f.write_str("r32"),
+            DataType::Real64 => f.write_str("r64"),
+            DataType::VisibleString => f.write_str("vs"),
+            DataType::OctetString => f.write_str("os"),
+            DataType::UnicodeString => f.write_str("us"),
+            DataType::TimeOfDay => f.write_str("t"),
+            DataType::TimeDifference => f.write_str("td"),
+            DataType::Domain => f.write_str("d"),
+        }
+    }
+}
+
+/// Text that names no data type.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("\"{0}\" is not a type (b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex)")]
+pub struct DataTypeError(String);
+
+impl FromStr for DataType {
+    type Err = DataTypeError;
+
+    /// Reads the names of CiA 309-3 and the aliases `bool`, `f32`, `f64`, `str`, `hex`.
+    fn from_str(text: &str) -> Result<DataType, DataTypeError> {
+        Ok(match text {
+            "b" | "bool" => DataType::Boolean,
+            "r32" | "f32" => DataType::Real32,
+            "r64" | "f64" => DataType::Real64,
+            "vs" | "str" => DataType::VisibleString,
+            "os" | "hex" => DataType::OctetString,
+            "us" => DataType::UnicodeString,
+            "t" => DataType::TimeOfDay,
+            "td" => DataType::TimeDifference,
+            "d" => DataType::Domain,
+            _ => {
+                let bytes = match text.get(1..) {
+                    Some("8") => 1,
+                    Some("16") => 2,
+                    Some("24") => 3,
+                    Some("32") => 4,
+                    Some("40") => 5,
+                    Some("48") => 6,
+                    Some("56") => 7,
+                    Some("64") => 8,
+                    _ => return Err(DataTypeError(text.to_owned())),
+                };
+                match text.as_bytes().first() {
+                    Some(b'u') => DataType::Unsigned(bytes),
+                    Some(b'i') => DataType::Integer(bytes),
+                    _ => return Err(DataTypeError(text.to_owned())),
+                }
+            }
+        })
+    }
+}
+
+/// TIME_OF_DAY or TIME_DIFFERENCE (CiA 301, 7.1.6.6 and 7.1.6.7).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CanTime {
+    /// Milliseconds, 28 bits: after midnight, or of the difference.
+    pub milliseconds: u32,
+    /// Days: since 1984-01-01, or of the difference.
+    pub days: u16,
+}
+
+impl CanTime {
+    fn from_bytes(bytes: &[u8; 8]) -> CanTime {
+        CanTime {
+            milliseconds: u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) & 0x0fff_ffff,
+            days: u16::from_le_bytes([bytes[4], bytes[5]]),
+        }
+    }
+
+    fn to_bytes(self) -> [u8; 6] {
+        let [a, b, c, d] = (self.milliseconds & 0x0fff_ffff).to_le_bytes();
+        let [e, f] = self.days.to_le_bytes();
+        [a, b, c, d, e, f]
+    }
+}
+
+/// A value of the object dictionary.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// BOOLEAN.
+    Bool(bool),
+    /// Any UNSIGNEDn.
+    Unsigned(u64),
+    /// Any INTEGERn.
+    Integer(i64),
+    /// REAL32.
+    Real32(f32),
+    /// REAL64.
+    Real64(f64),
+    /// VISIBLE_STRING or UNICODE_STRING.
+    Text(String),
+    /// OCTET_STRING or DOMAIN.
+    Bytes(Vec<u8>),
+    /// TIME_OF_DAY.
+    TimeOfDay(CanTime),
+    /// TIME_DIFFERENCE.
+    TimeDifference(CanTime),
+}
+
+impl Value {
+    /// The number as a REAL64, where the value is one. 64-bit integers lose what a REAL64 cannot hold.
+    pub fn as_f64(&self) -> Option<f64> {
+        match self {
+            Value::Unsigned(number) => Some(*number as f64),
+            Value::Integer(number) => Some(*number as f64),
+            Value::Real32(number) => Some(f64::from(*number)),
+            Value::Real64(number) => Some(*number),
+            _ => None,
+        }
+    }
+
+    /// The number as an unsigned one, where it is one and not negative.
+    pub fn as_u64(&self) -> Option<u64> {
+        match self {
+            Value::Bool(bit) => Some(u64::from(*bit)),
+            Value::Unsigned(number) => Some(*number),
+            Value::Integer(number) => u64::try_from(*number).ok(),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Value {
+    /// The value as it is written to stdout: integers in decimal, reals as the shortest text that reads
+    /// back to the same number, bytes in hexadecimal, text as it is.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Value::Bool(bit) => write!(f, "{}", u8::from(*bit)),
+            Value::Unsigned(number) => write!(f, "{number}"),
+            Value::Integer(number) => write!(f, "{number}"),
+            Value::Real32(number) => {
+                write_real(f, *number, number.abs() != 0.0 && !(1e-5..1e16).contains(&number.abs()))
+            }
+            Value::Real64(number) => {
+                write_real(f, *number, number.abs() != 0.0 && !(1e-5..1e16).contains(&number.abs()))
+            }
+            Value::Text(text) => f.write_str(text),
+            Value::Bytes(bytes) => bytes.iter().try_for_each(|byte| write!(f, "{byte:02X}")),
+            Value::TimeOfDay(time) => {
+                let days = u64::from(DAYS_1970_TO_1984) + u64::from(time.days);
+                let since_epoch = std::time::Duration::from_secs(days * 86_400)
+                    + std::time::Duration::from_millis(u64::from(time.milliseconds));
+                let moment = std::time::SystemTime::UNIX_EPOCH + since_epoch;
+                write!(f, "{}", humantime::format_rfc3339_millis(moment))
+            }
+            Value::TimeDifference(time) => {
+                let length = std::time::Duration::from_secs(u64::from(time.days) * 86_400)
+                    + std::time::Duration::from_millis(u64::from(time.milliseconds));
+                write!(f, "{}", humantime::format_duration(length))
+            }
+        }
+    }
+}
+
+/// Days between the epoch of Unix and the one of CANopen, 1984-01-01.
+const DAYS_1970_TO_1984: u16 = 5113;
+
+/// Very large and very small numbers in scientific notation: a REAL32 of 1e-38 is unreadable otherwise.
+fn write_real<T: fmt::Display + fmt::LowerExp>(f: &mut fmt::Formatter<'_>, number: T, scientific: bool) -> fmt::Result {
+    let text = number.to_string();
+    if scientific && text != "inf" && text != "-inf" && text != "NaN" {
+        write!(f, "{number:e}")
+    } else {
+        f.write_str(&text)
+    }
+}
+
+/// A value that does not have the width of its type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{found} bytes where the type has {expected}")]
+pub struct WidthError {
+    /// Bytes of the type.
+    pub expected: usize,
+    /// Bytes that were there.
+    pub found: usize,
+}
+
+/// Text that makes no value of a type.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ValueError {
+    /// Not of the type's form.
+    #[error("\"{text}\" is not a value of type {data_type}")]
+    Form {
+        /// What was typed.
+        text: String,
+        /// The type asked for.
+        data_type: DataType,
+    },
+    /// A number outside the type's range.
+    #[error("{text} does not fit {data_type} ({low} to {high})")]
+    Range {
+        /// What was typed.
+        text: String,
+        /// The type asked for.
+        data_type: DataType,
+        /// The lowest number of the type.
+        low: String,
+        /// The highest number of the type.
+        high: String,
+    },
+}
+
+impl DataType {
+    /// The bytes of a value typed by a person: decimal, `0x…` (for integers the bit pattern too),
+    /// `-5`, `1.25e3`, text, hexadecimal bytes, RFC 3339 for times, `1h30m` for time differences.
+    ///
+    /// # Errors
+    /// Text of another form, and numbers that the type cannot hold; nothing is ever cut off.
+    pub fn encode_text(self, text: &str) -> Result<Vec<u8>, ValueError> {
+        let form = || ValueError::Form { text: text.to_owned(), data_type: self };
+        match self {
+            DataType::Boolean => match text {
+                "0" | "false" => Ok(vec![0]),
+                "1" | "true" => Ok(vec![1]),
+                _ => Err(form()),
+            },
+            DataType::Unsigned(width) => {
+                let high = u64::MAX >> (64 - 8 * u32::from(width));
+                let number = parse_integer(text).ok_or_else(form)?;
+                match u64::try_from(number) {
+                    Ok(number) if number <= high => Ok(number.to_le_bytes()[..usize::from(width)].to_vec()),
+                    _ => Err(self.range(text, 0, i128::from(high))),
+                }
+            }
+            DataType::Integer(width) => {
+                let high = i64::MAX >> (64 - 8 * u32::from(width));
+                let low = -high - 1;
+                let number = parse_integer(text).ok_or_else(form)?;
+                let pattern_high = u64::MAX >> (64 - 8 * u32::from(width));
+                if is_hexadecimal(text) && number > i128::from(high) && number <= i128::from(pattern_high) {
+                    return Ok(number.to_le_bytes()[..usize::from(width)].to_vec());
+                }
+                match i64::try_from(number) {
+                    Ok(number) if (low..=high).contains(&number) => {
+                        Ok(number.to_le_bytes()[..usize::from(width)].to_vec())
+                    }
+                    _ => Err(self.range(text, i128::from(low), i128::from(high))),
+                }
+            }
+            DataType::Real32 => {
+                let wide: f64 = parse_real(text).ok_or_else(form)?;
+                let number: f32 = text.parse().map_err(|_| form())?;
+                if number.is_infinite() && wide.is_finite() {
+                    return Err(ValueError::Range {
+                        text: text.to_owned(),
+                        data_type: self,
+                        low: format!("{:e}", f32::MIN),
+                        high: format!("{:e}", f32::MAX),
+                    });
+                }
+                Ok(number.to_le_bytes().to_vec())
+            }
+            DataType::Real64 => Ok(parse_real(text).ok_or_else(form)?.to_le_bytes().to_vec()),
+            DataType::VisibleString => {
+                text.chars().map(|character| u8::try_from(u32::from(character)).map_err(|_| form())).collect()
+            }
+            DataType::UnicodeString => Ok(text.encode_utf16().flat_map(u16::to_le_bytes).collect()),
+            DataType::OctetString | DataType::Domain => parse_hex(text).ok_or_else(form),
+            DataType::TimeOfDay => {
+                let moment = humantime::parse_rfc3339(text).map_err(|_| form())?;
+                let since = moment.duration_since(std::time::SystemTime::UNIX_EPOCH).map_err(|_| form())?;
+                let days = (since.as_secs() / 86_400).checked_sub(u64::from(DAYS_1970_TO_1984)).ok_or_else(form)?;
+                let in_day = since - std::time::Duration::from_secs(since.as_secs() / 86_400 * 86_400);
+                self.can_time(days, in_day.as_millis()).ok_or_else(form)
+            }
+            DataType::TimeDifference => {
+                let length = humantime::parse_duration(text).map_err(|_| form())?;
+                let days = length.as_secs() / 86_400;
+                let rest = length - std::time::Duration::from_secs(days * 86_400);
+                self.can_time(days, rest.as_millis()).ok_or_else(form)
+            }
+        }
+    }
+
+    fn can_time(self, days: u64, milliseconds: u128) -> Option<Vec<u8>> {
+        let time = CanTime { milliseconds: u32::try_from(milliseconds).ok()?, days: u16::try_from(days).ok()? };
+        Some(time.to_bytes().to_vec())
+    }
+
+    fn range(self, text: &str, low: i128, high: i128) -> ValueError {
+        ValueError::Range { text: text.to_owned(), data_type: self, low: low.to_string(), high: high.to_string() }
+    }
+}
+
+fn is_hexadecimal(text: &str) -> bool {
+    text.starts_with("0x") || text.starts_with("0X")
+}
+
+fn parse_integer(text: &str) -> Option<i128> {
+    if is_hexadecimal(text) {
+        let digits = &text[2..];
+        return (!digits.starts_with(['+', '-'])).then(|| i128::from_str_radix(digits, 16).ok()).flatten();
+    }
+    (!text.starts_with('+')).then(|| text.parse().ok()).flatten()
+}
+
+fn parse_real(text: &str) -> Option<f64> {
+    text.parse().ok()
+}
+
+/// Bytes in hexadecimal, two digits each, with `0x` in front and blanks between them if one likes.
+pub fn parse_hex(text: &str) -> Option<Vec<u8>> {
+    let text = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")).unwrap_or(text);
+    let digits: Vec<u8> = text
+        .chars()
+        .filter(|character| !character.is_whitespace())
+        .map(|character| character.to_digit(16).and_then(|digit| u8::try_from(digit).ok()))
+        .collect::<Option<_>>()?;
+    digits.len().is_multiple_of(2).then(|| digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn text(data_type: DataType, bytes: &[u8]) -> String {
+        data_type.decode(bytes).expect("the width fits").to_string()
+    }
+
+    #[test]
+    fn values_of_the_manuals() {
+        // DPS, table 19: 50 C3 00 00 is 50000; MC1609: 7130h.2 = 7985.
+        assert_eq!(text(DataType::Integer(4), &[0x50, 0xc3, 0, 0]), "50000");
+        assert_eq!(text(DataType::Integer(2), &[0x31, 0x1f]), "7985");
+        // D-20-9, 1008h.
+        assert_eq!(text(DataType::VisibleString, b"D2X9"), "D2X9");
+        // MH-4 overload markers.
+        assert_eq!(text(DataType::Integer(2), &[0, 0x80]), "-32768");
+        assert_eq!(text(DataType::Integer(4), &[0, 0, 0, 0x80]), "-2147483648");
+        assert_eq!(text(DataType::Real32, &[0, 0, 0xc0, 0x7f]), "NaN");
+        assert_eq!(text(DataType::Integer(3), &[0xff, 0xff, 0xff]), "-1");
+    }
+
+    #[test]
+    fn reals_are_the_shortest_text_that_reads_back() {
+        assert_eq!(text(DataType::Real32, &1.1f32.to_le_bytes()), "1.1");
+        assert_eq!(text(DataType::Real32, &0f32.to_le_bytes()), "0");
+        assert_eq!(text(DataType::Real32, &(-0f32).to_le_bytes()), "-0");
+        assert_eq!(text(DataType::Real32, &1e-38f32.to_le_bytes()), "1e-38");
+        assert_eq!(text(DataType::Real64, &1e300f64.to_le_bytes()), "1e300");
+        assert_eq!(text(DataType::Real64, &f64::NEG_INFINITY.to_le_bytes()), "-inf");
+    }
+
+    #[test]
+    fn times() {
+        assert_eq!(text(DataType::TimeOfDay, &[0, 0, 0, 0, 0, 0]), "1984-01-01T00:00:00.000Z");
+        let bytes = DataType::TimeOfDay.encode_text("2026-11-22T12:00:00.250Z").expect("a time");
+        assert_eq!(text(DataType::TimeOfDay, &bytes), "2026-11-22T12:00:00.250Z");
+        assert!(DataType::TimeOfDay.encode_text("1980-01-01T00:00:00Z").is_err());
+        let bytes = DataType::TimeDifference.encode_text("1day 2s").expect("a length");
+        assert_eq!(text(DataType::TimeDifference, &bytes), "1day 2s");
+    }
+
+    #[test]
+    fn text_that_does_not_fit_is_refused_never_cut() {
+        for (data_type, wrong) in [
+            ("u8", "300"),
+            ("u8", "-1"),
+            ("u8", "0x100"),
+            ("i8", "128"),
+            ("i8", "-129"),
+            ("i8", "0x100"),
+            ("u64", "18446744073709551616"),
+            ("i64", "9223372036854775808"),
+            ("b", "2"),
+            ("r32", "1e39"),
+            ("u8", "1.0"),
+            ("u8", ""),
+            ("u8", "0x"),
+            ("u8", "0x-1"),
+            ("u8", "+1"),
+            ("r32", "1,5"),
+            ("vs", "\u{20ac}"),
+            ("os", "123"),
+            ("os", "0g"),
+            ("td", "5"),
+        ] {
+            let data_type: DataType = data_type.parse().expect("a type");
+            assert!(data_type.encode_text(wrong).is_err(), "{data_type} {wrong}");
+        }
+        assert_eq!(
+            DataType::Unsigned(1).encode_text("300").map_err(|error| error.to_string()),
+            Err("300 does not fit u8 (0 to 255)".to_owned())
+        );
+    }
+
+    #[test]
+    fn hexadecimal_is_the_bit_pattern_of_a_signed_type() {
+        assert_eq!(DataType::Integer(2).encode_text("0x8000"), Ok(vec![0, 0x80]));
+        assert_eq!(DataType::Integer(2).encode_text("0x7fff"), Ok(vec![0xff, 0x7f]));
+        assert_eq!(DataType::Unsigned(4).encode_text("0x65766173"), Ok(b"save".to_vec()));
+        assert_eq!(DataType::Domain.encode_text("0x01 02"), Ok(vec![1, 2]));
+    }
+
+    #[test]
+    fn names_of_types_round_trip() {
+        for name in
+            ["b", "u8", "u16", "u24", "u32", "u64", "i8", "i24", "i64", "r32", "r64", "vs", "os", "us", "d", "t", "td"]
+        {
+            assert_eq!(name.parse::<DataType>().map(|found| found.to_string()).as_deref(), Ok(name));
+        }
+        for wrong in ["", "u", "u7", "x8", "i128", "é8", "u8 "] {
+            assert!(wrong.parse::<DataType>().is_err(), "{wrong}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn decoding_is_total(code in 0u16..0x20, bytes in proptest::collection::vec(any::<u8>(), 0..16)) {
+            if let Some(data_type) = DataType::from_code(code) {
+                let decoded = data_type.decode(&bytes);
+                prop_assert_eq!(decoded.is_ok(), data_type.width().is_none_or(|width| width == bytes.len()));
+                if let Ok(value) = decoded { let _ = value.to_string(); }
+            }
+        }
+
+        #[test]
+        fn integers_round_trip_through_text(width in 1u8..=8, bits in any::<u64>()) {
+            let bytes = bits.to_le_bytes()[..usize::from(width)].to_vec();
+            for data_type in [DataType::Unsigned(width), DataType::Integer(width)] {
+                let text = data_type.decode(&bytes).expect("the width fits").to_string();
+                prop_assert_eq!(data_type.encode_text(&text), Ok(bytes.clone()));
+            }
+        }
+
+        #[test]
+        fn reals_round_trip_through_text(bits in any::<u32>()) {
+            let number = f32::from_bits(bits);
+            prop_assume!(!number.is_nan());
+            let text = Value::Real32(number).to_string();
+            prop_assert_eq!(DataType::Real32.encode_text(&text), Ok(number.to_le_bytes().to_vec()));
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! Device descriptions as data: what one TOML file in `devices/` says about one kind of device.
+//!
+//! Unknown keys are errors, so that a typing error in a description is never silently ignored.
+
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// Everything that is known of one kind of device.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Description {
+    /// The short name for `--device`, `sim:` and the DEVICE column: `mh4`.
+    pub name: String,
+    /// The name on the label: `WIKA MH-4-CAN`.
+    pub title: String,
+    /// Who makes it: `WIKA`.
+    pub vendor: String,
+    /// Where the facts come from.
+    pub source: String,
+    /// What the device must answer to be recognised as this kind.
+    pub identify: Identify,
+    /// As delivered.
+    #[serde(default)]
+    pub factory: Factory,
+    /// How its SDO server behaves.
+    #[serde(default)]
+    pub sdo: SdoStyle,
+    /// Deviations from the standard that code has to know about.
+    #[serde(default)]
+    pub quirks: Vec<super::quirk::Quirk>,
+    /// Index of the LSS bit rate table to bit rate in bit/s.
+    #[serde(default)]
+    pub bit_rates: BTreeMap<String, u32>,
+    /// What it measures.
+    #[serde(default, rename = "signal")]
+    pub signals: Vec<SignalEntry>,
+    /// The object dictionary.
+    #[serde(default, rename = "object")]
+    pub objects: Vec<ObjectEntry>,
+    /// What its emergency codes mean.
+    #[serde(default, rename = "emcy")]
+    pub emergencies: Vec<EmergencyEntry>,
+    /// What the simulator needs beyond the manual.
+    #[serde(default)]
+    pub sim: SimEntry,
+}
+
+/// What a device answers that tells its kind; everything given must agree.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Identify {
+    /// 1000h, all 32 bits.
+    pub device_type: Option<u32>,
+    /// 1018h:1.
+    pub vendor_id: Option<u32>,
+    /// 1018h:2.
+    pub product_code: Option<u32>,
+    /// 1008h.
+    pub device_name: Option<String>,
+}
+
+/// The settings of a new device.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Factory {
+    /// Node-ID as delivered, where the manual says.
+    pub node_id: Option<NodeId>,
+    /// Bit rate as delivered in bit/s, where the manual says.
+    pub bit_rate: Option<u32>,
+}
+
+/// How an SDO server behaves.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SdoStyle {
+    /// Whether it indicates sizes (43h, 4Bh …) or omits them (42h).
+    #[serde(default)]
+    pub size: SizeIndication,
+    /// Whether it has no segmented transfer, so that strings have at most four characters.
+    #[serde(default)]
+    pub expedited_only: bool,
+}
+
+/// Whether the command specifier of an expedited transfer tells the size.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SizeIndication {
+    /// s = 1.
+    #[default]
+    Indicated,
+    /// s = 0: 22h to write, 42h as the answer to a read.
+    Omitted,
+}
+
+/// One measured quantity.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SignalEntry {
+    /// `pressure`, `temperature`, `ch1` …; with `channels`, `ch{n}` stands for each of them.
+    pub name: String,
+    /// CiA 404 channel (the sub-index), 1 to 199.
+    pub channel: u8,
+    /// The object that is read by SDO when no PDO decides.
+    pub value: ObjectId,
+    /// The same quantity under other indices than x130h: D-20-9's 2090h.
+    #[serde(default)]
+    pub also: Vec<ObjectId>,
+    /// Where the physical unit stands (6131h).
+    pub unit: Option<ObjectId>,
+    /// Where the decimal digits of integer values stand (6132h).
+    pub digits: Option<ObjectId>,
+    /// Where the status stands (6150h), if the device has one.
+    pub status: Option<ObjectId>,
+    /// Whether an overload shows in the value itself (REAL32 NaN, smallest integer).
+    #[serde(default)]
+    pub marker: bool,
+    /// Measuring range start (6148h), if the device has it.
+    pub span_start: Option<ObjectId>,
+    /// Measuring range end (6149h), if the device has it.
+    pub span_end: Option<ObjectId>,
+}
+
+/// One entry of the object dictionary, or a run of sub-indices alike.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectEntry {
+    /// `0x1000`, `0x1018:1`, or `0x6130:1-16` for a run.
+    pub at: String,
+    /// In lower case with hyphens: `producer-heartbeat-time`.
+    pub name: String,
+    /// Data type, in the names of CiA 309-3.
+    #[serde(rename = "type", deserialize_with = "from_text")]
+    pub data_type: DataType,
+    /// Access by SDO.
+    pub access: Access,
+    /// Value as delivered: a number, text, or `$NODEID+0x180`.
+    pub default: Option<Scalar>,
+    /// Lowest value allowed.
+    pub low: Option<Scalar>,
+    /// Highest value allowed.
+    pub high: Option<Scalar>,
+    /// Values and ranges allowed, where they are not one range: `["0-240", "254", "255"]`.
+    #[serde(default)]
+    pub allow: Vec<String>,
+    /// What numbers mean: `{ "0" = "none", "1" = "moving average" }`.
+    #[serde(default)]
+    pub values: BTreeMap<String, String>,
+    /// The signature that must be written: `save`, `load`, `zero`, `set`.
+    pub signature: Option<String>,
+    /// Whether a TPDO may carry it.
+    #[serde(default)]
+    pub pdo: bool,
+    /// Unit of the number, where it is fixed: `ms`, `100us`.
+    pub unit: Option<String>,
+    /// Which store group keeps it: `comm`, `app`, `all`; absent when 1010h does not.
+    pub stored: Option<String>,
+    /// What it is and does, in one or two sentences.
+    #[serde(default)]
+    pub text: String,
+    /// Page or table of the manual.
+    #[serde(default)]
+    pub page: String,
+    /// What the manual contradicts or leaves open.
+    #[serde(default)]
+    pub doubt: String,
+}
+
+/// How an entry can be accessed by SDO.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Access {
+    /// Read only.
+    Ro,
+    /// Write only.
+    Wo,
+    /// Read and write.
+    Rw,
+    /// Read only, and never changes.
+    Const,
+}
+
+impl Access {
+    /// Whether an SDO upload is allowed.
+    pub fn is_readable(self) -> bool {
+        self != Access::Wo
+    }
+
+    /// Whether an SDO download is allowed.
+    pub fn is_writable(self) -> bool {
+        matches!(self, Access::Rw | Access::Wo)
+    }
+}
+
+/// A number or text in a description.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum Scalar {
+    /// An integer.
+    Integer(i64),
+    /// A number with a fraction.
+    Real(f64),
+    /// Text, or a `$NODEID` formula.
+    Text(String),
+}
+
+/// What one emergency code of a device means.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EmergencyEntry {
+    /// The emergency error code, bytes 0 and 1.
+    pub code: u16,
+    /// In words.
+    pub text: String,
+    /// The bit of 1001h that goes with it, 0 to 7.
+    pub register_bit: Option<u8>,
+    /// The whole register as the manual prints it.
+    pub register: Option<u8>,
+    /// What bytes 3 to 7 hold.
+    #[serde(default)]
+    pub bytes: Vec<String>,
+}
+
+/// What the simulator needs beyond the manual: numbers that a real device has and no manual prints.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimEntry {
+    /// 1018h:4 of the first device; the next ones count up.
+    #[serde(default)]
+    pub serial: u32,
+    /// The measured quantities, one per signal.
+    #[serde(default, rename = "channel")]
+    pub channels: Vec<SimChannel>,
+}
+
+/// How a simulated quantity moves: a slow sine with noise.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimChannel {
+    /// The CiA 404 channel.
+    pub channel: u8,
+    /// Unit code of `base`, `amplitude`, `noise`, `start` and `end` (6131h).
+    pub unit: u32,
+    /// The middle.
+    pub base: f64,
+    /// The swing to both sides.
+    pub amplitude: f64,
+    /// Length of one swing in seconds.
+    pub period_s: f64,
+    /// Width of the noise to both sides.
+    pub noise: f64,
+    /// Start of the measuring range.
+    pub start: f64,
+    /// End of the measuring range.
+    pub end: f64,
+}
+
+fn from_text<'de, D, T>(deserializer: D) -> Result<T, D::Error>
+where
+    D: serde::Deserializer<'de>,
+    T: std::str::FromStr,
+    T::Err: std::fmt::Display,
+{
+    let text = String::deserialize(deserializer)?;
+    text.parse().map_err(serde::de::Error::custom)
+}
+
+impl<'de> Deserialize<'de> for NodeId {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<NodeId, D::Error> {
+        NodeId::new(u8::deserialize(deserializer)?).map_err(serde::de::Error::custom)
+    }
+}
+
+impl<'de> Deserialize<'de> for ObjectId {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<ObjectId, D::Error> {
+        from_text(deserializer)
+    }
+}
