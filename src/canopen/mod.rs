@@ -2,8 +2,11 @@
 //!
 //! No I/O, no clock, no printing, no device names. Decoding any frame of 0 to 8 bytes is total.
 
+pub mod emcy;
 pub mod frame;
 pub mod id;
 pub mod nmt;
 pub mod object;
+pub mod pdo;
+pub mod sdo;
 pub mod value;
