@@ -2,7 +2,7 @@
 
 use super::description::Description;
 use super::dictionary::Dictionary;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// A description with its object dictionary laid out.
 #[derive(Clone, Debug)]
@@ -66,24 +66,24 @@ macro_rules! built_in {
 }
 
 /// The built-in descriptions, in the order in which they are tried.
-pub fn built_in() -> &'static [Model] {
-    static MODELS: OnceLock<Vec<Model>> = OnceLock::new();
+pub fn built_in() -> &'static [Arc<Model>] {
+    static MODELS: OnceLock<Vec<Arc<Model>>> = OnceLock::new();
     MODELS.get_or_init(|| {
         built_in!("mh4", "d20", "dps", "mc1609")
             .into_iter()
-            .filter_map(|(_, text)| Model::from_toml(text).ok())
+            .filter_map(|(_, text)| Model::from_toml(text).ok().map(Arc::new))
             .collect()
     })
 }
 
 /// The built-in description of a name.
-pub fn by_name(name: &str) -> Option<&'static Model> {
-    built_in().iter().find(|model| model.description.name == name)
+pub fn by_name(name: &str) -> Option<Arc<Model>> {
+    built_in().iter().find(|model| model.description.name == name).cloned()
 }
 
 /// The built-in description that a device's answers fit.
-pub fn recognise(traits: &Traits) -> Option<&'static Model> {
-    built_in().iter().find(|model| model.fits(traits))
+pub fn recognise(traits: &Traits) -> Option<Arc<Model>> {
+    built_in().iter().find(|model| model.fits(traits)).cloned()
 }
 
 #[cfg(test)]
