@@ -2,7 +2,7 @@
 //!
 //! Unknown keys are errors, so that a typing error in a description is never silently ignored.
 
-use crate::canopen::id::NodeId;
+use crate::canopen::id::{NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use serde::Deserialize;
@@ -34,6 +34,8 @@ pub struct Description {
     /// Index of the LSS bit rate table to bit rate in bit/s.
     #[serde(default)]
     pub bit_rates: BTreeMap<String, u32>,
+    /// Index that stands for automatic bit rate detection, if the device has one.
+    pub auto_bit_rate: Option<u8>,
     /// What it measures.
     #[serde(default, rename = "signal")]
     pub signals: Vec<SignalEntry>,
@@ -60,6 +62,9 @@ pub struct Identify {
     pub product_code: Option<u32>,
     /// 1008h.
     pub device_name: Option<String>,
+    /// Objects to read where all of the above is not proof enough, and what they must hold.
+    #[serde(default)]
+    pub confirm: BTreeMap<ObjectId, Scalar>,
 }
 
 /// The settings of a new device.
@@ -142,10 +147,10 @@ pub struct ObjectEntry {
     pub low: Option<Scalar>,
     /// Highest value allowed.
     pub high: Option<Scalar>,
-    /// Values and ranges allowed, where they are not one range: `["0-240", "254", "255"]`.
+    /// Values and ranges allowed, where they are not one range: `["0-240", "254", "0x004E0000"]`.
     #[serde(default)]
     pub allow: Vec<String>,
-    /// What numbers mean: `{ "0" = "none", "1" = "moving average" }`.
+    /// What numbers mean, in decimal or hexadecimal: `{ "0" = "none", "0x004E0000" = "bar" }`.
     #[serde(default)]
     pub values: BTreeMap<String, String>,
     /// The signature that must be written: `save`, `load`, `zero`, `set`.
@@ -166,6 +171,30 @@ pub struct ObjectEntry {
     /// What the manual contradicts or leaves open.
     #[serde(default)]
     pub doubt: String,
+}
+
+impl ObjectEntry {
+    /// Whether `number` lies within the limits and, where values are listed, is one of them.
+    pub fn allows(&self, number: f64) -> bool {
+        let limit = |scalar: &Option<Scalar>| match scalar {
+            Some(Scalar::Integer(limit)) => Some(*limit as f64),
+            Some(Scalar::Real(limit)) => Some(*limit),
+            Some(Scalar::Text(_)) | None => None,
+        };
+        limit(&self.low).is_none_or(|low| low <= number)
+            && limit(&self.high).is_none_or(|high| number <= high)
+            && (self.allow.is_empty()
+                || self.allow.iter().any(|listed| {
+                    parse_range(listed).is_some_and(|(low, high)| f64::from(low) <= number && number <= f64::from(high))
+                }))
+    }
+}
+
+/// `254` or `0-240`: the lowest and the highest number of one part of `allow`.
+pub(crate) fn parse_range(text: &str) -> Option<(u32, u32)> {
+    let (low, high) = text.split_once('-').unwrap_or((text, text));
+    let (low, high) = (parse_u32(low)?, parse_u32(high)?);
+    (low <= high).then_some((low, high))
 }
 
 /// How an entry can be accessed by SDO.

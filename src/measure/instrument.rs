@@ -38,6 +38,7 @@ impl Identity {
             vendor_id: self.vendor,
             product_code: self.product,
             device_name: self.name.clone(),
+            ..Traits::default()
         }
     }
 }
