@@ -7,3 +7,4 @@ pub mod id;
 pub mod nmt;
 pub mod object;
 pub mod value;
+pub mod wire_length;
