@@ -8,6 +8,10 @@
 //! - [`bus`] → canopen (frames). The trait [`bus::Bus`] and its transports. The only place with sockets,
 //!   clocks, signals and `unsafe`.
 
+// Here and not in Cargo.toml: integration tests may panic, that is how they fail.
+#![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 pub mod bus;
 pub mod canopen;
 pub mod device;
+pub mod master;

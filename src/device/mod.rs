@@ -4,3 +4,4 @@ pub mod catalog;
 pub mod description;
 pub mod dictionary;
 pub mod quirk;
+pub mod unit;

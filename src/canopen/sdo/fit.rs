@@ -1,0 +1,168 @@
+//! From the bytes that a device delivered to a value of the type that was asked for: the size rule.
+//!
+//! Never stricter than the sensors in the field, never silent about it.
+
+use super::Uploaded;
+use crate::canopen::value::{DataType, Value, WidthError};
+use std::fmt;
+
+/// A value, and what was odd about how it came.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fitted {
+    /// The value.
+    pub value: Value,
+    /// What the user should hear of.
+    pub note: Option<Note>,
+}
+
+/// Something odd that does not make the value doubtful.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Note {
+    /// The type is unknown and the device did not say how many of the four bytes count.
+    SizeNotIndicated,
+    /// More bytes than the type has; the excess says nothing.
+    Wider {
+        /// Bytes of the type.
+        expected: usize,
+        /// Bytes delivered.
+        found: usize,
+    },
+    /// An integer in fewer bytes than its type has.
+    Narrower {
+        /// Bytes of the type.
+        expected: usize,
+        /// Bytes delivered.
+        found: usize,
+    },
+    /// A segmented transfer announced another size than it delivered.
+    Announced {
+        /// Bytes announced.
+        announced: u32,
+        /// Bytes delivered.
+        found: usize,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Note::SizeNotIndicated => f.write_str("size not indicated: all four bytes are shown"),
+            Note::Wider { expected, found } => write!(f, "the device delivered {found} bytes for {expected}"),
+            Note::Narrower { expected, found } => write!(f, "the device delivered {found} bytes for {expected}"),
+            Note::Announced { announced, found } => {
+                write!(f, "the device announced {announced} bytes and delivered {found}")
+            }
+        }
+    }
+}
+
+/// Bytes that make no value of the type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the device delivered {found} bytes where {data_type} has {expected}")]
+pub struct FitError {
+    /// The type asked for.
+    pub data_type: DataType,
+    /// Its bytes.
+    pub expected: usize,
+    /// Bytes delivered.
+    pub found: usize,
+}
+
+/// Fits what was delivered to `data_type`; with `None` the bytes stay as they are.
+///
+/// Without a size the type's width decides and the rest is ignored. With a size, more bytes than the
+/// type has are accepted if the excess says nothing (zeros, or the sign of a negative integer), and an
+/// integer in fewer bytes is the same number.
+///
+/// # Errors
+/// Bytes that make no value of the type.
+pub fn fit(data_type: Option<DataType>, uploaded: &Uploaded) -> Result<Fitted, FitError> {
+    let found = uploaded.bytes.len();
+    let announced = uploaded.announced.filter(|&size| usize::try_from(size) != Ok(found));
+    let announced = announced.map(|announced| Note::Announced { announced, found });
+    let Some(data_type) = data_type else {
+        let note = if uploaded.indicated { announced } else { Some(Note::SizeNotIndicated) };
+        return Ok(Fitted { value: Value::Bytes(uploaded.bytes.clone()), note });
+    };
+    let error = |error: WidthError| FitError { data_type, expected: error.expected, found };
+    let Some(expected) = data_type.width() else {
+        return Ok(Fitted { value: data_type.decode(&uploaded.bytes).map_err(error)?, note: announced });
+    };
+    if found < expected {
+        let narrow = match data_type {
+            DataType::Unsigned(_) => u8::try_from(found).ok().map(DataType::Unsigned),
+            DataType::Integer(_) => u8::try_from(found).ok().map(DataType::Integer),
+            _ => None,
+        };
+        let narrow = narrow.filter(|_| uploaded.indicated && found > 0);
+        let narrow = narrow.ok_or(FitError { data_type, expected, found })?;
+        let value = narrow.decode(&uploaded.bytes).map_err(error)?;
+        return Ok(Fitted { value, note: Some(Note::Narrower { expected, found }) });
+    }
+    let (counted, excess) = uploaded.bytes.split_at(expected);
+    if excess.is_empty() || !uploaded.indicated {
+        return Ok(Fitted { value: data_type.decode(counted).map_err(error)?, note: announced });
+    }
+    let negative = matches!(data_type, DataType::Integer(_)) && counted.last().is_some_and(|byte| byte & 0x80 != 0);
+    let filling = |byte: u8| excess.iter().all(|&found| found == byte);
+    if filling(0) || negative && filling(0xff) {
+        let note = Some(Note::Wider { expected, found });
+        return Ok(Fitted { value: data_type.decode(counted).map_err(error)?, note });
+    }
+    Err(FitError { data_type, expected, found })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn uploaded(bytes: &[u8], indicated: bool) -> Uploaded {
+        Uploaded { bytes: bytes.to_vec(), indicated, announced: None }
+    }
+
+    fn text(data_type: DataType, uploaded: &Uploaded) -> Result<(String, Option<Note>), FitError> {
+        fit(Some(data_type), uploaded).map(|fitted| (fitted.value.to_string(), fitted.note))
+    }
+
+    #[test]
+    fn without_a_size_the_type_decides() {
+        let answer = uploaded(&[0xe8, 0x03, 0xaa, 0xbb], false);
+        assert_eq!(text(DataType::Unsigned(2), &answer), Ok(("1000".into(), None)));
+        assert_eq!(text(DataType::VisibleString, &uploaded(b"D2X9", false)), Ok(("D2X9".into(), None)));
+        assert_eq!(text(DataType::VisibleString, &uploaded(b"DPS\0", false)), Ok(("DPS".into(), None)));
+        let raw = fit(None, &answer).expect("no type, no error");
+        assert_eq!((raw.value.to_string().as_str(), raw.note), ("E803AABB", Some(Note::SizeNotIndicated)));
+        assert!(text(DataType::Unsigned(8), &answer).is_err());
+        assert!(text(DataType::Unsigned(4), &uploaded(&[1, 2, 3], false)).is_err());
+    }
+
+    #[test]
+    fn wider_is_accepted_if_the_excess_says_nothing() {
+        let note = Some(Note::Wider { expected: 1, found: 4 });
+        assert_eq!(text(DataType::Unsigned(1), &uploaded(&[5, 0, 0, 0], true)), Ok(("5".into(), note)));
+        assert_eq!(text(DataType::Integer(1), &uploaded(&[0xfb, 0xff, 0xff, 0xff], true)), Ok(("-5".into(), note)));
+        assert!(text(DataType::Unsigned(1), &uploaded(&[5, 1, 0, 0], true)).is_err());
+        assert!(text(DataType::Unsigned(1), &uploaded(&[0xfb, 0xff, 0xff, 0xff], true)).is_err());
+        assert!(text(DataType::Integer(1), &uploaded(&[5, 0xff, 0xff, 0xff], true)).is_err());
+    }
+
+    #[test]
+    fn narrower_integers_are_the_same_number_and_nothing_else_is_filled_up() {
+        // MH-4, 9130h: the table says INTEGER16, text and mapping INTEGER32.
+        let note = Some(Note::Narrower { expected: 4, found: 2 });
+        assert_eq!(text(DataType::Integer(4), &uploaded(&[0xfe, 0xff], true)), Ok(("-2".into(), note)));
+        assert!(text(DataType::Real32, &uploaded(&[0, 0], true)).is_err());
+        assert!(text(DataType::Integer(4), &uploaded(&[], true)).is_err());
+        assert_eq!(
+            text(DataType::Real32, &uploaded(&[0, 0], true)).map_err(|error| error.to_string()),
+            Err("the device delivered 2 bytes where r32 has 4".into())
+        );
+    }
+
+    #[test]
+    fn another_size_than_announced_is_said() {
+        let answer = Uploaded { bytes: b"MH-4-CAN".to_vec(), indicated: true, announced: Some(9) };
+        let note = Some(Note::Announced { announced: 9, found: 8 });
+        assert_eq!(text(DataType::VisibleString, &answer), Ok(("MH-4-CAN".into(), note)));
+    }
+}

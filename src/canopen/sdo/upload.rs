@@ -1,0 +1,142 @@
+//! SDO upload, expedited and segmented: the client reads an object (CiA 301, 7.2.4.3.5 and 7.2.4.3.6).
+
+use super::{AbortCode, Progress, TransferError, Violation, abort_frame, abort_of, multiplexer, number};
+use crate::canopen::frame::Frame;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::object::ObjectId;
+
+/// More than this no object has; it bounds what a server that never ends can make us keep.
+const LONGEST: usize = 64 << 20;
+
+/// What a device answered to a read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Uploaded {
+    /// The bytes in wire order. Of an answer without size: all four.
+    pub bytes: Vec<u8>,
+    /// Whether the server said how many bytes count (it did not: 42h).
+    pub indicated: bool,
+    /// The size that a segmented transfer announced.
+    pub announced: Option<u32>,
+}
+
+/// A read in progress.
+#[derive(Clone, Debug)]
+pub struct Upload {
+    node: NodeId,
+    object: ObjectId,
+    state: State,
+    bytes: Vec<u8>,
+    announced: Option<u32>,
+    accept_60: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    Initiated,
+    Segments { toggle: bool },
+}
+
+impl Upload {
+    /// A read of `object` from `node`. `accept_60` takes command specifier 60h for a size-less answer
+    /// ([`crate::device::quirk::Quirk::UploadAnswered60`]).
+    pub fn new(node: NodeId, object: ObjectId, accept_60: bool) -> Upload {
+        Upload { node, object, state: State::Initiated, bytes: Vec::new(), announced: None, accept_60 }
+    }
+
+    /// The request that starts the transfer.
+    pub fn request(&self) -> Frame {
+        let [a, b, c] = self.object.multiplexer();
+        Frame::full(CanId::sdo_request(self.node), [0x40, a, b, c, 0, 0, 0, 0])
+    }
+
+    /// Whether the server has begun to answer, so that it must be told when we give up.
+    pub fn has_begun(&self) -> bool {
+        self.state != State::Initiated
+    }
+
+    /// Bytes received so far and bytes announced, for a progress bar.
+    pub fn received(&self) -> (usize, Option<u32>) {
+        (self.bytes.len(), self.announced)
+    }
+
+    /// Takes a frame of the bus; what is to be sent next goes to `out`.
+    pub fn on_frame(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
+        if let Some(code) = abort_of(frame, self.node, self.object) {
+            return Progress::Failed(TransferError::Aborted(code));
+        }
+        let data = frame.data();
+        let (true, Some(&command)) = (frame.id() == CanId::sdo_response(self.node), data.first()) else {
+            return Progress::NotOurs;
+        };
+        match self.state {
+            State::Initiated if multiplexer(data) == Some(self.object) => self.initiated(command, frame, out),
+            State::Segments { toggle } if command >> 5 == 0 => self.segment(command, toggle, frame, out),
+            _ => Progress::NotOurs,
+        }
+    }
+
+    /// Gives up: the server is told, if it had begun to answer.
+    pub fn on_timeout(&mut self, out: &mut Vec<Frame>) -> TransferError {
+        self.abort(AbortCode::TIMEOUT, out);
+        TransferError::NoAnswer
+    }
+
+    /// Tells the server that the transfer is over, if it had begun to answer.
+    pub fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
+        if self.has_begun() {
+            out.push(abort_frame(self.node, self.object, code));
+        }
+    }
+
+    fn initiated(&mut self, command: u8, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
+        let data = frame.data();
+        let expedited = command & 0x02 != 0;
+        let indicated = command & 0x01 != 0;
+        if command == 0x60 && self.accept_60 {
+            return Progress::Done(Uploaded { bytes: data[4..].to_vec(), indicated: false, announced: None });
+        }
+        if command >> 5 != 2 {
+            let violation = if command == 0x60 { Violation::WriteAcknowledgeToRead } else { Violation::Command };
+            return Progress::Failed(TransferError::Violation(violation, *frame));
+        }
+        if expedited {
+            let unused = if indicated { usize::from(command >> 2 & 3) } else { 0 };
+            // A short frame holds fewer bytes than it says: what is there is used, never filled up.
+            let end = data.len().min(8 - unused).max(4);
+            return Progress::Done(Uploaded { bytes: data[4..end].to_vec(), indicated, announced: None });
+        }
+        self.announced = if indicated { number(data) } else { None };
+        self.state = State::Segments { toggle: false };
+        out.push(self.segment_request(false));
+        Progress::Continue
+    }
+
+    fn segment(&mut self, command: u8, toggle: bool, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
+        if (command & 0x10 != 0) != toggle {
+            return self.fail(Violation::Toggle, frame, out);
+        }
+        let data = frame.data();
+        let unused = usize::from(command >> 1 & 7);
+        let end = data.len().min(8 - unused).max(1);
+        self.bytes.extend_from_slice(&data[1..end]);
+        if self.bytes.len() > LONGEST {
+            return self.fail(Violation::TooLong, frame, out);
+        }
+        if command & 0x01 != 0 {
+            let bytes = std::mem::take(&mut self.bytes);
+            return Progress::Done(Uploaded { bytes, indicated: true, announced: self.announced });
+        }
+        self.state = State::Segments { toggle: !toggle };
+        out.push(self.segment_request(!toggle));
+        Progress::Continue
+    }
+
+    fn segment_request(&self, toggle: bool) -> Frame {
+        Frame::full(CanId::sdo_request(self.node), [if toggle { 0x70 } else { 0x60 }, 0, 0, 0, 0, 0, 0, 0])
+    }
+
+    fn fail(&mut self, violation: Violation, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
+        self.abort(violation.abort_code(), out);
+        Progress::Failed(TransferError::Violation(violation, *frame))
+    }
+}

@@ -1,0 +1,247 @@
+//! Physical units as 6131h codes them (CiA 303-2; sources of each code in the table).
+
+use std::fmt;
+
+/// A unit code: prefix in bits 31-24 (signed power of ten), numerator in 23-16, denominator in 15-8.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Unit(pub u32);
+
+/// What a numerator code stands for: code, ASCII symbol, and how to get to the base of its quantity.
+struct Base {
+    code: u8,
+    symbol: &'static str,
+    /// Quantity, factor and offset: base value = value * factor + offset.
+    scale: Option<(Quantity, f64, f64)>,
+}
+
+/// What is measured; only values of one quantity convert into each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Quantity {
+    Pressure,
+    Temperature,
+    Length,
+    Time,
+    Mass,
+    Force,
+    Voltage,
+    Current,
+    Frequency,
+}
+
+const fn plain(code: u8, symbol: &'static str) -> Base {
+    Base { code, symbol, scale: None }
+}
+
+const fn scaled(code: u8, symbol: &'static str, quantity: Quantity, factor: f64, offset: f64) -> Base {
+    Base { code, symbol, scale: Some((quantity, factor, offset)) }
+}
+
+/// 1 psi in Pa: pound-force (0.45359237 kg * 9.80665 m/s2) on a square inch (0.0254 m).
+const PSI_PA: f64 = 0.453_592_37 * 9.806_65 / (0.0254 * 0.0254);
+
+/// DRP-303-2 V1.1, but 2Dh (MH-4, MC1609), 4Eh, ABh, ACh (MH-4, DPS), 26h (esd CAN-CBX-THERMO), 41h
+/// (Epson); 40h-4Ch without 41h and 25h-32h without 26h: general knowledge of CiA 303-2, no page at hand.
+const BASES: &[Base] = &[
+    scaled(0x01, "m", Quantity::Length, 1.0, 0.0),
+    scaled(0x02, "kg", Quantity::Mass, 1.0, 0.0),
+    scaled(0x03, "s", Quantity::Time, 1.0, 0.0),
+    scaled(0x04, "A", Quantity::Current, 1.0, 0.0),
+    scaled(0x05, "K", Quantity::Temperature, 1.0, 0.0),
+    plain(0x06, "mol"),
+    plain(0x07, "cd"),
+    plain(0x10, "rad"),
+    plain(0x11, "sr"),
+    scaled(0x20, "Hz", Quantity::Frequency, 1.0, 0.0),
+    scaled(0x21, "N", Quantity::Force, 1.0, 0.0),
+    scaled(0x22, "Pa", Quantity::Pressure, 1.0, 0.0),
+    plain(0x23, "J"),
+    plain(0x24, "W"),
+    plain(0x25, "C"),
+    scaled(0x26, "V", Quantity::Voltage, 1.0, 0.0),
+    plain(0x27, "F"),
+    plain(0x28, "ohm"),
+    plain(0x29, "S"),
+    plain(0x2a, "Wb"),
+    plain(0x2b, "T"),
+    plain(0x2c, "H"),
+    scaled(0x2d, "degC", Quantity::Temperature, 1.0, 273.15),
+    plain(0x2e, "lm"),
+    plain(0x2f, "lx"),
+    plain(0x30, "Bq"),
+    plain(0x31, "Gy"),
+    plain(0x32, "Sv"),
+    plain(0x40, "gon"),
+    plain(0x41, "deg"),
+    plain(0x42, "arcmin"),
+    plain(0x43, "arcsec"),
+    plain(0x44, "l"),
+    scaled(0x47, "min", Quantity::Time, 60.0, 0.0),
+    scaled(0x48, "h", Quantity::Time, 3600.0, 0.0),
+    scaled(0x49, "d", Quantity::Time, 86_400.0, 0.0),
+    scaled(0x4b, "g", Quantity::Mass, 1e-3, 0.0),
+    scaled(0x4c, "t", Quantity::Mass, 1e3, 0.0),
+    scaled(0x4e, "bar", Quantity::Pressure, 1e5, 0.0),
+    scaled(0xab, "psi", Quantity::Pressure, PSI_PA, 0.0),
+    scaled(0xac, "degF", Quantity::Temperature, 5.0 / 9.0, 459.67 * 5.0 / 9.0),
+];
+
+/// Prefixes by power of ten. "da" and "h" are used only where nothing else reads the same.
+const PREFIXES: &[(i8, &str)] = &[
+    (18, "E"),
+    (15, "P"),
+    (12, "T"),
+    (9, "G"),
+    (6, "M"),
+    (3, "k"),
+    (2, "h"),
+    (1, "da"),
+    (0, ""),
+    (-1, "d"),
+    (-2, "c"),
+    (-3, "m"),
+    (-6, "u"),
+    (-9, "n"),
+    (-12, "p"),
+    (-15, "f"),
+    (-18, "a"),
+];
+
+impl Unit {
+    /// No dimension.
+    pub const NONE: Unit = Unit(0);
+
+    fn parts(self) -> (i8, u8, u8, u8) {
+        let [reserved, denominator, numerator, prefix] = self.0.to_le_bytes();
+        (i8::from_le_bytes([prefix]), numerator, denominator, reserved)
+    }
+
+    fn base(code: u8) -> Option<&'static Base> {
+        BASES.iter().find(|base| base.code == code)
+    }
+
+    /// The ASCII symbol: `bar`, `degC`, `mbar`, `deg/s`; empty for no dimension; `None` where the code is
+    /// not known.
+    pub fn symbol(self) -> Option<String> {
+        let (prefix, numerator, denominator, reserved) = self.parts();
+        if self == Unit::NONE {
+            return Some(String::new());
+        }
+        let (_, prefix) = PREFIXES.iter().find(|(power, _)| *power == prefix)?;
+        let numerator = Unit::base(numerator)?.symbol;
+        match (denominator, reserved) {
+            (0, 0) => Some(format!("{prefix}{numerator}")),
+            (denominator, 0) => Some(format!("{prefix}{numerator}/{}", Unit::base(denominator)?.symbol)),
+            _ => None,
+        }
+    }
+
+    /// The unit of a symbol as people type it: `bar`, `mbar`, `kPa`, `°C` or `degC`, or a raw code `0x…`.
+    pub fn from_symbol(text: &str) -> Option<Unit> {
+        if text.starts_with("0x") || text.starts_with("0X") {
+            return crate::canopen::id::parse_u32(text).map(Unit);
+        }
+        let text = text.replace('\u{b0}', "deg").replace(['\u{b5}', '\u{3bc}'], "u");
+        for base in BASES {
+            for (power, prefix) in PREFIXES {
+                if text.strip_suffix(base.symbol) == Some(*prefix) {
+                    return Some(Unit(u32::from_le_bytes([0, 0, base.code, power.to_le_bytes()[0]])));
+                }
+            }
+        }
+        None
+    }
+
+    fn scale(self) -> Option<(Quantity, f64, f64)> {
+        let (prefix, numerator, 0, 0) = self.parts() else { return None };
+        let (quantity, factor, offset) = Unit::base(numerator)?.scale?;
+        Some((quantity, factor * 10f64.powi(i32::from(prefix)), offset))
+    }
+
+    /// `value` of this unit in another one; `None` when they do not measure the same quantity or one of
+    /// them is not known. A temperature converts as a temperature, not as a difference of two.
+    pub fn convert(self, value: f64, to: Unit) -> Option<f64> {
+        if self == to {
+            return Some(value);
+        }
+        let (from_quantity, from_factor, from_offset) = self.scale()?;
+        let (to_quantity, to_factor, to_offset) = to.scale()?;
+        (from_quantity == to_quantity).then(|| (value * from_factor + from_offset - to_offset) / to_factor)
+    }
+}
+
+impl fmt::Display for Unit {
+    /// The symbol, or the raw code where it is not known.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.symbol() {
+            Some(symbol) => f.write_str(&symbol),
+            None => write!(f, "0x{:08X}", self.0),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_and_symbols() {
+        for (code, symbol) in [
+            (0x004E_0000, "bar"),
+            (0x00AB_0000, "psi"),
+            (0x0622_0000, "MPa"),
+            (0x0322_0000, "kPa"),
+            (0x0222_0000, "hPa"),
+            (0x0022_0000, "Pa"),
+            (0xFD4E_0000, "mbar"),
+            (0x002D_0000, "degC"),
+            (0x00AC_0000, "degF"),
+            (0x0005_0000, "K"),
+            (0xFA26_0000, "uV"),
+            (0xFD26_0000, "mV"),
+            (0xFD04_0000, "mA"),
+            (0x0321_0000, "kN"),
+            (0xFD01_0000, "mm"),
+            (0x0002_0000, "kg"),
+            (0x004B_0000, "g"),
+        ] {
+            assert_eq!(Unit(code).to_string(), symbol);
+            assert_eq!(Unit::from_symbol(symbol), Some(Unit(code)), "{symbol}");
+        }
+        assert_eq!(Unit(0x0041_0300).to_string(), "deg/s");
+        assert_eq!(Unit::NONE.to_string(), "");
+        assert_eq!(Unit::from_symbol("\u{b0}C"), Some(Unit(0x002D_0000)));
+        assert_eq!(Unit::from_symbol("0x004E0000"), Some(Unit(0x004E_0000)));
+        assert_eq!(Unit::from_symbol("mmHg"), None);
+    }
+
+    #[test]
+    fn unknown_codes_stay_raw() {
+        for code in [0x00F1_0000, 0x004E_0001, 0x004E_FF00, 0x104E_0000, 0xFFFF_FFFF] {
+            assert_eq!(Unit(code).to_string(), format!("0x{code:08X}"));
+        }
+    }
+
+    #[test]
+    fn every_code_of_the_table_stands_once_and_reads_back() {
+        for base in BASES {
+            let unit = Unit(u32::from(base.code) << 16);
+            assert_eq!(unit.to_string(), base.symbol);
+            assert_eq!(Unit::from_symbol(base.symbol), Some(unit), "{}", base.symbol);
+        }
+    }
+
+    #[test]
+    fn conversion() {
+        let unit = |symbol| Unit::from_symbol(symbol).expect("a unit");
+        let convert = |value: f64, from, to| unit(from).convert(value, unit(to)).expect("the same quantity");
+        // DPS, table 19: 50.000 psi read 3.448 bar after the change of unit (3.44738 is exact; the device
+        // cuts or rounds to what it keeps).
+        assert!((convert(50.0, "psi", "bar") - 3.447_379).abs() < 1e-6);
+        assert!((convert(1.0, "bar", "kPa") - 100.0).abs() < 1e-9);
+        assert!((convert(25.0, "degC", "degF") - 77.0).abs() < 1e-9);
+        assert!((convert(0.0, "degC", "K") - 273.15).abs() < 1e-9);
+        assert_eq!(unit("bar").convert(1.0, unit("degC")), None);
+        assert_eq!(Unit(0x00F1_0000).convert(1.0, unit("bar")), None);
+        assert_eq!(Unit(0x00F1_0000).convert(1.0, Unit(0x00F1_0000)), Some(1.0));
+    }
+}

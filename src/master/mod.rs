@@ -1,0 +1,272 @@
+//! Drives the protocol machines over a [`Bus`]: one deadline an exchange, retries, matching, many
+//! exchanges side by side.
+//!
+//! [`Master::next`] is the one loop: it sends what waits, receives one thing, lets the SDO client see it
+//! and says what happened. Everything that blocks is built on it.
+
+mod sdo;
+mod send;
+
+pub use sdo::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
+
+use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};
+use crate::canopen::frame::Frame;
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::sdo::{FitError, Note, Uploaded, fit};
+use crate::canopen::value::{DataType, Value};
+use sdo::SdoClient;
+use send::Outgoing;
+use std::time::Duration;
+
+/// How long to wait and how often to ask.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// The longest wait for one answer.
+    pub timeout: Duration,
+    /// How often a request that got no answer is repeated.
+    pub retries: u32,
+}
+
+impl Default for Timing {
+    fn default() -> Timing {
+        Timing { timeout: Duration::from_millis(500), retries: 1 }
+    }
+}
+
+/// Why nothing could be done at all; what concerns one node is a [`SdoError`].
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The bus fails.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The user asked to stop.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// Something that happened while waiting.
+#[derive(Debug)]
+pub enum Happening {
+    /// A frame that is no part of our SDO transfers.
+    Frame(Received),
+    /// An SDO transfer has ended.
+    Sdo(Ticket, Result<Answer, SdoError>),
+    /// The controller reports trouble.
+    Fault(Fault, Stamp),
+    /// The kernel dropped frames.
+    Dropped(u32),
+    /// The interface went down or came back.
+    Link(bool),
+    /// The moment waited for is there.
+    Deadline,
+    /// The user asked to stop.
+    Interrupted,
+}
+
+/// A CANopen master on a bus.
+pub struct Master<'bus> {
+    bus: &'bus mut dyn Bus,
+    timing: Timing,
+    sdo: SdoClient,
+    outgoing: Outgoing,
+    /// A frame that came after the moment waited for.
+    put_back: Option<Received>,
+}
+
+impl<'bus> Master<'bus> {
+    /// A master on `bus`.
+    pub fn new(bus: &'bus mut dyn Bus, timing: Timing) -> Master<'bus> {
+        let outgoing = Outgoing::new(bus.bit_rate());
+        Master { bus, timing, sdo: SdoClient::default(), outgoing, put_back: None }
+    }
+
+    /// The bus.
+    pub fn bus(&self) -> &dyn Bus {
+        &*self.bus
+    }
+
+    /// The time-outs in force.
+    pub fn timing(&self) -> Timing {
+        self.timing
+    }
+
+    /// The present moment.
+    pub fn now(&self) -> Mono {
+        self.bus.now().mono
+    }
+
+    /// Tells the bus which frames are wanted.
+    pub fn listen(&mut self, filters: &Filters) -> Result<(), Error> {
+        Ok(self.bus.listen(filters)?)
+    }
+
+    /// Puts a frame behind those already waiting to be sent.
+    pub fn send(&mut self, frame: Frame) {
+        self.outgoing.push(frame, None);
+    }
+
+    /// Puts a frame before all that wait: a SYNC must not stand behind SDO requests.
+    pub fn send_first(&mut self, frame: Frame) {
+        self.outgoing.push_first(frame);
+    }
+
+    /// Starts an SDO transfer; its end comes as [`Happening::Sdo`] with the ticket returned. One transfer a
+    /// node at a time; others of the same node wait their turn.
+    pub fn start(&mut self, request: Request) -> Ticket {
+        self.sdo.submit(request)
+    }
+
+    /// Whether an SDO transfer is under way or waiting.
+    pub fn is_busy(&self) -> bool {
+        self.sdo.is_busy()
+    }
+
+    /// Ends every SDO transfer; servers that had begun are told.
+    pub fn cancel(&mut self) {
+        let mut out = Vec::new();
+        self.sdo.cancel(&mut out);
+        self.outgoing.drop_requests();
+        for frame in out {
+            self.outgoing.push(frame, None);
+        }
+        let now = self.now();
+        // The bus may be gone; then there is nobody to tell.
+        let _ = self.outgoing.flush(self.bus, now, self.timing.timeout, &mut |_, _| {});
+    }
+
+    /// The next thing that happens, at the latest [`Happening::Deadline`] once `until` is reached.
+    ///
+    /// Time is told by what is received, so that traffic never extends a deadline and a slow program never
+    /// shortens one: a frame that came after a deadline is looked at after the deadline.
+    pub fn next(&mut self, until: Mono) -> Result<Happening, Error> {
+        loop {
+            if let Some((ticket, result)) = self.sdo.pop_finished() {
+                return Ok(Happening::Sdo(ticket, result));
+            }
+            let retry_at = self.send_what_waits()?;
+            let mut deadline = until;
+            for other in [retry_at, self.sdo.next_deadline()].into_iter().flatten() {
+                deadline = deadline.min(other);
+            }
+            let event = match self.put_back.take() {
+                Some(received) => Event::Frame(received),
+                None => self.bus.receive(deadline)?,
+            };
+            match event {
+                Event::Frame(received) => {
+                    let at = received.at.mono;
+                    if at > until {
+                        self.put_back = Some(received);
+                        return Ok(Happening::Deadline);
+                    }
+                    self.sdo.on_time(at, &self.timing, &mut self.outgoing);
+                    if !self.sdo.on_frame(&received, &mut self.outgoing) {
+                        return Ok(Happening::Frame(received));
+                    }
+                }
+                Event::Fault(fault, at) => return Ok(Happening::Fault(fault, at)),
+                Event::Dropped(count) => return Ok(Happening::Dropped(count)),
+                Event::Link(up) => return Ok(Happening::Link(up)),
+                Event::Interrupted => return Ok(Happening::Interrupted),
+                Event::Timeout => {
+                    self.sdo.on_time(deadline, &self.timing, &mut self.outgoing);
+                    if deadline >= until && !self.sdo.has_finished() {
+                        return Ok(Happening::Deadline);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Reads the clock only when there is something to send: on some machines that is a system call.
+    fn send_what_waits(&mut self) -> Result<Option<Mono>, Error> {
+        if !self.sdo.can_start() && self.outgoing.is_empty() {
+            return Ok(None);
+        }
+        let now = self.now();
+        self.sdo.advance(&self.timing, now, &mut self.outgoing);
+        let (sdo, timing) = (&mut self.sdo, &self.timing);
+        let retry_at = self.outgoing.flush(self.bus, now, timing.timeout, &mut |ticket, sent_at| {
+            sdo.on_sent(ticket, sent_at, timing);
+        })?;
+        Ok(retry_at)
+    }
+
+    /// Carries out transfers side by side and returns their results in the order of the requests. Frames
+    /// that are no part of them go to `watch`.
+    ///
+    /// # Errors
+    /// Only what stops everything; what one device does is in its result.
+    pub fn transfer(
+        &mut self,
+        requests: Vec<Request>,
+        watch: &mut dyn FnMut(&Received),
+    ) -> Result<Vec<Result<Answer, SdoError>>, Error> {
+        let tickets: Vec<Ticket> = requests.into_iter().map(|request| self.start(request)).collect();
+        let mut results: Vec<Option<Result<Answer, SdoError>>> = tickets.iter().map(|_| None).collect();
+        let mut open = tickets.len();
+        let far = Mono::at(Duration::MAX);
+        while open > 0 {
+            match self.next(far)? {
+                Happening::Sdo(ticket, result) => {
+                    if let Some(at) = tickets.iter().position(|&mine| mine == ticket) {
+                        results[at] = Some(result);
+                        open -= 1;
+                    }
+                }
+                Happening::Frame(received) => watch(&received),
+                Happening::Interrupted => {
+                    self.cancel();
+                    return Err(Error::Interrupted);
+                }
+                Happening::Link(false) => {
+                    self.cancel();
+                    return Err(Error::Bus(BusError::Down(self.bus.name().to_owned())));
+                }
+                Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) | Happening::Deadline => {}
+            }
+        }
+        Ok(results.into_iter().flatten().collect())
+    }
+
+    /// One transfer.
+    pub fn transfer_one(&mut self, request: Request) -> Result<Result<Answer, SdoError>, Error> {
+        let (node, object, operation) = (request.node, request.object, request.operation());
+        let result = self.transfer(vec![request], &mut |_| {})?.pop();
+        Ok(result.unwrap_or(Err(SdoError { node, object, operation, failure: SdoFailure::Cancelled })))
+    }
+
+    /// Reads a value of a known type.
+    pub fn read(
+        &mut self,
+        node: NodeId,
+        object: ObjectId,
+        data_type: DataType,
+    ) -> Result<Result<Value, SdoError>, Error> {
+        let answer = self.transfer_one(Request::read(node, object))?;
+        Ok(answer.and_then(|answer| answer.value(node, object, Some(data_type)).map(|(value, _)| value)))
+    }
+}
+
+impl Answer {
+    /// The value read, and what was odd about how it came.
+    ///
+    /// # Errors
+    /// Bytes that make no value of the type.
+    pub fn value(
+        &self,
+        node: NodeId,
+        object: ObjectId,
+        data_type: Option<DataType>,
+    ) -> Result<(Value, Option<Note>), SdoError> {
+        let empty = Uploaded { bytes: Vec::new(), indicated: true, announced: None };
+        let uploaded = self.uploaded.as_ref().unwrap_or(&empty);
+        fit(data_type, uploaded).map(|fitted| (fitted.value, fitted.note)).map_err(|error: FitError| SdoError {
+            node,
+            object,
+            operation: Operation::Read,
+            failure: SdoFailure::Fit(error),
+        })
+    }
+}

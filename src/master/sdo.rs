@@ -1,0 +1,413 @@
+//! The SDO client: one transfer a node at a time, many nodes side by side, retries, and the rule that a
+//! late answer never becomes the next reading.
+
+use super::Timing;
+use super::send::Outgoing;
+use crate::bus::{Mono, Received, Stamp};
+use crate::canopen::frame::Frame;
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::sdo::{
+    AbortCode, Download, DownloadSize, FitError, Progress, TransferError, Upload, Uploaded, Violation,
+};
+use std::collections::{BTreeMap, VecDeque};
+use std::fmt;
+use std::time::Duration;
+
+/// Names a transfer from its start to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Ticket(u64);
+
+/// What is to be transferred.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// With which node.
+    pub node: NodeId,
+    /// Which object.
+    pub object: ObjectId,
+    kind: Kind,
+    timeout: Option<Duration>,
+    repeatable: bool,
+}
+
+#[derive(Clone, Debug)]
+enum Kind {
+    Read { accept_60: bool },
+    Write { data: Vec<u8>, size: DownloadSize },
+}
+
+impl Request {
+    /// A read.
+    pub fn read(node: NodeId, object: ObjectId) -> Request {
+        Request { node, object, kind: Kind::Read { accept_60: false }, timeout: None, repeatable: true }
+    }
+
+    /// A write of a plain value.
+    pub fn write(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> Request {
+        Request { node, object, kind: Kind::Write { data, size }, timeout: None, repeatable: true }
+    }
+
+    /// A read that takes 60h for a size-less answer ([`crate::device::quirk::Quirk::UploadAnswered60`]).
+    pub fn accepting_60(mut self) -> Request {
+        if let Kind::Read { accept_60 } = &mut self.kind {
+            *accept_60 = true;
+        }
+        self
+    }
+
+    /// Sent once only, whatever the time-outs say: signatures, and scans that do their own asking.
+    pub fn once(mut self) -> Request {
+        self.repeatable = false;
+        self
+    }
+
+    /// With a longer wait than others: storing.
+    pub fn within(mut self, timeout: Duration) -> Request {
+        self.timeout = Some(timeout);
+        self
+    }
+
+    /// Whether it reads or writes.
+    pub fn operation(&self) -> Operation {
+        match self.kind {
+            Kind::Read { .. } => Operation::Read,
+            Kind::Write { .. } => Operation::Write,
+        }
+    }
+}
+
+/// Whether a transfer reads or writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operation {
+    /// SDO upload.
+    Read,
+    /// SDO download.
+    Write,
+}
+
+impl fmt::Display for Operation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Operation::Read => "read",
+            Operation::Write => "write",
+        })
+    }
+}
+
+/// The end of a transfer that succeeded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// What was read; `None` of a write.
+    pub uploaded: Option<Uploaded>,
+    /// When the last frame of the answer was received.
+    pub at: Stamp,
+}
+
+/// Why a transfer has no result.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{operation} {object}: {failure}")]
+pub struct SdoError {
+    /// With which node.
+    pub node: NodeId,
+    /// Which object.
+    pub object: ObjectId,
+    /// Whether it was read or written.
+    pub operation: Operation,
+    /// What went wrong.
+    pub failure: SdoFailure,
+}
+
+/// What went wrong with a transfer.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SdoFailure {
+    /// The device refused.
+    #[error("refused by the device ({0})")]
+    Refused(AbortCode),
+    /// Nothing came.
+    #[error("no answer within {}{}", humantime::format_duration(*.waited), if *.begun { " in the middle of the transfer" } else { "" })]
+    NoAnswer {
+        /// The longest wait for one answer.
+        waited: Duration,
+        /// Whether the device had begun to answer.
+        begun: bool,
+    },
+    /// The device answered against the protocol.
+    #[error("{0}: {1}")]
+    Violation(Violation, Frame),
+    /// The device delivered bytes that make no value of the type.
+    #[error("{0}")]
+    Fit(FitError),
+    /// We gave up.
+    #[error("not finished")]
+    Cancelled,
+}
+
+#[derive(Clone, Debug)]
+enum Machine {
+    Read(Upload),
+    Write(Download),
+}
+
+/// A transfer under way.
+#[derive(Debug)]
+struct Active {
+    ticket: Ticket,
+    request: Request,
+    machine: Machine,
+    /// Set when the last frame went out, never renewed by other traffic.
+    deadline: Option<Mono>,
+    attempts_left: u32,
+    /// The user's transfer that waits while this one makes sure that no old answer is still under way.
+    behind: Option<(Ticket, Request)>,
+}
+
+/// A request that got no answer, whose answer may still come.
+#[derive(Clone, Copy, Debug)]
+struct Ghost {
+    object: ObjectId,
+    until: Mono,
+}
+
+#[derive(Debug, Default)]
+struct Node {
+    waiting: VecDeque<(Ticket, Request)>,
+    active: Option<Active>,
+    ghosts: Vec<Ghost>,
+}
+
+/// How long an answer may be late. Nothing in the standard bounds it; storing takes the longest.
+const GHOST_LIFE: Duration = Duration::from_secs(10);
+
+/// The client's side of every SDO channel.
+#[derive(Debug, Default)]
+pub(super) struct SdoClient {
+    nodes: BTreeMap<NodeId, Node>,
+    finished: VecDeque<(Ticket, Result<Answer, SdoError>)>,
+    next_ticket: u64,
+}
+
+impl Active {
+    fn new(ticket: Ticket, request: Request, timing: &Timing) -> Active {
+        let machine = match &request.kind {
+            Kind::Read { accept_60 } => Machine::Read(Upload::new(request.node, request.object, *accept_60)),
+            Kind::Write { data, size } => {
+                Machine::Write(Download::new(request.node, request.object, data.clone(), *size))
+            }
+        };
+        let attempts_left = if request.repeatable { timing.retries } else { 0 };
+        Active { ticket, request, machine, deadline: None, attempts_left, behind: None }
+    }
+
+    fn first_frame(&self) -> Frame {
+        match &self.machine {
+            Machine::Read(upload) => upload.request(),
+            Machine::Write(download) => download.request(),
+        }
+    }
+
+    fn has_begun(&self) -> bool {
+        match &self.machine {
+            Machine::Read(upload) => upload.has_begun(),
+            Machine::Write(download) => download.has_begun(),
+        }
+    }
+
+    fn on_frame(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Option<Uploaded>> {
+        match &mut self.machine {
+            Machine::Read(upload) => match upload.on_frame(frame, out) {
+                Progress::Done(uploaded) => Progress::Done(Some(uploaded)),
+                Progress::NotOurs => Progress::NotOurs,
+                Progress::Continue => Progress::Continue,
+                Progress::Failed(error) => Progress::Failed(error),
+            },
+            Machine::Write(download) => match download.on_frame(frame, out) {
+                Progress::Done(()) => Progress::Done(None),
+                Progress::NotOurs => Progress::NotOurs,
+                Progress::Continue => Progress::Continue,
+                Progress::Failed(error) => Progress::Failed(error),
+            },
+        }
+    }
+
+    fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
+        match &mut self.machine {
+            Machine::Read(upload) => upload.abort(code, out),
+            Machine::Write(download) => download.abort(code, out),
+        }
+    }
+
+    fn waited(&self, timing: &Timing) -> Duration {
+        self.request.timeout.unwrap_or(timing.timeout)
+    }
+
+    fn error(&self, failure: SdoFailure) -> SdoError {
+        SdoError { node: self.request.node, object: self.request.object, operation: self.request.operation(), failure }
+    }
+}
+
+impl SdoClient {
+    pub(super) fn submit(&mut self, request: Request) -> Ticket {
+        let ticket = Ticket(self.next_ticket);
+        self.next_ticket += 1;
+        self.nodes.entry(request.node).or_default().waiting.push_back((ticket, request));
+        ticket
+    }
+
+    pub(super) fn is_busy(&self) -> bool {
+        self.has_finished() || self.nodes.values().any(|node| node.active.is_some() || !node.waiting.is_empty())
+    }
+
+    /// Whether [`SdoClient::advance`] would start something.
+    pub(super) fn can_start(&self) -> bool {
+        self.nodes.values().any(|node| node.active.is_none() && !node.waiting.is_empty())
+    }
+
+    pub(super) fn has_finished(&self) -> bool {
+        !self.finished.is_empty()
+    }
+
+    pub(super) fn pop_finished(&mut self) -> Option<(Ticket, Result<Answer, SdoError>)> {
+        self.finished.pop_front()
+    }
+
+    /// Starts what can start: the next transfer of every node that has none under way.
+    pub(super) fn advance(&mut self, timing: &Timing, now: Mono, outgoing: &mut Outgoing) {
+        for node in self.nodes.values_mut() {
+            if node.active.is_some() {
+                continue;
+            }
+            let Some((ticket, request)) = node.waiting.pop_front() else { continue };
+            node.ghosts.retain(|ghost| ghost.until > now);
+            // A server answers in order. While an answer for this very object may still be under way, a read
+            // of another object comes first: once that is answered, nothing older can come.
+            let haunted = node.ghosts.iter().any(|ghost| ghost.object == request.object);
+            let active = if haunted {
+                let other = if request.object == DEVICE_TYPE { ERROR_REGISTER } else { DEVICE_TYPE };
+                let barrier = Request::read(request.node, other).once();
+                Active { behind: Some((ticket, request)), ..Active::new(ticket, barrier, timing) }
+            } else {
+                Active::new(ticket, request, timing)
+            };
+            outgoing.push(active.first_frame(), Some(ticket));
+            node.active = Some(active);
+        }
+    }
+
+    /// A frame of a transfer is on its way: from now on its answer is waited for.
+    pub(super) fn on_sent(&mut self, ticket: Ticket, now: Mono, timing: &Timing) {
+        let active = self.nodes.values_mut().filter_map(|node| node.active.as_mut());
+        if let Some(active) = active.into_iter().find(|active| active.ticket == ticket) {
+            active.deadline = Some(now + active.waited(timing));
+        }
+    }
+
+    pub(super) fn next_deadline(&self) -> Option<Mono> {
+        self.nodes.values().filter_map(|node| node.active.as_ref()?.deadline).min()
+    }
+
+    /// Takes a frame; `false` if it is no SDO frame of a node that we deal with.
+    pub(super) fn on_frame(&mut self, received: &Received, outgoing: &mut Outgoing) -> bool {
+        let id = received.frame.id();
+        let Some(number) = id.sdo_response_node().or_else(|| id.sdo_request_node()) else { return false };
+        let Some(node) = self.nodes.get_mut(&number) else { return false };
+        let Some(active) = &mut node.active else {
+            node.settle(&received.frame);
+            return false;
+        };
+        let mut out = Vec::new();
+        let result = match active.on_frame(&received.frame, &mut out) {
+            Progress::NotOurs => {
+                node.settle(&received.frame);
+                return false;
+            }
+            Progress::Continue => {
+                active.deadline = None;
+                let ticket = active.ticket;
+                for frame in out {
+                    outgoing.push(frame, Some(ticket));
+                }
+                return true;
+            }
+            Progress::Done(uploaded) => Ok(Answer { uploaded, at: received.at }),
+            Progress::Failed(TransferError::Aborted(code)) => Err(active.error(SdoFailure::Refused(code))),
+            Progress::Failed(TransferError::Violation(violation, frame)) => {
+                Err(active.error(SdoFailure::Violation(violation, frame)))
+            }
+            Progress::Failed(TransferError::NoAnswer) => Err(active.error(SdoFailure::Cancelled)),
+        };
+        for frame in out {
+            outgoing.push(frame, None);
+        }
+        if let Some(active) = node.active.take() {
+            outgoing.drop_ticket(active.ticket);
+            match active.behind {
+                // Refused or answered: either way everything older has been answered before.
+                Some(behind) => {
+                    node.ghosts.clear();
+                    node.waiting.push_front(behind);
+                }
+                None => self.finished.push_back((active.ticket, result)),
+            }
+        }
+        true
+    }
+
+    /// Looks for transfers whose time is over.
+    pub(super) fn on_time(&mut self, now: Mono, timing: &Timing, outgoing: &mut Outgoing) {
+        for node in self.nodes.values_mut() {
+            let Some(active) = node.active.as_mut().filter(|active| active.deadline.is_some_and(|at| at <= now)) else {
+                continue;
+            };
+            let begun = active.has_begun();
+            if !begun {
+                node.ghosts.push(Ghost { object: active.request.object, until: now + GHOST_LIFE });
+                if active.attempts_left > 0 {
+                    active.attempts_left -= 1;
+                    active.deadline = None;
+                    let frame = active.first_frame();
+                    outgoing.push(frame, Some(active.ticket));
+                    continue;
+                }
+            }
+            let Some(mut active) = node.active.take() else { continue };
+            let mut out = Vec::new();
+            active.abort(AbortCode::TIMEOUT, &mut out);
+            for frame in out {
+                outgoing.push(frame, None);
+            }
+            let waited = active.waited(timing);
+            let mut error = active.error(SdoFailure::NoAnswer { waited, begun });
+            if let Some((_, request)) = &active.behind {
+                error.object = request.object;
+                error.operation = request.operation();
+            }
+            self.finished.push_back((active.ticket, Err(error)));
+        }
+    }
+
+    /// Ends everything; what is to be told to servers goes to `out`.
+    pub(super) fn cancel(&mut self, out: &mut Vec<Frame>) {
+        for node in self.nodes.values_mut() {
+            if let Some(mut active) = node.active.take() {
+                active.abort(AbortCode::TIMEOUT, out);
+            }
+            node.waiting.clear();
+        }
+        self.finished.clear();
+    }
+}
+
+impl Node {
+    /// An answer that nobody waits for: it is that of a request given up.
+    fn settle(&mut self, frame: &Frame) {
+        if let (Some(_), [_, a, b, c, ..]) = (frame.id().sdo_response_node(), frame.data()) {
+            let object = ObjectId::from_multiplexer([*a, *b, *c]);
+            if let Some(at) = self.ghosts.iter().position(|ghost| ghost.object == object) {
+                self.ghosts.remove(at);
+            }
+        }
+    }
+}
+
+const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
+const ERROR_REGISTER: ObjectId = ObjectId::new(0x1001, 0);

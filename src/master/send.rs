@@ -1,0 +1,98 @@
+//! What waits to be sent: paced to the bit rate, patient with a full transmit queue.
+
+use super::Ticket;
+use crate::bus::{Bus, BusError, Mono};
+use crate::canopen::frame::Frame;
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// How long to wait before trying a full transmit queue again. Linux gives no wake-up for it.
+const RETRY: Duration = Duration::from_millis(1);
+
+/// How many frames may be ahead of the wire. The default transmit queue of a Linux interface holds 10.
+const AHEAD: u32 = 4;
+
+/// The longest classic frame with an 11-bit identifier: 8 bytes, every stuff bit, and the gap.
+const LONGEST_FRAME_BITS: u64 = 135;
+
+/// The queue between the protocol machines and the bus.
+pub(super) struct Outgoing {
+    queue: VecDeque<(Frame, Option<Ticket>)>,
+    frame_time: Option<Duration>,
+    /// When the wire will have carried everything sent so far, if nobody else sends.
+    wire_free_at: Mono,
+    full_since: Option<Mono>,
+}
+
+impl Outgoing {
+    pub(super) fn new(bit_rate: Option<u32>) -> Outgoing {
+        let frame_time = bit_rate
+            .filter(|&rate| rate > 0)
+            .map(|rate| Duration::from_nanos(LONGEST_FRAME_BITS * 1_000_000_000 / u64::from(rate)));
+        Outgoing { queue: VecDeque::new(), frame_time, wire_free_at: Mono::START, full_since: None }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.queue.is_empty()
+    }
+
+    pub(super) fn push(&mut self, frame: Frame, ticket: Option<Ticket>) {
+        self.queue.push_back((frame, ticket));
+    }
+
+    pub(super) fn push_first(&mut self, frame: Frame) {
+        self.queue.push_front((frame, None));
+    }
+
+    /// Forgets the frames of SDO transfers.
+    pub(super) fn drop_requests(&mut self) {
+        self.queue.retain(|(_, ticket)| ticket.is_none());
+    }
+
+    /// Forgets the frames of one SDO transfer.
+    pub(super) fn drop_ticket(&mut self, gone: Ticket) {
+        self.queue.retain(|(_, ticket)| *ticket != Some(gone));
+    }
+
+    /// Sends what can be sent now and tells `sent` of each frame of a transfer. Returns when to try again,
+    /// if something is left.
+    ///
+    /// # Errors
+    /// The bus's own, and a transmit queue that stays full for `patience` (at least a second).
+    pub(super) fn flush(
+        &mut self,
+        bus: &mut dyn Bus,
+        now: Mono,
+        patience: Duration,
+        sent: &mut dyn FnMut(Ticket, Mono),
+    ) -> Result<Option<Mono>, BusError> {
+        while let Some((frame, ticket)) = self.queue.front() {
+            if let Some(frame_time) = self.frame_time {
+                let ahead = self.wire_free_at.since(now);
+                if ahead > frame_time * AHEAD {
+                    return Ok(Some(now + frame_time));
+                }
+            }
+            match bus.send(frame) {
+                Ok(()) => {}
+                Err(BusError::QueueFull) => {
+                    let since = *self.full_since.get_or_insert(now);
+                    if now.since(since) > patience.max(Duration::from_secs(1)) {
+                        return Err(BusError::QueueFull);
+                    }
+                    return Ok(Some(now + RETRY));
+                }
+                Err(error) => return Err(error),
+            }
+            if let Some(ticket) = ticket {
+                sent(*ticket, now);
+            }
+            self.queue.pop_front();
+            self.full_since = None;
+            if let Some(frame_time) = self.frame_time {
+                self.wire_free_at = self.wire_free_at.max(now) + frame_time;
+            }
+        }
+        Ok(None)
+    }
+}
