@@ -52,7 +52,7 @@ pub struct Wall(Duration);
 
 impl Wall {
     /// The moment `since_epoch` after 1970-01-01 00:00 UTC.
-    pub fn at(since_epoch: Duration) -> Wall {
+    pub const fn at(since_epoch: Duration) -> Wall {
         Wall(since_epoch)
     }
 

@@ -10,3 +10,4 @@ pub mod object;
 pub mod pdo;
 pub mod sdo;
 pub mod value;
+pub mod wire_length;

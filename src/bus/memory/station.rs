@@ -1,14 +1,15 @@
-//! A CAN bus inside the process: a wire with arbitration and a bit rate, a clock that is real for
-//! people and virtual for tests, and stations on it. The simulated devices are such stations.
+//! What can be on a bus beside the program: a station, which is driven by frames and time.
 
-use super::time::Mono;
+use crate::bus::time::Mono;
 use crate::canopen::frame::Frame;
+use std::any::Any;
 use std::collections::VecDeque;
 
 /// A participant on a bus that is driven by frames and time: a simulated device.
 ///
-/// It never waits and has no clock: the bus says when it is.
-pub trait Station {
+/// It never waits and has no clock: whoever runs it says when it is. `Any`, so that a test can look into a
+/// station that it has handed over.
+pub trait Station: Any + Send {
     /// Power comes on at `now`.
     fn power_on(&mut self, now: Mono, out: &mut Outbox);
 
@@ -18,7 +19,8 @@ pub trait Station {
     /// The moment asked for by [`Station::next_wake`] has come.
     fn wake(&mut self, now: Mono, out: &mut Outbox);
 
-    /// When the station wants to be woken next, if nothing else happens before.
+    /// When the station wants to be woken next, if nothing else happens before. After [`Station::wake`] at
+    /// `now` this must be later than `now`, or time would stand still.
     fn next_wake(&self) -> Option<Mono>;
 
     /// A frame from this station's outbox has left it and is complete on the wire.

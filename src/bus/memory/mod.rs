@@ -1,0 +1,294 @@
+//! A CAN bus inside the process: a wire with arbitration and a bit rate, a clock that is real for
+//! people and virtual for tests, and stations on it. The simulated devices are such stations.
+
+mod clock;
+mod station;
+
+use super::time::{Mono, Stamp};
+use super::{Bus, BusError, Event, Filters, Received, TimestampSource};
+use crate::canopen::frame::Frame;
+use crate::canopen::wire_length::{INTERMISSION, bit_time, frame_bits, priority};
+use clock::TimeLine;
+pub use clock::{Clock, Sleeper, Uninterrupted, VIRTUAL_EPOCH};
+pub use station::{Outbox, Station};
+use std::any::Any;
+use std::collections::{BTreeSet, VecDeque};
+
+/// How many frames of the program wait for the wire before [`BusError::QueueFull`]: Linux's default
+/// `txqueuelen` of a CAN interface.
+pub const QUEUE_LENGTH: usize = 10;
+
+/// The bit rate unless another is asked for, in bit/s.
+pub const BIT_RATE: u32 = 250_000;
+
+/// A CAN bus inside the process, as the program sees it.
+///
+/// The program is one of the participants. It gets what the others send and not its own frames, as on
+/// SocketCAN. Everything happens in [`Bus::receive`] and [`Bus::send`]; there is no thread. On the real clock
+/// what was due while the program did something else is made up for, each happening at its own time.
+pub struct MemoryBus {
+    name: String,
+    bit_rate: u32,
+    queue_length: usize,
+    time_line: TimeLine,
+    /// How far the bus has been played.
+    now: Mono,
+    places: Vec<Place>,
+    queue: VecDeque<Frame>,
+    inbox: VecDeque<Event>,
+    filters: Filters,
+    wire: Wire,
+    interrupts: BTreeSet<Mono>,
+    sleeper: Box<dyn Sleeper>,
+}
+
+/// A station and what it has to send.
+struct Place {
+    station: Box<dyn Station>,
+    out: Outbox,
+}
+
+/// Who is sending.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sender {
+    Program,
+    Station(usize),
+}
+
+/// What the wire is doing.
+enum Wire {
+    /// Nothing until then (the pause after a frame); afterwards whoever wants may begin.
+    Free(Mono),
+    Busy {
+        sender: Sender,
+        frame: Frame,
+        complete: Mono,
+    },
+}
+
+impl MemoryBus {
+    /// A bus without stations that goes by `clock`.
+    pub fn new(clock: Clock) -> MemoryBus {
+        MemoryBus {
+            name: "sim".to_owned(),
+            bit_rate: BIT_RATE,
+            queue_length: QUEUE_LENGTH,
+            time_line: TimeLine::open(clock),
+            now: Mono::START,
+            places: Vec::new(),
+            queue: VecDeque::new(),
+            inbox: VecDeque::new(),
+            filters: Filters::All,
+            wire: Wire::Free(Mono::START),
+            interrupts: BTreeSet::new(),
+            sleeper: Box::new(Uninterrupted),
+        }
+    }
+
+    /// The same bus at another bit rate, in bit/s.
+    pub fn with_bit_rate(mut self, bit_rate: u32) -> MemoryBus {
+        self.bit_rate = bit_rate.max(1);
+        self
+    }
+
+    /// The same bus with another length of the program's transmit queue.
+    pub fn with_queue_length(mut self, length: usize) -> MemoryBus {
+        self.queue_length = length;
+        self
+    }
+
+    /// The same bus with waits that something can interrupt.
+    pub fn with_sleeper(mut self, sleeper: Box<dyn Sleeper>) -> MemoryBus {
+        self.sleeper = sleeper;
+        self
+    }
+
+    /// Connects a station and switches its power on.
+    pub fn attach(&mut self, station: impl Station) {
+        let mut place = Place { station: Box::new(station), out: Outbox::default() };
+        place.station.power_on(self.now, &mut place.out);
+        self.places.push(place);
+    }
+
+    /// The stations of one kind, in the order in which they were attached.
+    pub fn stations<S: Station>(&self) -> impl Iterator<Item = &S> {
+        self.places.iter().filter_map(|place| {
+            let station: &dyn Any = &*place.station;
+            station.downcast_ref()
+        })
+    }
+
+    /// The stations of one kind, to be changed.
+    pub fn stations_mut<S: Station>(&mut self) -> impl Iterator<Item = &mut S> {
+        self.places.iter_mut().filter_map(|place| {
+            let station: &mut dyn Any = &mut *place.station;
+            station.downcast_mut()
+        })
+    }
+
+    /// Lets the user ask to stop at `moment`: [`Event::Interrupted`], once.
+    pub fn interrupt_at(&mut self, moment: Mono) {
+        self.interrupts.insert(moment);
+    }
+
+    /// The next moment at which something happens by itself, not before the present one.
+    fn next_happening(&self) -> Option<Mono> {
+        let wire = match &self.wire {
+            Wire::Busy { complete, .. } => Some(*complete),
+            Wire::Free(from) => self.contender().map(|_| *from),
+        };
+        let wakes = self.places.iter().filter_map(|place| place.station.next_wake());
+        let interrupt = self.interrupts.first().copied();
+        wakes.chain(wire).chain(interrupt).min().map(|moment| moment.max(self.now))
+    }
+
+    /// Who wins the wire if it is free: the lowest identifier among the heads of all queues.
+    fn contender(&self) -> Option<Sender> {
+        let program = self.queue.front().map(|frame| (priority(frame), Sender::Program));
+        let stations = self
+            .places
+            .iter()
+            .enumerate()
+            .filter_map(|(index, place)| Some((priority(place.out.front()?), Sender::Station(index))));
+        program.into_iter().chain(stations).min_by_key(|(priority, _)| *priority).map(|(_, sender)| sender)
+    }
+
+    /// Plays everything that happens up to and including `limit`, at most until the program has something
+    /// to receive; `true` as long as there is more.
+    fn step(&mut self, limit: Mono) -> bool {
+        let Some(moment) = self.next_happening().filter(|moment| *moment <= limit) else { return false };
+        self.now = moment;
+        if self.interrupts.first().is_some_and(|due| *due <= moment) {
+            self.interrupts.pop_first();
+            self.inbox.push_back(Event::Interrupted);
+            return true;
+        }
+        // What is complete now is delivered before anybody who wakes now, and everybody who wakes now takes
+        // part in the arbitration of now.
+        if let Wire::Busy { sender, frame, complete } = &self.wire
+            && *complete <= moment
+        {
+            let (sender, frame) = (*sender, *frame);
+            self.wire = Wire::Free(moment + bit_time(INTERMISSION, self.bit_rate));
+            self.deliver(sender, &frame);
+            return true;
+        }
+        let mut woken = false;
+        for place in &mut self.places {
+            if place.station.next_wake().is_some_and(|due| due <= moment) {
+                place.station.wake(moment, &mut place.out);
+                woken = true;
+            }
+        }
+        if !woken {
+            self.begin();
+        }
+        true
+    }
+
+    /// The winner of the arbitration begins to send.
+    fn begin(&mut self) {
+        let frame = match self.contender() {
+            Some(Sender::Program) => self.queue.pop_front().map(|frame| (Sender::Program, frame)),
+            Some(Sender::Station(index)) => self.places[index].out.pop().map(|frame| (Sender::Station(index), frame)),
+            None => None,
+        };
+        if let Some((sender, frame)) = frame {
+            let complete = self.now + bit_time(frame_bits(&frame), self.bit_rate);
+            self.wire = Wire::Busy { sender, frame, complete };
+        }
+    }
+
+    /// A frame is complete: everybody but its sender gets it, the sender learns that it is out.
+    fn deliver(&mut self, sender: Sender, frame: &Frame) {
+        if sender != Sender::Program && self.filters.wants(frame) {
+            self.inbox.push_back(Event::Frame(Received { frame: *frame, at: self.stamp(self.now) }));
+        }
+        for (index, place) in self.places.iter_mut().enumerate() {
+            if sender == Sender::Station(index) {
+                place.station.sent(self.now, frame);
+            } else {
+                place.station.receive(self.now, frame, &mut place.out);
+            }
+        }
+    }
+
+    /// On the real clock: plays what is due by now. Returns the host's time.
+    fn catch_up(&mut self) -> Option<Mono> {
+        let host_now = self.time_line.host_now()?;
+        while self.step(host_now) {}
+        self.now = self.now.max(host_now);
+        Some(host_now)
+    }
+
+    fn stamp(&self, mono: Mono) -> Stamp {
+        Stamp { mono, wall: self.time_line.wall(mono) }
+    }
+}
+
+impl Bus for MemoryBus {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        Some(self.bit_rate)
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        TimestampSource::Simulated
+    }
+
+    fn now(&self) -> Stamp {
+        self.stamp(self.time_line.host_now().unwrap_or(self.now).max(self.now))
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        // What was complete before now was received under the old filters.
+        self.catch_up();
+        self.filters = filters.clone();
+        Ok(())
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.catch_up();
+        if self.queue.len() >= self.queue_length {
+            return Err(BusError::QueueFull);
+        }
+        self.queue.push_back(*frame);
+        Ok(())
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        if self.sleeper.sleep(std::time::Duration::ZERO) {
+            return Ok(Event::Interrupted);
+        }
+        loop {
+            let host_now = self.catch_up();
+            if let Some(event) = self.inbox.pop_front() {
+                return Ok(event);
+            }
+            let next = self.next_happening().filter(|moment| *moment <= deadline);
+            match (host_now, next) {
+                (None, Some(_)) => {
+                    self.step(deadline);
+                }
+                (None, None) => {
+                    self.now = self.now.max(deadline);
+                    return Ok(Event::Timeout);
+                }
+                (Some(host_now), next) => {
+                    if host_now >= deadline {
+                        return Ok(Event::Timeout);
+                    }
+                    if self.sleeper.sleep(next.unwrap_or(deadline).since(host_now)) {
+                        return Ok(Event::Interrupted);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
