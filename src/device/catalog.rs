@@ -289,7 +289,10 @@ mod tests {
                 bytes.resize(4, 0xff);
                 traits.answers.insert(object, bytes);
             }
-            assert_eq!(recognise(&traits).map(|found| &found.description.name), Some(&model.description.name));
+            assert_eq!(
+                recognise(&traits).map(|found| found.description.name.clone()).as_ref(),
+                Some(&model.description.name)
+            );
             assert_eq!(to_ask(&traits), []);
         }
     }
@@ -298,16 +301,16 @@ mod tests {
     fn another_device_of_the_same_profile_is_not_recognised() {
         // 0x00020194 is the device type of many: the rest decides.
         let mut traits = Traits { device_type: Some(0x0002_0194), vendor_id: Some(0xda), ..Traits::default() };
-        assert_eq!(recognise(&traits).map(|model| &model.description.name), None);
+        assert_eq!(recognise(&traits).map(|model| model.description.name.clone()), None);
         let asked = to_ask(&traits);
         assert_eq!(asked, [ObjectId::new(0x7121, 16), ObjectId::new(0x7122, 16), ObjectId::new(0x7123, 16)]);
         // It has a 7122h and no 7121h; an empty answer is no answer.
         traits.answers.insert(asked[1], vec![0xff, 0xff]);
         traits.answers.insert(asked[0], Vec::new());
-        assert_eq!(recognise(&traits).map(|model| &model.description.name), None);
+        assert_eq!(recognise(&traits).map(|model| model.description.name.clone()), None);
         assert_eq!(to_ask(&traits), [asked[2]]);
         // A silent device is asked nothing.
         assert_eq!(to_ask(&Traits::default()), []);
-        assert_eq!(recognise(&Traits::default()).map(|model| &model.description.name), None);
+        assert_eq!(recognise(&Traits::default()).map(|model| model.description.name.clone()), None);
     }
 }

@@ -7,7 +7,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
 use crate::canopen::value::{DataType, Value};
-use crate::device::catalog::{Model, recognise};
+use crate::device::catalog::{Model, Traits, recognise, to_ask};
 use crate::device::description::SignalEntry;
 use crate::device::unit::Unit;
 use crate::master::{Error, Master, Request, SdoError, SdoFailure};
@@ -100,19 +100,50 @@ pub fn identities(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<Vec<Ident
 /// # Errors
 /// A node that does not answer, and what stops everything.
 pub fn instruments(master: &mut Master<'_>, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Instrument>, Error> {
+    let mut instruments = recognised(master, nodes, overrides)?;
+    read_services(master, &mut instruments)?;
+    read_tpdos(master, &mut instruments)?;
+    find_signals(master, &mut instruments)?;
+    read_units(master, &mut instruments)?;
+    Ok(instruments)
+}
+
+/// Reads identities and finds the descriptions that they fit.
+///
+/// # Errors
+/// A node that does not answer, and what stops everything.
+pub fn recognised(master: &mut Master<'_>, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Instrument>, Error> {
+    // A device whose reads need a quirk can only be read once the user has named its description.
+    for (node, model) in overrides {
+        master.set_quirks(*node, &model.description.quirks);
+    }
+    let identities = identities(master, nodes)?;
+    let mut traits: Vec<Traits> = identities.iter().map(Identity::traits).collect();
+    let questions: Vec<(usize, ObjectId)> = nodes
+        .iter()
+        .enumerate()
+        .filter(|(_, node)| !overrides.contains_key(node))
+        .flat_map(|(at, _)| to_ask(&traits[at]).into_iter().map(move |object| (at, object)))
+        .collect();
+    let requests = questions.iter().map(|&(at, object)| Request::read(nodes[at], object)).collect();
+    for (&(at, object), answer) in questions.iter().zip(master.transfer(requests, &mut |_| {})?) {
+        match answer {
+            Ok(answer) => {
+                traits[at].answers.extend(answer.uploaded.map(|uploaded| (object, uploaded.bytes)));
+            }
+            Err(SdoError { failure: SdoFailure::Refused(_), .. }) => {}
+            Err(error) => return Err(Error::Sdo(error)),
+        }
+    }
     let mut instruments: Vec<Instrument> = nodes.iter().map(|&node| Instrument::new(node)).collect();
-    for (instrument, identity) in instruments.iter_mut().zip(identities(master, nodes)?) {
+    for ((instrument, identity), traits) in instruments.iter_mut().zip(identities).zip(&traits) {
         let given = overrides.get(&instrument.node).cloned();
-        instrument.model = given.or_else(|| recognise(&identity.traits()));
+        instrument.model = given.or_else(|| recognise(traits));
         instrument.identity = identity;
         if let Some(model) = &instrument.model {
             master.set_quirks(instrument.node, &model.description.quirks);
         }
     }
-    read_services(master, &mut instruments)?;
-    read_tpdos(master, &mut instruments)?;
-    find_signals(master, &mut instruments)?;
-    read_units(master, &mut instruments)?;
     Ok(instruments)
 }
 
