@@ -16,3 +16,4 @@ pub mod canopen;
 pub mod device;
 pub mod master;
 pub mod measure;
+pub mod tasks;
