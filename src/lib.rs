@@ -16,4 +16,5 @@ pub mod canopen;
 pub mod device;
 pub mod master;
 pub mod measure;
+pub mod output;
 pub mod tasks;
