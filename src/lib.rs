@@ -15,3 +15,4 @@ pub mod bus;
 pub mod canopen;
 pub mod device;
 pub mod master;
+pub mod sim;

@@ -150,6 +150,10 @@ pub struct ObjectEntry {
     pub values: BTreeMap<String, String>,
     /// The signature that must be written: `save`, `load`, `zero`, `set`.
     pub signature: Option<String>,
+    /// Objects that must all be 0 before this one can be written with anything else: heartbeat and node
+    /// guarding exclude each other on some devices.
+    #[serde(default)]
+    pub only_if_zero: Vec<ObjectId>,
     /// Whether a TPDO may carry it.
     #[serde(default)]
     pub pdo: bool,
@@ -166,6 +170,31 @@ pub struct ObjectEntry {
     /// What the manual contradicts or leaves open.
     #[serde(default)]
     pub doubt: String,
+}
+
+impl ObjectEntry {
+    /// The object that the entry stands for, or every one of a run of sub-indices.
+    ///
+    /// # Errors
+    /// An address that is none, in words.
+    pub fn objects(&self) -> Result<impl Iterator<Item = ObjectId>, String> {
+        let run = self.at.split_once(':').and_then(|(_, subs)| subs.split_once('-'));
+        let (first, last) = match run {
+            Some((_, last)) => {
+                let start = self.at.rsplit_once('-').map_or("", |(start, _)| start);
+                let last: u8 = last.parse().map_err(|_| format!("\"{}\" is not an object or a run", self.at))?;
+                (start, Some(last))
+            }
+            None => (self.at.as_str(), None),
+        };
+        let first: ObjectId = first.parse().map_err(|error| format!("{error}"))?;
+        Ok((first.sub..=last.unwrap_or(first.sub)).map(move |sub| first.with_sub(sub)))
+    }
+
+    /// Whether the entry stands for a run of sub-indices, be it of one.
+    pub fn is_run(&self) -> bool {
+        self.at.split_once(':').is_some_and(|(_, subs)| subs.contains('-'))
+    }
 }
 
 /// How an entry can be accessed by SDO.
