@@ -2,7 +2,7 @@
 //!
 //! Unknown keys are errors, so that a typing error in a description is never silently ignored.
 
-use crate::canopen::id::NodeId;
+use crate::canopen::id::{NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use serde::Deserialize;
@@ -28,12 +28,17 @@ pub struct Description {
     /// How its SDO server behaves.
     #[serde(default)]
     pub sdo: SdoStyle,
+    /// How its PDOs are configured.
+    #[serde(default)]
+    pub pdo: PdoStyle,
     /// Deviations from the standard that code has to know about.
     #[serde(default)]
     pub quirks: Vec<super::quirk::Quirk>,
     /// Index of the LSS bit rate table to bit rate in bit/s.
     #[serde(default)]
     pub bit_rates: BTreeMap<String, u32>,
+    /// Index that stands for automatic bit rate detection, if the device has one.
+    pub auto_bit_rate: Option<u8>,
     /// What it measures.
     #[serde(default, rename = "signal")]
     pub signals: Vec<SignalEntry>,
@@ -60,6 +65,9 @@ pub struct Identify {
     pub product_code: Option<u32>,
     /// 1008h.
     pub device_name: Option<String>,
+    /// Objects to read where all of the above is not proof enough, and what they must hold.
+    #[serde(default)]
+    pub confirm: BTreeMap<ObjectId, Scalar>,
 }
 
 /// The settings of a new device.
@@ -93,6 +101,26 @@ pub enum SizeIndication {
     Indicated,
     /// s = 0: 22h to write, 42h as the answer to a read.
     Omitted,
+}
+
+/// How PDOs are configured.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PdoStyle {
+    /// What has to be done before the mapping can be changed.
+    #[serde(default)]
+    pub remap: Remap,
+}
+
+/// What has to be done before a mapping can be changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Remap {
+    /// CiA 301: bit 31 of the COB-ID set, then the number of entries 0.
+    #[default]
+    Invalidate,
+    /// The number of entries 0, in PRE-OPERATIONAL; meanwhile the PDO has no bytes. Bit 31 is not needed.
+    CountOnly,
 }
 
 /// One measured quantity.
@@ -142,10 +170,10 @@ pub struct ObjectEntry {
     pub low: Option<Scalar>,
     /// Highest value allowed.
     pub high: Option<Scalar>,
-    /// Values and ranges allowed, where they are not one range: `["0-240", "254", "255"]`.
+    /// Values and ranges allowed, where they are not one range: `["0-240", "254", "0x004E0000"]`.
     #[serde(default)]
     pub allow: Vec<String>,
-    /// What numbers mean: `{ "0" = "none", "1" = "moving average" }`.
+    /// What numbers mean, in decimal or hexadecimal: `{ "0" = "none", "0x004E0000" = "bar" }`.
     #[serde(default)]
     pub values: BTreeMap<String, String>,
     /// The signature that must be written: `save`, `load`, `zero`, `set`.
@@ -159,6 +187,8 @@ pub struct ObjectEntry {
     pub pdo: bool,
     /// Unit of the number, where it is fixed: `ms`, `100us`.
     pub unit: Option<String>,
+    /// The channel whose physical unit (6131h) its number is in, for objects of which CiA 404 does not say so.
+    pub follows_unit: Option<u8>,
     /// Which store group keeps it: `comm`, `app`, `all`; absent when 1010h does not.
     pub stored: Option<String>,
     /// What it is and does, in one or two sentences.
@@ -195,6 +225,28 @@ impl ObjectEntry {
     pub fn is_run(&self) -> bool {
         self.at.split_once(':').is_some_and(|(_, subs)| subs.contains('-'))
     }
+
+    /// Whether `number` lies within the limits and, where values are listed, is one of them.
+    pub fn allows(&self, number: f64) -> bool {
+        let limit = |scalar: &Option<Scalar>| match scalar {
+            Some(Scalar::Integer(limit)) => Some(*limit as f64),
+            Some(Scalar::Real(limit)) => Some(*limit),
+            Some(Scalar::Text(_)) | None => None,
+        };
+        limit(&self.low).is_none_or(|low| low <= number)
+            && limit(&self.high).is_none_or(|high| number <= high)
+            && (self.allow.is_empty()
+                || self.allow.iter().any(|listed| {
+                    parse_range(listed).is_some_and(|(low, high)| f64::from(low) <= number && number <= f64::from(high))
+                }))
+    }
+}
+
+/// `254` or `0-240`: the lowest and the highest number of one part of `allow`.
+pub(crate) fn parse_range(text: &str) -> Option<(u32, u32)> {
+    let (low, high) = text.split_once('-').unwrap_or((text, text));
+    let (low, high) = (parse_u32(low)?, parse_u32(high)?);
+    (low <= high).then_some((low, high))
 }
 
 /// How an entry can be accessed by SDO.
@@ -259,6 +311,13 @@ pub struct SimEntry {
     /// 1018h:4 of the first device; the next ones count up.
     #[serde(default)]
     pub serial: u32,
+    /// How often a new value is there, in microseconds; 1 ms if the manual does not say.
+    pub sample_us: Option<u32>,
+    /// How far beyond the measuring range an overload begins, in percent of the range.
+    #[serde(default)]
+    pub overload_percent: f64,
+    /// The emergency of an overload, if it raises one.
+    pub overload_emcy: Option<u16>,
     /// The measured quantities, one per signal.
     #[serde(default, rename = "channel")]
     pub channels: Vec<SimChannel>,
@@ -284,6 +343,8 @@ pub struct SimChannel {
     pub start: f64,
     /// End of the measuring range.
     pub end: f64,
+    /// The field value (x100h) at the start and at the end of the range; CiA 404's 0 and 10000 else.
+    pub field: Option<[f64; 2]>,
 }
 
 fn from_text<'de, D, T>(deserializer: D) -> Result<T, D::Error>

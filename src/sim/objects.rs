@@ -6,7 +6,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::device::catalog::Model;
-use crate::device::description::{Access, ObjectEntry, Scalar};
+use crate::device::description::{Access, ObjectEntry, Scalar, parse_range};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -313,16 +313,6 @@ impl Spec {
         }
         Ok(())
     }
-}
-
-/// `254` or `0-240` of an `allow` list.
-fn parse_range(text: &str) -> Option<(u32, u32)> {
-    let number = |text: &str| match text.strip_prefix("0x") {
-        Some(digits) => u32::from_str_radix(digits, 16).ok(),
-        None => text.parse().ok(),
-    };
-    let (low, high) = text.split_once('-').unwrap_or((text, text));
-    Some((number(low)?, number(high)?))
 }
 
 #[cfg(test)]
