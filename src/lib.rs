@@ -15,4 +15,5 @@ pub mod bus;
 pub mod canopen;
 pub mod device;
 pub mod master;
+pub mod measure;
 pub mod sim;

@@ -1,8 +1,17 @@
 //! Buses: what a CAN bus can do for the layers above, and everything that touches the outside world
 //! for it. The only place with sockets, clocks, signals and `unsafe`.
 
+pub mod faults;
+pub mod interrupt;
 pub mod memory;
+#[cfg(unix)]
+mod poll;
+#[cfg(test)]
+mod script;
+#[cfg(target_os = "linux")]
+pub mod socketcan;
 pub mod time;
+pub mod trace;
 
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
@@ -35,6 +44,46 @@ pub trait Bus {
     /// The next thing that happens, at the latest [`Event::Timeout`] once `deadline` is reached.
     /// With a deadline in the past it returns what is there already, without waiting.
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError>;
+
+    /// Writes out what is still buffered (a trace). To be called when the work is done: dropping a
+    /// bus can report nothing.
+    fn finish(&mut self) -> Result<(), BusError> {
+        Ok(())
+    }
+}
+
+impl<B: Bus + ?Sized> Bus for Box<B> {
+    fn name(&self) -> &str {
+        (**self).name()
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        (**self).bit_rate()
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        (**self).timestamps()
+    }
+
+    fn now(&self) -> Stamp {
+        (**self).now()
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        (**self).listen(filters)
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        (**self).send(frame)
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        (**self).receive(deadline)
+    }
+
+    fn finish(&mut self) -> Result<(), BusError> {
+        (**self).finish()
+    }
 }
 
 /// What comes from a bus.

@@ -5,7 +5,7 @@ use super::dictionary::Dictionary;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// A description with its object dictionary laid out.
 #[derive(Clone, Debug)]
@@ -89,19 +89,19 @@ macro_rules! built_in {
 }
 
 /// The built-in descriptions, in the order in which they are tried.
-pub fn built_in() -> &'static [Model] {
-    static MODELS: OnceLock<Vec<Model>> = OnceLock::new();
+pub fn built_in() -> &'static [Arc<Model>] {
+    static MODELS: OnceLock<Vec<Arc<Model>>> = OnceLock::new();
     MODELS.get_or_init(|| {
         built_in!("mh4", "d20", "dps", "mc1609")
             .into_iter()
-            .filter_map(|(_, text)| Model::from_toml(text).ok())
+            .filter_map(|(_, text)| Model::from_toml(text).ok().map(Arc::new))
             .collect()
     })
 }
 
 /// The built-in description of a name.
-pub fn by_name(name: &str) -> Option<&'static Model> {
-    built_in().iter().find(|model| model.description.name == name)
+pub fn by_name(name: &str) -> Option<Arc<Model>> {
+    built_in().iter().find(|model| model.description.name == name).cloned()
 }
 
 /// What has still to be read to tell which description a device's answers fit: empty when one fits,
@@ -121,8 +121,8 @@ pub fn to_ask(traits: &Traits) -> Vec<ObjectId> {
 }
 
 /// The built-in description that a device's answers fit.
-pub fn recognise(traits: &Traits) -> Option<&'static Model> {
-    built_in().iter().find(|model| model.fits(traits))
+pub fn recognise(traits: &Traits) -> Option<Arc<Model>> {
+    built_in().iter().find(|model| model.fits(traits)).cloned()
 }
 
 #[cfg(test)]
@@ -289,7 +289,10 @@ mod tests {
                 bytes.resize(4, 0xff);
                 traits.answers.insert(object, bytes);
             }
-            assert_eq!(recognise(&traits).map(|found| &found.description.name), Some(&model.description.name));
+            assert_eq!(
+                recognise(&traits).map(|found| found.description.name.clone()).as_ref(),
+                Some(&model.description.name)
+            );
             assert_eq!(to_ask(&traits), []);
         }
     }
@@ -298,16 +301,16 @@ mod tests {
     fn another_device_of_the_same_profile_is_not_recognised() {
         // 0x00020194 is the device type of many: the rest decides.
         let mut traits = Traits { device_type: Some(0x0002_0194), vendor_id: Some(0xda), ..Traits::default() };
-        assert_eq!(recognise(&traits).map(|model| &model.description.name), None);
+        assert_eq!(recognise(&traits).map(|model| model.description.name.clone()), None);
         let asked = to_ask(&traits);
         assert_eq!(asked, [ObjectId::new(0x7121, 16), ObjectId::new(0x7122, 16), ObjectId::new(0x7123, 16)]);
         // It has a 7122h and no 7121h; an empty answer is no answer.
         traits.answers.insert(asked[1], vec![0xff, 0xff]);
         traits.answers.insert(asked[0], Vec::new());
-        assert_eq!(recognise(&traits).map(|model| &model.description.name), None);
+        assert_eq!(recognise(&traits).map(|model| model.description.name.clone()), None);
         assert_eq!(to_ask(&traits), [asked[2]]);
         // A silent device is asked nothing.
         assert_eq!(to_ask(&Traits::default()), []);
-        assert_eq!(recognise(&Traits::default()).map(|model| &model.description.name), None);
+        assert_eq!(recognise(&Traits::default()).map(|model| model.description.name.clone()), None);
     }
 }

@@ -15,6 +15,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{FitError, Note, Uploaded, fit};
 use crate::canopen::value::{DataType, Value};
+use crate::device::quirk::Quirk;
 use sdo::SdoClient;
 use send::Outgoing;
 use std::time::Duration;
@@ -34,15 +35,24 @@ impl Default for Timing {
     }
 }
 
-/// Why nothing could be done at all; what concerns one node is a [`SdoError`].
+/// Why something could not be done.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The bus fails.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// One device stands in the way.
+    #[error("node {}: {}", .0.node, .0)]
+    Sdo(SdoError),
     /// The user asked to stop.
     #[error("interrupted")]
     Interrupted,
+}
+
+impl From<SdoError> for Error {
+    fn from(error: SdoError) -> Error {
+        Error::Sdo(error)
+    }
 }
 
 /// Something that happened while waiting.
@@ -115,6 +125,11 @@ impl<'bus> Master<'bus> {
     /// node at a time; others of the same node wait their turn.
     pub fn start(&mut self, request: Request) -> Ticket {
         self.sdo.submit(request)
+    }
+
+    /// Tells how a node's SDO server deviates from the standard.
+    pub fn set_quirks(&mut self, node: NodeId, quirks: &[Quirk]) {
+        self.sdo.accept_60(node, quirks.contains(&Quirk::UploadAnswered60));
     }
 
     /// Whether an SDO transfer is under way or waiting.

@@ -32,27 +32,19 @@ pub struct Request {
 
 #[derive(Clone, Debug)]
 enum Kind {
-    Read { accept_60: bool },
+    Read,
     Write { data: Vec<u8>, size: DownloadSize },
 }
 
 impl Request {
     /// A read.
     pub fn read(node: NodeId, object: ObjectId) -> Request {
-        Request { node, object, kind: Kind::Read { accept_60: false }, timeout: None, repeatable: true }
+        Request { node, object, kind: Kind::Read, timeout: None, repeatable: true }
     }
 
     /// A write of a plain value.
     pub fn write(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> Request {
         Request { node, object, kind: Kind::Write { data, size }, timeout: None, repeatable: true }
-    }
-
-    /// A read that takes 60h for a size-less answer ([`crate::device::quirk::Quirk::UploadAnswered60`]).
-    pub fn accepting_60(mut self) -> Request {
-        if let Kind::Read { accept_60 } = &mut self.kind {
-            *accept_60 = true;
-        }
-        self
     }
 
     /// Sent once only, whatever the time-outs say: signatures, and scans that do their own asking.
@@ -70,7 +62,7 @@ impl Request {
     /// Whether it reads or writes.
     pub fn operation(&self) -> Operation {
         match self.kind {
-            Kind::Read { .. } => Operation::Read,
+            Kind::Read => Operation::Read,
             Kind::Write { .. } => Operation::Write,
         }
     }
@@ -173,6 +165,8 @@ struct Node {
     waiting: VecDeque<(Ticket, Request)>,
     active: Option<Active>,
     ghosts: Vec<Ghost>,
+    /// [`crate::device::quirk::Quirk::UploadAnswered60`] acts here.
+    accept_60: bool,
 }
 
 /// How long an answer may be late. Nothing in the standard bounds it; storing takes the longest.
@@ -187,9 +181,9 @@ pub(super) struct SdoClient {
 }
 
 impl Active {
-    fn new(ticket: Ticket, request: Request, timing: &Timing) -> Active {
+    fn new(ticket: Ticket, request: Request, accept_60: bool, timing: &Timing) -> Active {
         let machine = match &request.kind {
-            Kind::Read { accept_60 } => Machine::Read(Upload::new(request.node, request.object, *accept_60)),
+            Kind::Read => Machine::Read(Upload::new(request.node, request.object, accept_60)),
             Kind::Write { data, size } => {
                 Machine::Write(Download::new(request.node, request.object, data.clone(), *size))
             }
@@ -253,6 +247,10 @@ impl SdoClient {
         ticket
     }
 
+    pub(super) fn accept_60(&mut self, node: NodeId, accept: bool) {
+        self.nodes.entry(node).or_default().accept_60 = accept;
+    }
+
     pub(super) fn is_busy(&self) -> bool {
         self.has_finished() || self.nodes.values().any(|node| node.active.is_some() || !node.waiting.is_empty())
     }
@@ -284,9 +282,9 @@ impl SdoClient {
             let active = if haunted {
                 let other = if request.object == DEVICE_TYPE { ERROR_REGISTER } else { DEVICE_TYPE };
                 let barrier = Request::read(request.node, other).once();
-                Active { behind: Some((ticket, request)), ..Active::new(ticket, barrier, timing) }
+                Active { behind: Some((ticket, request)), ..Active::new(ticket, barrier, node.accept_60, timing) }
             } else {
-                Active::new(ticket, request, timing)
+                Active::new(ticket, request, node.accept_60, timing)
             };
             outgoing.push(active.first_frame(), Some(ticket));
             node.active = Some(active);

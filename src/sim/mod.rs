@@ -9,7 +9,10 @@
 //! [`MemoryBus`](crate::bus::memory::MemoryBus) or, through [`host`], on a real bus.
 
 mod abort;
+mod model;
+mod number;
 mod objects;
 mod sdo_server;
 
 pub use abort::Abort;
+pub use model::{Direction, Overload};

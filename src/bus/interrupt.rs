@@ -1,0 +1,177 @@
+//! Ctrl-C and SIGTERM as events of a bus, each reported once.
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::{SigId, low_level};
+use std::ffi::c_int;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// The user's wish to stop, as a bus takes it in.
+///
+/// Every instance sees every signal that arrives while it lives, so two buses in one process are
+/// both told. From the first instance on, Ctrl-C no longer ends the program by itself: whoever
+/// holds an instance has to ask it.
+#[derive(Debug)]
+pub struct Interrupts {
+    /// Set behind the byte in the pipe: one load tells a busy reader that there is nothing to read.
+    raised: Arc<AtomicBool>,
+    pending: usize,
+    registered: Vec<SigId>,
+    #[cfg(unix)]
+    pipe: std::os::unix::net::UnixStream,
+}
+
+impl Interrupts {
+    /// Watches for SIGINT and SIGTERM from now on.
+    pub fn new() -> io::Result<Interrupts> {
+        Interrupts::on(&[SIGINT, SIGTERM])
+    }
+
+    /// The next signal that has not been reported yet. Costs next to nothing when there is none.
+    pub fn take(&mut self) -> bool {
+        if self.raised.load(Ordering::Acquire) {
+            self.collect();
+        }
+        match self.pending.checked_sub(1) {
+            Some(left) => {
+                self.pending = left;
+                true
+            }
+            None => false,
+        }
+    }
+}
+
+#[cfg(unix)]
+impl Interrupts {
+    fn on(signals: &[c_int]) -> io::Result<Interrupts> {
+        // One byte in the pipe is one signal: it counts them and wakes a waiting poll in one.
+        let (pipe, write) = std::os::unix::net::UnixStream::pair()?;
+        pipe.set_nonblocking(true)?;
+        let raised = Arc::new(AtomicBool::new(false));
+        let mut new = Interrupts { raised, pending: 0, registered: Vec::new(), pipe };
+        for &signal in signals {
+            new.registered.push(low_level::pipe::register(signal, write.try_clone()?)?);
+            new.registered.push(signal_hook::flag::register(signal, Arc::clone(&new.raised))?);
+        }
+        Ok(new)
+    }
+
+    /// Sleeps until `deadline`, or returns `true` at once when a signal arrives.
+    pub fn wait_until(&mut self, deadline: Instant) -> bool {
+        loop {
+            if self.take() {
+                return true;
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return false;
+            }
+            match super::poll::readable([self.fd()], left) {
+                Ok([true]) => self.collect(),
+                Ok([false]) => {}
+                // Waiting for one own descriptor can fail only for lack of memory.
+                Err(_) => std::thread::sleep(left),
+            }
+        }
+    }
+
+    /// Readable while there may be a signal to collect.
+    pub(super) fn fd(&self) -> std::os::fd::BorrowedFd<'_> {
+        std::os::fd::AsFd::as_fd(&self.pipe)
+    }
+
+    /// Takes in what the pipe holds, for whoever found [`Interrupts::fd`] readable: the signal's
+    /// byte is there a moment before its flag.
+    pub(super) fn collect(&mut self) {
+        self.raised.store(false, Ordering::Release);
+        let mut bytes = [0; 64];
+        while let Ok(count @ 1..) = io::Read::read(&mut self.pipe, &mut bytes) {
+            self.pending = self.pending.saturating_add(count);
+        }
+    }
+}
+
+/// Elsewhere there is no pipe to wait on: signals that follow each other closely count as one, and a
+/// sleep looks for them now and then.
+#[cfg(not(unix))]
+impl Interrupts {
+    fn on(signals: &[c_int]) -> io::Result<Interrupts> {
+        let raised = Arc::new(AtomicBool::new(false));
+        let mut new = Interrupts { raised, pending: 0, registered: Vec::new() };
+        for &signal in signals {
+            new.registered.push(signal_hook::flag::register(signal, Arc::clone(&new.raised))?);
+        }
+        Ok(new)
+    }
+
+    /// Sleeps until `deadline`, or returns `true` soon after a signal arrives.
+    pub fn wait_until(&mut self, deadline: Instant) -> bool {
+        const SLICE: std::time::Duration = std::time::Duration::from_millis(20);
+        loop {
+            if self.take() {
+                return true;
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return false;
+            }
+            std::thread::sleep(left.min(SLICE));
+        }
+    }
+
+    fn collect(&mut self) {
+        if self.raised.swap(false, Ordering::AcqRel) {
+            self.pending = self.pending.saturating_add(1);
+        }
+    }
+}
+
+impl Drop for Interrupts {
+    fn drop(&mut self) {
+        for &id in &self.registered {
+            low_level::unregister(id);
+        }
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use signal_hook::consts::{SIGUSR1, SIGUSR2};
+    use std::time::Duration;
+
+    #[test]
+    fn each_signal_is_reported_once() -> io::Result<()> {
+        let mut first = Interrupts::on(&[SIGUSR1])?;
+        let mut second = Interrupts::on(&[SIGUSR1])?;
+        assert!(!first.take());
+        low_level::raise(SIGUSR1)?;
+        low_level::raise(SIGUSR1)?;
+        assert_eq!([first.take(), first.take(), first.take()], [true, true, false]);
+        low_level::raise(SIGUSR1)?;
+        assert_eq!([second.take(), second.take(), second.take(), second.take()], [true, true, true, false]);
+        drop(second);
+        assert_eq!([first.take(), first.take()], [true, false]);
+        Ok(())
+    }
+
+    #[test]
+    fn a_signal_ends_a_sleep() -> io::Result<()> {
+        let mut interrupts = Interrupts::on(&[SIGUSR2])?;
+        let start = Instant::now();
+        assert!(!interrupts.wait_until(start + Duration::from_millis(20)));
+        assert!(start.elapsed() >= Duration::from_millis(20));
+        let raiser = std::thread::spawn(|| {
+            std::thread::sleep(Duration::from_millis(30));
+            low_level::raise(SIGUSR2)
+        });
+        assert!(interrupts.wait_until(start + Duration::from_secs(60)));
+        assert!(start.elapsed() < Duration::from_secs(60));
+        assert!(!interrupts.wait_until(Instant::now()));
+        assert!(raiser.join().is_ok_and(|raised| raised.is_ok()));
+        Ok(())
+    }
+}

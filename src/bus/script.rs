@@ -1,0 +1,75 @@
+//! A bus for the tests of the wrappers: it delivers what it was told, at the time it was told, on a
+//! clock that jumps.
+
+use super::{Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall};
+use crate::canopen::frame::Frame;
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// When the scripted bus was opened.
+const OPENED: Duration = Duration::from_secs(1_436_509_052);
+
+/// Events to come, in order of time, and the frames that were sent.
+#[derive(Default)]
+pub(super) struct Script {
+    now: Mono,
+    coming: VecDeque<(Mono, Event)>,
+    pub(super) sent: Vec<String>,
+}
+
+impl Script {
+    pub(super) fn new() -> Script {
+        Script::default()
+    }
+
+    /// Delivers this frame at `at`.
+    pub(super) fn frame(mut self, at: Mono, text: &str) -> Script {
+        let frame = text.parse().unwrap();
+        self.coming.push_back((at, Event::Frame(Received { frame, at: stamp(at) })));
+        self
+    }
+}
+
+fn stamp(mono: Mono) -> Stamp {
+    Stamp { mono, wall: Wall::at(OPENED + mono.since_start()) }
+}
+
+impl Bus for Script {
+    fn name(&self) -> &str {
+        "script"
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        None
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        TimestampSource::Simulated
+    }
+
+    fn now(&self) -> Stamp {
+        stamp(self.now)
+    }
+
+    fn listen(&mut self, _: &Filters) -> Result<(), BusError> {
+        Ok(())
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.sent.push(frame.to_string());
+        Ok(())
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        match self.coming.front() {
+            Some((at, _)) if *at <= deadline => {
+                self.now = self.now.max(*at);
+                Ok(self.coming.pop_front().unwrap().1)
+            }
+            _ => {
+                self.now = self.now.max(deadline);
+                Ok(Event::Timeout)
+            }
+        }
+    }
+}

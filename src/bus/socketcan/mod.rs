@@ -1,0 +1,356 @@
+//! Linux SocketCAN: kernel filters, kernel timestamps, the kernel's drop counter, error frames.
+//!
+//! A system call costs more than everything else done for a frame. So one `recvmmsg` serves up to
+//! 64 calls of `receive`, the clocks are read once for all of them, and the socket is waited for
+//! only after it was found empty.
+
+mod faults;
+mod interfaces;
+mod receive;
+
+use super::interrupt::Interrupts;
+use super::{Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall, poll};
+use crate::canopen::frame::Frame;
+use crate::canopen::id::CanId;
+pub use interfaces::{Interface, interfaces};
+use receive::{Batch, Message};
+use socketcan::{CanAddr, CanFrame, CanInterface, CanSocket, Socket, SocketOptions};
+use std::cell::Cell;
+use std::collections::{HashSet, VecDeque};
+use std::io;
+use std::os::fd::{AsFd, OwnedFd};
+use std::time::{Duration, Instant};
+
+/// More filters than this the kernel does not take (`CAN_RAW_FILTER_MAX`).
+const MAX_FILTERS: usize = 512;
+/// The receive buffer asked for: some ten thousand frames, seconds of a full bus.
+const RECEIVE_BUFFER: i32 = 8 << 20;
+/// How often an interface that went down is looked at; the kernel does not tell when it is back.
+const LINK_CHECK: Duration = Duration::from_millis(200);
+/// A frame cannot have waited longer than this for being read. Where the clocks say so, the wall
+/// clock was set in between.
+const LONGEST_LAG: Duration = Duration::from_secs(10);
+/// How far the two clocks of one reading may lie apart.
+const JITTER: Duration = Duration::from_millis(1);
+
+/// A CAN interface of the Linux kernel.
+pub struct SocketCan {
+    name: String,
+    socket: CanSocket,
+    interrupts: Interrupts,
+    opened: Instant,
+    batch: Batch,
+    /// When the batch was read.
+    read: Stamp,
+    /// The socket was empty then: nothing in the batch was received earlier.
+    empty_at: Mono,
+    /// The reading of the batch left nothing in the socket.
+    emptied: bool,
+    /// The socket is empty as far as is known: wait before reading again.
+    drained: bool,
+    /// Events that come before the rest of the batch.
+    ready: VecDeque<Event>,
+    /// The interface is up, as far as the user of this bus has been told.
+    up: bool,
+    /// The kernel's count of lost frames when it was last reported.
+    lost: u32,
+    /// The identifiers wanted, where they are too many for the kernel.
+    wanted: Option<HashSet<CanId>>,
+    timestamps: TimestampSource,
+    /// Asked for once while the interface stays up: it costs some system calls.
+    bit_rate: Cell<Option<Option<u32>>>,
+}
+
+impl SocketCan {
+    /// Opens the CAN interface `name`, which has to be up.
+    pub fn open(name: &str) -> Result<SocketCan, BusError> {
+        SocketCan::open_filtered(name, &Filters::All)
+    }
+
+    /// Opens the CAN interface `name` with filters that hold from the first frame on.
+    pub fn open_filtered(name: &str, filters: &Filters) -> Result<SocketCan, BusError> {
+        let interrupts =
+            Interrupts::new().map_err(|source| BusError::Io { what: "watch for signals".into(), source })?;
+        let socket = new_socket()?;
+        let failed = |what: &str, source| BusError::Io { what: format!("{what} {name}"), source };
+        let address = CanAddr::from_iface(name).map_err(|_| BusError::NoInterface(name.to_owned()))?;
+        socket.set_error_filter_accept_all().map_err(|error| failed("set the error filter of", error))?;
+        // Each of these only improves what is measured; a kernel that lacks one still delivers frames.
+        let timestamps = match socket.set_recv_timestamp(true) {
+            Ok(()) => TimestampSource::Kernel,
+            Err(_) => TimestampSource::Program,
+        };
+        let _ = socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RXQ_OVFL, 1);
+        if socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUFFORCE, RECEIVE_BUFFER).is_err() {
+            let _ = socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUF, RECEIVE_BUFFER);
+        }
+        let mut bus = SocketCan {
+            name: name.to_owned(),
+            socket,
+            interrupts,
+            opened: Instant::now(),
+            batch: Batch::new(),
+            read: Stamp::default(),
+            empty_at: Mono::START,
+            emptied: false,
+            drained: false,
+            ready: VecDeque::new(),
+            up: true,
+            lost: 0,
+            wanted: None,
+            timestamps,
+            bit_rate: Cell::new(None),
+        };
+        bus.listen(filters)?;
+        let socket = bus.socket.as_raw_socket();
+        socket.bind(&address.into_sock_addr()).map_err(|error| match error.raw_os_error() {
+            Some(libc::ENODEV) => BusError::NotCan(name.to_owned()),
+            _ => failed("open", error),
+        })?;
+        // Binding to an interface that is down succeeds and leaves the error on the socket.
+        match socket.take_error() {
+            Ok(Some(error)) | Err(error) => Err(bus.error("open", error)),
+            Ok(None) => Ok(bus),
+        }
+    }
+
+    fn error(&self, doing: &str, source: io::Error) -> BusError {
+        match source.raw_os_error() {
+            Some(libc::ENOBUFS | libc::EAGAIN) => BusError::QueueFull,
+            Some(libc::ENETDOWN) => BusError::Down(self.name.clone()),
+            // The interface was removed, as an adapter that is pulled out.
+            Some(libc::ENODEV | libc::ENXIO) => BusError::NoInterface(self.name.clone()),
+            Some(libc::EPERM | libc::EACCES) => BusError::Permission(format!("{doing} {}", self.name)),
+            _ => BusError::Io { what: format!("{doing} {}", self.name), source },
+        }
+    }
+
+    fn mono(&self) -> Mono {
+        Mono::at(self.opened.elapsed())
+    }
+
+    /// Makes [`Event::Link`] of a change that has not been told yet.
+    fn link(&mut self, up: bool) {
+        if self.up != up {
+            self.up = up;
+            self.bit_rate.set(None);
+            self.ready.push_back(Event::Link(up));
+        }
+    }
+
+    /// Reads what the kernel holds for this socket.
+    fn fill(&mut self) -> Result<(), BusError> {
+        match self.batch.fill(self.socket.as_fd()) {
+            Ok(count) => {
+                if self.emptied {
+                    self.empty_at = self.read.mono;
+                }
+                self.emptied = count < receive::BATCH;
+                self.drained = self.emptied;
+                self.read = self.now();
+                Ok(())
+            }
+            Err(error) => match error.raw_os_error() {
+                Some(libc::EAGAIN) => {
+                    self.drained = true;
+                    Ok(())
+                }
+                Some(libc::EINTR) => Ok(()),
+                // Told once by the kernel; the socket stays bound and works again with the interface.
+                Some(libc::ENETDOWN) => {
+                    self.link(false);
+                    Ok(())
+                }
+                _ => Err(self.error("receive from", error)),
+            },
+        }
+    }
+
+    /// Waits until there is something to read, a signal or the deadline. Whether the deadline has
+    /// been reached with nothing there.
+    fn wait(&mut self, deadline: Mono) -> Result<bool, BusError> {
+        let left = deadline.since(self.mono());
+        let limit = if self.up { left } else { left.min(LINK_CHECK) };
+        let ready = poll::readable([self.socket.as_fd(), self.interrupts.fd()], limit);
+        let [frames, signal] = ready.map_err(|error| self.error("wait for", error))?;
+        if signal {
+            self.interrupts.collect();
+        }
+        if frames {
+            self.drained = false;
+        } else if !self.up && interfaces::is_up(&self.name) == Some(true) {
+            self.link(true);
+        }
+        Ok(!frames && !signal && self.ready.is_empty() && self.mono() >= deadline)
+    }
+
+    /// The frame of a message, if nothing comes before it. Otherwise what the message tells is ready,
+    /// in order.
+    fn take_in(&mut self, message: Message) -> Option<Event> {
+        // Told by whatever comes through, sooner than by the next look at the interface.
+        self.link(true);
+        if let Some(lost) = message.lost {
+            let more = lost.wrapping_sub(self.lost);
+            self.lost = lost;
+            if more > 0 {
+                self.ready.push_back(Event::Dropped(more));
+            }
+        }
+        let at = self.stamp(message.wall);
+        match CanFrame::from(message.frame) {
+            CanFrame::Error(frame) => {
+                self.ready.extend(faults::faults(frame).into_iter().map(|fault| Event::Fault(fault, at)));
+            }
+            CanFrame::Data(_) | CanFrame::Remote(_) => {
+                let frame = from_kernel(&message.frame)?;
+                if self.wanted.as_ref().is_some_and(|wanted| frame.is_remote() || !wanted.contains(&frame.id())) {
+                    return None;
+                }
+                let event = Event::Frame(Received { frame, at });
+                if self.ready.is_empty() {
+                    return Some(event);
+                }
+                self.ready.push_back(event);
+            }
+        }
+        None
+    }
+
+    /// Both times of a frame, from the kernel's wall time and the clocks when it was read.
+    ///
+    /// The kernel stamps with the wall clock only. What matters for deadlines and intervals is the
+    /// monotonic time: the moment of reading less the time the frame had waited. If the wall clock
+    /// was set in between, that difference is nonsense; it shows where the frame would have been
+    /// received after it was read, or before the socket was last seen empty.
+    fn stamp(&self, kernel: Option<Duration>) -> Stamp {
+        let Some(kernel) = kernel else { return self.read };
+        let longest = self.read.mono.since(self.empty_at).saturating_add(JITTER).min(LONGEST_LAG);
+        let lag = self.read.wall.since_epoch().checked_sub(kernel).filter(|&lag| lag <= longest).unwrap_or_default();
+        Stamp { mono: (self.read.mono - lag).max(self.empty_at), wall: Wall::at(kernel) }
+    }
+}
+
+impl Bus for SocketCan {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        if self.bit_rate.get().is_none() {
+            let details = CanInterface::open(&self.name).and_then(|interface| interface.details());
+            let timing = details.ok().and_then(|details| details.can.bit_timing);
+            self.bit_rate.set(Some(timing.map(|timing| timing.bitrate).filter(|&rate| rate > 0)));
+        }
+        self.bit_rate.get().flatten()
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        self.timestamps
+    }
+
+    fn now(&self) -> Stamp {
+        Stamp { mono: self.mono(), wall: Wall::now() }
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        let ids: Option<HashSet<CanId>> = match filters {
+            Filters::All => None,
+            Filters::Only(ids) => Some(ids.iter().copied().collect()),
+        };
+        let set = match &ids {
+            Some(ids) if ids.is_empty() => self.socket.set_filter_drop_all(),
+            Some(ids) if ids.len() <= MAX_FILTERS => {
+                let filters: Vec<(u32, u32)> = ids.iter().map(|&id| filter(id)).collect();
+                self.socket.set_filters(&filters)
+            }
+            _ => self.socket.set_filter_accept_all(),
+        };
+        set.map_err(|error| self.error("set the filters of", error))?;
+        self.wanted = ids.filter(|ids| ids.len() > MAX_FILTERS);
+        Ok(())
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.socket.write_frame(&to_kernel(frame)).map_err(|error| {
+            // The kernel gives the news to whichever call comes first, and only once.
+            if error.raw_os_error() == Some(libc::ENETDOWN) {
+                self.link(false);
+            }
+            self.error("send on", error)
+        })
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        loop {
+            if self.interrupts.take() {
+                return Ok(Event::Interrupted);
+            }
+            if let Some(event) = self.ready.pop_front() {
+                return Ok(event);
+            }
+            if let Some(message) = self.batch.next() {
+                if let Some(event) = self.take_in(message) {
+                    return Ok(event);
+                }
+            } else if !self.drained {
+                self.fill()?;
+            } else if self.wait(deadline)? {
+                return Ok(Event::Timeout);
+            }
+        }
+    }
+}
+
+/// A raw CAN socket that blocks on nothing, not yet bound.
+fn new_socket() -> Result<CanSocket, BusError> {
+    let domain = socket2::Domain::from(libc::AF_CAN);
+    let protocol = socket2::Protocol::from(libc::CAN_RAW);
+    let socket = socket2::Socket::new(domain, socket2::Type::RAW, Some(protocol))
+        .and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
+    match socket {
+        Ok(socket) => Ok(CanSocket::from(OwnedFd::from(socket))),
+        Err(source) => Err(match source.raw_os_error() {
+            Some(libc::EAFNOSUPPORT | libc::EPROTONOSUPPORT) => {
+                BusError::Unsupported("this kernel has no CAN support".to_owned())
+            }
+            Some(libc::EPERM | libc::EACCES) => BusError::Permission("open a CAN socket".to_owned()),
+            _ => BusError::Io { what: "open a CAN socket".to_owned(), source },
+        }),
+    }
+}
+
+/// Identifier and mask that let through data frames with exactly this identifier.
+fn filter(id: CanId) -> (u32, u32) {
+    const EXACT: u32 = libc::CAN_EFF_FLAG | libc::CAN_RTR_FLAG;
+    match id {
+        CanId::Standard(id) => (u32::from(id), libc::CAN_SFF_MASK | EXACT),
+        CanId::Extended(id) => (id | libc::CAN_EFF_FLAG, libc::CAN_EFF_MASK | EXACT),
+    }
+}
+
+fn to_kernel(frame: &Frame) -> CanFrame {
+    let mut raw = socketcan::frame::can_frame_default();
+    raw.can_id = match frame.id() {
+        CanId::Standard(id) => u32::from(id),
+        CanId::Extended(id) => id | libc::CAN_EFF_FLAG,
+    };
+    if frame.is_remote() {
+        raw.can_id |= libc::CAN_RTR_FLAG;
+    }
+    raw.can_dlc = frame.len();
+    raw.data[..frame.data().len()].copy_from_slice(frame.data());
+    CanFrame::from(raw)
+}
+
+/// Nothing for a frame that is no classic data or remote frame.
+fn from_kernel(raw: &libc::can_frame) -> Option<Frame> {
+    let id = if raw.can_id & libc::CAN_EFF_FLAG != 0 {
+        CanId::extended(raw.can_id & libc::CAN_EFF_MASK)?
+    } else {
+        CanId::standard(u16::try_from(raw.can_id & libc::CAN_SFF_MASK).ok()?)?
+    };
+    if raw.can_id & libc::CAN_RTR_FLAG != 0 {
+        return Frame::remote(id, raw.can_dlc).ok();
+    }
+    Frame::new(id, raw.data.get(..usize::from(raw.can_dlc))?).ok()
+}

@@ -1,0 +1,194 @@
+//! Reading many frames with one system call, each with the kernel's timestamp and drop counter.
+//!
+//! `recvmmsg` is called directly because nothing else does all three: the `socketcan` crate reads
+//! one frame a call and passes the drop counter over, nix loses control messages when its buffers
+//! are used again (nix-rust/nix pull request 2813).
+
+use std::io;
+use std::os::fd::{AsRawFd, BorrowedFd};
+use std::time::Duration;
+
+const VECTOR: libc::c_uint = 64;
+/// Frames taken in by one system call at most.
+pub(super) const BATCH: usize = VECTOR as usize;
+/// Room for the control messages of one frame: a timestamp and a counter take 56 bytes.
+const CONTROL: usize = 96;
+
+/// Aligned as the kernel's control message header is.
+#[repr(C, align(8))]
+#[derive(Clone, Copy)]
+struct Control([u8; CONTROL]);
+
+/// Where the kernel puts one frame.
+#[derive(Clone, Copy)]
+struct Slot {
+    frame: libc::can_frame,
+    control: Control,
+    /// How much of `frame` and `control` is filled.
+    filled: usize,
+    control_filled: usize,
+}
+
+/// What the kernel tells with a frame.
+#[derive(Clone, Copy)]
+pub(super) struct Message {
+    /// The frame, not yet looked into.
+    pub(super) frame: libc::can_frame,
+    /// When the kernel received it, since 1970.
+    pub(super) wall: Option<Duration>,
+    /// How many frames this socket had lost in all when this one was queued.
+    pub(super) lost: Option<u32>,
+}
+
+/// The frames of the last system call that nobody has asked for yet.
+pub(super) struct Batch {
+    slots: Box<[Slot; BATCH]>,
+    next: usize,
+    count: usize,
+}
+
+impl Batch {
+    pub(super) fn new() -> Batch {
+        let frame = socketcan::frame::can_frame_default();
+        let empty = Slot { frame, control: Control([0; CONTROL]), filled: 0, control_filled: 0 };
+        Batch { slots: Box::new([empty; BATCH]), next: 0, count: 0 }
+    }
+
+    /// The next frame of the batch.
+    pub(super) fn next(&mut self) -> Option<Message> {
+        while self.next < self.count {
+            let slot = &self.slots[self.next];
+            self.next += 1;
+            // Anything else is no classic frame, and no such thing has been asked for.
+            if slot.filled == size_of::<libc::can_frame>() {
+                let (wall, lost) = read_control(&slot.control.0[..slot.control_filled.min(CONTROL)]);
+                return Some(Message { frame: slot.frame, wall, lost });
+            }
+        }
+        None
+    }
+
+    /// Takes in what is there, without waiting: how many frames, none only with an error.
+    #[expect(unsafe_code, reason = "no safe interface to recvmmsg delivers the drop counter")]
+    pub(super) fn fill(&mut self, socket: BorrowedFd<'_>) -> io::Result<usize> {
+        (self.next, self.count) = (0, 0);
+        // SAFETY: all-zero bytes are a valid iovec and mmsghdr: lengths of 0 and null pointers.
+        let mut parts: [libc::iovec; BATCH] = unsafe { std::mem::zeroed() };
+        // SAFETY: as above.
+        let mut headers: [libc::mmsghdr; BATCH] = unsafe { std::mem::zeroed() };
+        for ((slot, part), header) in self.slots.iter_mut().zip(&mut parts).zip(&mut headers) {
+            part.iov_base = (&raw mut slot.frame).cast();
+            part.iov_len = size_of::<libc::can_frame>();
+            header.msg_hdr.msg_iov = part;
+            header.msg_hdr.msg_iovlen = 1;
+            header.msg_hdr.msg_control = slot.control.0.as_mut_ptr().cast();
+            header.msg_hdr.msg_controllen = CONTROL as _;
+        }
+        // SAFETY: every header points to one part and to a control buffer with their true lengths;
+        // `parts` and the slots outlive the call and nothing else touches them during it. A can_frame
+        // is plain bytes, so whatever the kernel writes is a valid one.
+        let received = unsafe {
+            libc::recvmmsg(
+                socket.as_raw_fd(),
+                headers.as_mut_ptr(),
+                VECTOR,
+                libc::MSG_DONTWAIT as _,
+                std::ptr::null_mut(),
+            )
+        };
+        let count = usize::try_from(received).map_err(|_| io::Error::last_os_error())?;
+        for (slot, header) in self.slots.iter_mut().zip(&headers).take(count) {
+            slot.filled = usize::try_from(header.msg_len).unwrap_or(0);
+            slot.control_filled = header.msg_hdr.msg_controllen as _;
+        }
+        self.count = count;
+        Ok(count)
+    }
+}
+
+/// Reads timestamp and drop counter from the control messages of one frame. Each has the kernel's
+/// header (a length of the width of `size_t` that counts the header, level, type) and starts at a
+/// multiple of that width.
+fn read_control(mut control: &[u8]) -> (Option<Duration>, Option<u32>) {
+    const WORD: usize = size_of::<usize>();
+    let (mut wall, mut lost) = (None, None);
+    while let Some((len, rest)) = control.split_first_chunk::<WORD>() {
+        let Some((level, rest)) = rest.split_first_chunk::<4>() else { break };
+        let Some((kind, _)) = rest.split_first_chunk::<4>() else { break };
+        let len = usize::from_ne_bytes(*len);
+        let Some(data) = control.get(WORD + 8..len) else { break };
+        if i32::from_ne_bytes(*level) == libc::SOL_SOCKET {
+            match i32::from_ne_bytes(*kind) {
+                libc::SCM_TIMESTAMPNS => wall = read_timespec(data),
+                libc::SO_RXQ_OVFL => lost = data.first_chunk().map(|bytes| u32::from_ne_bytes(*bytes)),
+                _ => {}
+            }
+        }
+        control = control.get(len.next_multiple_of(WORD)..).unwrap_or_default();
+    }
+    (wall, lost)
+}
+
+/// A `timespec` of either width.
+fn read_timespec(data: &[u8]) -> Option<Duration> {
+    let (seconds, nanos) = if data.len() >= 16 {
+        let (seconds, rest) = data.split_first_chunk()?;
+        (u64::from_ne_bytes(*seconds), u64::from_ne_bytes(*rest.first_chunk()?))
+    } else {
+        let (seconds, rest) = data.split_first_chunk()?;
+        (u64::from(u32::from_ne_bytes(*seconds)), u64::from(u32::from_ne_bytes(*rest.first_chunk()?)))
+    };
+    Some(Duration::new(seconds, u32::try_from(nanos).ok().filter(|&nanos| nanos < 1_000_000_000)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A control message as the kernel lays it out.
+    fn message(level: i32, kind: i32, data: &[u8]) -> Vec<u8> {
+        let len = size_of::<usize>() + 8 + data.len();
+        let mut bytes = [&len.to_ne_bytes()[..], &level.to_ne_bytes(), &kind.to_ne_bytes(), data].concat();
+        bytes.resize(len.next_multiple_of(size_of::<usize>()), 0xee);
+        bytes
+    }
+
+    fn timestamp(seconds: i64, nanos: i64) -> Vec<u8> {
+        let data = [seconds.to_ne_bytes(), nanos.to_ne_bytes()].concat();
+        message(libc::SOL_SOCKET, libc::SCM_TIMESTAMPNS, &data)
+    }
+
+    #[test]
+    fn timestamp_and_counter_in_either_order() {
+        let counter = message(libc::SOL_SOCKET, libc::SO_RXQ_OVFL, &1829u32.to_ne_bytes());
+        let time = timestamp(1_436_509_052, 249_713_001);
+        let expected = (Some(Duration::new(1_436_509_052, 249_713_001)), Some(1829));
+        assert_eq!(read_control(&[time.clone(), counter.clone()].concat()), expected);
+        assert_eq!(read_control(&[counter.clone(), time.clone()].concat()), expected);
+        let other = message(libc::SOL_SOCKET, 37, &[0; 48]);
+        assert_eq!(read_control(&[other, counter, time].concat()), expected);
+        assert_eq!(read_control(&[]), (None, None));
+    }
+
+    #[test]
+    fn control_messages_that_lie_are_passed_over() {
+        let time = timestamp(1, 2);
+        for end in 0..time.len() {
+            assert_eq!(read_control(&time[..end]), (None, None), "{end}");
+        }
+        for len in [0usize, 1, 15, 16, 1000, usize::MAX] {
+            let mut wrong = time.clone();
+            wrong[..size_of::<usize>()].copy_from_slice(&len.to_ne_bytes());
+            assert_eq!(read_control(&wrong), (None, None), "{len}");
+        }
+        assert_eq!(read_control(&timestamp(1, 1_000_000_000)), (None, None));
+        assert_eq!(read_control(&timestamp(1, -1)), (None, None));
+    }
+
+    #[test]
+    fn a_32_bit_timespec() {
+        let data = [7u32.to_ne_bytes(), 5u32.to_ne_bytes()].concat();
+        assert_eq!(read_timespec(&data), Some(Duration::new(7, 5)));
+        assert_eq!(read_timespec(&data[..6]), None);
+    }
+}

@@ -1,0 +1,323 @@
+//! The decoding of TPDOs into samples, by mapping, type, digits and status.
+
+use super::instrument::{Instrument, Signal, Tpdo};
+use super::sample::{Number, Raw, Sample, Source, Status};
+use crate::bus::{Received, Stamp};
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::object::ObjectId;
+use crate::canopen::pdo::{Field, lay_out};
+use crate::canopen::value::{DataType, Value};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// What the user wants of a node: a signal, its status, or any object.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// `pressure`.
+    Signal(String),
+    /// `pressure.status`.
+    Status(String),
+    /// An object that is carried as it is.
+    Object(ObjectId),
+}
+
+/// How the bytes of one value become a sample.
+#[derive(Clone, Debug)]
+pub struct Reading {
+    /// The sample's source.
+    pub source: usize,
+    data_type: DataType,
+    digits: u8,
+    marker: bool,
+}
+
+impl Reading {
+    /// The reading of a signal's process value of `data_type` into the source numbered `source`.
+    pub fn of_signal(signal: &Signal, data_type: DataType, source: usize) -> Reading {
+        Reading { source, data_type, digits: signal.digits.unwrap_or(0), marker: signal.marker }
+    }
+
+    /// The reading of a number that has neither unit nor digits.
+    pub fn plain(data_type: DataType, source: usize) -> Reading {
+        Reading { source, data_type, digits: 0, marker: false }
+    }
+
+    /// The type of the value.
+    pub fn data_type(&self) -> DataType {
+        self.data_type
+    }
+
+    /// A sample out of a value's bytes and, where there are, its status bits.
+    pub fn sample(&self, at: Stamp, bytes: &[u8], status_bits: Option<u64>) -> Option<Sample> {
+        let value = self.data_type.decode(bytes).ok()?;
+        let number = Number::from_value(&value, self.digits)?;
+        let told = status_bits.map(Status::from_bits);
+        let marked = !number.is_finite() || self.marker && is_smallest(&value, self.data_type);
+        let status = match told {
+            Some((Status::Ok, _)) if marked => Some(Status::Invalid),
+            Some((status, _)) => Some(status),
+            None if marked => Some(Status::Invalid),
+            None if self.marker => Some(Status::Ok),
+            None => None,
+        };
+        let valid = !marked && told.is_none_or(|(_, valid)| valid);
+        Some(Sample { at, source: self.source, value: valid.then_some(number), status, raw: Raw::new(bytes) })
+    }
+}
+
+/// The marker of an integer in overload (MH-4: -32768, -2147483648): the smallest number of the type.
+fn is_smallest(value: &Value, data_type: DataType) -> bool {
+    match (value, data_type) {
+        (Value::Integer(number), DataType::Integer(width)) => {
+            *number == i64::MIN >> (64 - 8 * u32::from(width.clamp(1, 8)))
+        }
+        _ => false,
+    }
+}
+
+#[derive(Debug)]
+struct Part {
+    field: Field,
+    reading: Reading,
+    status: Option<Field>,
+}
+
+#[derive(Debug)]
+struct Plan {
+    node: NodeId,
+    /// Bytes that the mapping fills.
+    length: usize,
+    parts: Vec<Part>,
+    wrong_length: u64,
+}
+
+/// Decodes the TPDOs of several instruments.
+#[derive(Debug, Default)]
+pub struct Decoder {
+    plans: HashMap<CanId, Plan>,
+    sources: Vec<Source>,
+}
+
+/// What a frame was to a decoder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Decoded {
+    /// No TPDO of ours.
+    NotOurs,
+    /// A TPDO of this node; its samples have been handed over.
+    Tpdo(NodeId),
+    /// A TPDO of this node whose length is not that of its mapping: no sample was made.
+    WrongLength(NodeId),
+}
+
+impl Decoder {
+    /// A source that is in no TPDO: polled values share the numbering. The same source keeps its number.
+    pub fn add_source(&mut self, source: Source) -> usize {
+        if let Some(at) = self.sources.iter().position(|known| *known == source) {
+            return at;
+        }
+        self.sources.push(source);
+        self.sources.len() - 1
+    }
+
+    /// Plans for every valid TPDO of an instrument; with `wanted`, only for what was asked for.
+    pub fn add(&mut self, instrument: &Instrument, wanted: &[Wanted]) {
+        for tpdo in instrument.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()) {
+            let plan = self.plan(instrument, tpdo, wanted);
+            self.plans.insert(tpdo.cob_id.can_id(), plan);
+        }
+    }
+
+    fn plan(&mut self, instrument: &Instrument, tpdo: &Tpdo, wanted: &[Wanted]) -> Plan {
+        let fields = lay_out(&tpdo.mapping);
+        let bits: usize = tpdo.mapping.iter().map(|entry| usize::from(entry.bits)).sum();
+        let mut parts = Vec::new();
+        for field in &fields {
+            let object = field.entry.object;
+            let data_type = instrument.data_type(object, field.entry.bits);
+            let mut add = |name: &str, unit: String, reading: &dyn Fn(usize) -> Reading, status: Option<Field>| {
+                let source = self.add_source(Source { node: instrument.node, signal: name.into(), unit: unit.into() });
+                parts.push(Part { field: *field, reading: reading(source), status });
+            };
+            let asked = |item: &Wanted| wanted.contains(item);
+            if let Some(signal) = instrument.signals.iter().find(|signal| signal.is_value(object)) {
+                if wanted.is_empty() || asked(&Wanted::Signal(signal.name.clone())) {
+                    let status = fields.iter().find(|other| Some(other.entry.object) == signal.status).copied();
+                    let unit = signal.unit.map(|unit| unit.to_string()).unwrap_or_default();
+                    add(&signal.name, unit, &|source| Reading::of_signal(signal, data_type, source), status);
+                }
+            } else if let Some(signal) = instrument.signals.iter().find(|signal| signal.status == Some(object)) {
+                if asked(&Wanted::Status(signal.name.clone())) {
+                    let name = format!("{}.status", signal.name);
+                    add(&name, String::new(), &|source| Reading::plain(data_type, source), None);
+                }
+            } else if wanted.is_empty() && !is_dummy(object) {
+                add(&object.to_string(), String::new(), &|source| Reading::plain(data_type, source), None);
+            }
+            if asked(&Wanted::Object(object)) {
+                add(&object.to_string(), String::new(), &|source| Reading::plain(data_type, source), None);
+            }
+        }
+        Plan { node: instrument.node, length: bits.div_ceil(8), parts, wrong_length: 0 }
+    }
+
+    /// Every source, in the order of their numbers.
+    pub fn sources(&self) -> &[Source] {
+        &self.sources
+    }
+
+    /// The identifiers that TPDOs come with.
+    pub fn can_ids(&self) -> impl Iterator<Item = CanId> + '_ {
+        self.plans.keys().copied()
+    }
+
+    /// TPDOs of `node` that did not have the length of their mapping.
+    pub fn wrong_lengths(&self, node: NodeId) -> u64 {
+        self.plans.values().filter(|plan| plan.node == node).map(|plan| plan.wrong_length).sum()
+    }
+
+    /// Decodes a frame; its samples are pushed to `samples` in the order of the mapping.
+    ///
+    /// A TPDO whose length is not that of its mapping gives none: the mapping has been changed, or the frame
+    /// is not the device's.
+    pub fn decode(&mut self, received: &Received, samples: &mut Vec<Sample>) -> Decoded {
+        let frame = &received.frame;
+        let Some(plan) = self.plans.get_mut(&frame.id()).filter(|_| !frame.is_remote()) else {
+            return Decoded::NotOurs;
+        };
+        let data = frame.data();
+        if data.len() != plan.length {
+            plan.wrong_length += 1;
+            return Decoded::WrongLength(plan.node);
+        }
+        for part in &plan.parts {
+            let Some((bytes, len)) = part.field.bytes(data) else { continue };
+            let status = part.status.and_then(|status| status.bytes(data)).map(|(bits, _)| u64::from_le_bytes(bits));
+            samples.extend(part.reading.sample(received.at, &bytes[..len], status));
+        }
+        Decoded::Tpdo(plan.node)
+    }
+}
+
+/// Indices 0001h to 001Fh in a mapping fill gaps (CiA 301, 7.4.7.1).
+fn is_dummy(object: ObjectId) -> bool {
+    object.index < 0x20
+}
+
+/// A source for a signal of a node.
+pub fn source(node: NodeId, name: &str, signal: Option<&Signal>) -> Source {
+    let unit = signal.and_then(|signal| signal.unit).map(|unit| unit.to_string()).unwrap_or_default();
+    Source { node, signal: Arc::from(name), unit: Arc::from(unit) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber};
+    use crate::device::unit::Unit;
+
+    fn instrument(value: (ObjectId, DataType), words: &[u32], signal: impl Fn(&mut Signal)) -> Instrument {
+        let node = NodeId::new(1).expect("a node-ID");
+        let mut pressure = Signal {
+            name: "pressure".into(),
+            channel: 1,
+            value,
+            also: vec![ObjectId::new(0x2090, 0)],
+            status: None,
+            marker: false,
+            unit: Some(Unit(0x004e_0000)),
+            digits: Some(3),
+        };
+        signal(&mut pressure);
+        let mut instrument = Instrument::new(node);
+        instrument.signals.push(pressure);
+        instrument.tpdos.push(Tpdo {
+            number: TpdoNumber::new(1).expect("a number"),
+            cob_id: CobId(0x4000_0181),
+            transmission: None,
+            event_timer_ms: None,
+            mapping: words.iter().map(|&word| MappingEntry::from_word(word)).collect(),
+        });
+        instrument
+    }
+
+    fn rows(instrument: &Instrument, wanted: &[Wanted], frame: &str) -> Vec<(String, String, &'static str)> {
+        let mut decoder = Decoder::default();
+        decoder.add(instrument, wanted);
+        let received = Received { frame: frame.parse().expect("a frame"), at: Stamp::default() };
+        let mut samples = Vec::new();
+        decoder.decode(&received, &mut samples);
+        samples
+            .iter()
+            .map(|sample| {
+                let value = sample.value.map(|value| value.to_string()).unwrap_or_default();
+                let source = &decoder.sources()[sample.source];
+                (source.signal.to_string(), value, sample.status.map_or("", Status::as_str))
+            })
+            .collect()
+    }
+
+    fn row(signal: &str, value: &str, status: &'static str) -> (String, String, &'static str) {
+        (signal.into(), value.into(), status)
+    }
+
+    const REAL: (ObjectId, DataType) = (ObjectId::new(0x6130, 1), DataType::Real32);
+
+    #[test]
+    fn mh4_real_with_status() {
+        let mh4 = instrument(REAL, &[0x6130_0120, 0x6150_0108], |signal| {
+            signal.status = Some(ObjectId::new(0x6150, 1));
+            signal.marker = true;
+        });
+        assert_eq!(rows(&mh4, &[], "181#0000803F00"), [row("pressure", "1", "ok")]);
+        assert_eq!(rows(&mh4, &[], "181#0000C07F03"), [row("pressure", "", "overload-high")]);
+        assert_eq!(rows(&mh4, &[], "181#0000C07F05"), [row("pressure", "", "overload-low")]);
+        assert_eq!(rows(&mh4, &[], "181#0000C07F00"), [row("pressure", "", "invalid")]);
+        assert_eq!(rows(&mh4, &[], "181#0000803F01"), [row("pressure", "", "invalid")]);
+        // Another length than the mapping's, a remote request, a 29-bit identifier: no row.
+        for other in ["181#", "181#0000803F", "181#0000803F0000", "181#R5", "00000181#0000803F00", "182#0000803F00"] {
+            assert_eq!(rows(&mh4, &[], other), [], "{other}");
+        }
+        let asked = [Wanted::Status("pressure".into()), Wanted::Object(ObjectId::new(0x6150, 1))];
+        assert_eq!(rows(&mh4, &asked, "181#0000C07F03"), [row("pressure.status", "3", ""), row("0x6150:1", "3", "")]);
+    }
+
+    #[test]
+    fn dps_integer_with_digits_tells_no_status() {
+        let dps = instrument((ObjectId::new(0x6130, 1), DataType::Integer(4)), &[0x6130_0120], |_| {});
+        let mut dps = dps;
+        // Without a description 6130h is REAL32 by the standard.
+        assert_eq!(rows(&dps, &[], "181#50C30000"), [row("pressure", "7.0065e-41", "")]);
+        dps.model = Some(Arc::new(
+            Model::from_toml(
+                "name='x'\ntitle=''\nvendor=''\nsource=''\n[identify]\n[[object]]\nat='0x6130:1-1'\nname='pv'\ntype='i32'\naccess='ro'",
+            )
+            .expect("a description"),
+        ));
+        assert_eq!(rows(&dps, &[], "181#50C30000"), [row("pressure", "50.000", "")]);
+        assert_eq!(rows(&dps, &[], "181#00000080"), [row("pressure", "-2147483.648", "")]);
+    }
+
+    use crate::device::catalog::Model;
+
+    #[test]
+    fn markers_only_where_the_device_has_them() {
+        let marked = instrument(REAL, &[0x9130_0120], |signal| signal.marker = true);
+        assert_eq!(rows(&marked, &[], "181#00000080"), [row("pressure", "", "invalid")]);
+        assert_eq!(rows(&marked, &[], "181#D2040000"), [row("pressure", "1.234", "ok")]);
+        // NaN is no number on any device.
+        let other = instrument(REAL, &[0x6130_0120], |_| {});
+        assert_eq!(rows(&other, &[], "181#0000C07F"), [row("pressure", "", "invalid")]);
+        assert_eq!(rows(&other, &[], "181#0000807F"), [row("pressure", "", "invalid")]);
+    }
+
+    #[test]
+    fn other_indices_of_the_same_quantity_and_objects_that_are_no_signal() {
+        let d20 = instrument(REAL, &[0x2090_0020], |_| {});
+        // Without a description 2090h's type is not known; it is the signal all the same.
+        assert_eq!(rows(&d20, &[], "181#D2040000"), [row("pressure", "1.234", "")]);
+        let raw = instrument(REAL, &[0x7100_0110, 0x0005_0008], |_| {});
+        assert_eq!(rows(&raw, &[], "181#100E00"), [row("0x7100:1", "3600", "")]);
+        // The D-20-9 sends no data while its mapping is switched off.
+        assert_eq!(rows(&d20, &[], "181#"), []);
+    }
+}

@@ -1,0 +1,9 @@
+//! From TPDOs and SDO answers to samples: what a device measures, decoded, with unit and status.
+//!
+//! Nothing here reads a clock: every sample has the stamp of the frame it came with.
+
+pub mod decode;
+pub mod instrument;
+pub mod sample;
+pub mod statistics;
+pub mod survey;

@@ -1,0 +1,326 @@
+//! Reads what is needed to understand a device's measurements: identity, TPDOs, units, digits.
+//!
+//! Many nodes are read side by side, in the same steps.
+
+use super::instrument::{Identity, Instrument, PROCESS_VALUES, Signal, Tpdo};
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
+use crate::canopen::value::{DataType, Value};
+use crate::device::catalog::{Model, Traits, recognise, to_ask};
+use crate::device::description::SignalEntry;
+use crate::device::unit::Unit;
+use crate::master::{Error, Master, Request, SdoError, SdoFailure};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+const U8: DataType = DataType::Unsigned(1);
+const U16: DataType = DataType::Unsigned(2);
+const U32: DataType = DataType::Unsigned(4);
+
+/// TPDOs looked for on a device without a description. JUMO's temperature probe sends TPDO5.
+const TPDOS_TRIED: u16 = 8;
+
+/// The description to use for a node, where the user named one.
+pub type Overrides = BTreeMap<NodeId, Arc<Model>>;
+
+/// Something to be read from a node.
+pub type Item = (NodeId, ObjectId, DataType);
+
+/// Reads many values side by side.
+///
+/// # Errors
+/// What stops everything. What one device refuses is in its result.
+pub fn read_all(master: &mut Master<'_>, items: &[Item]) -> Result<Vec<Result<Value, SdoError>>, Error> {
+    let requests = items.iter().map(|&(node, object, _)| Request::read(node, object)).collect();
+    let answers = master.transfer(requests, &mut |_| {})?;
+    let values = answers.into_iter().zip(items).map(|(answer, &(node, object, data_type))| {
+        answer.and_then(|answer| answer.value(node, object, Some(data_type))).map(|(value, _)| value)
+    });
+    Ok(values.collect())
+}
+
+/// Like [`read_all`], with `None` for what a device refuses.
+///
+/// # Errors
+/// Silence and breaches of the protocol too: a device that stops answering in the middle is not read
+/// half.
+fn read_known(master: &mut Master<'_>, items: &[Item]) -> Result<Vec<Option<Value>>, Error> {
+    read_all(master, items)?
+        .into_iter()
+        .map(|result| match result {
+            Ok(value) => Ok(Some(value)),
+            Err(error) => match error.failure {
+                SdoFailure::Refused(_) | SdoFailure::Fit(_) => Ok(None),
+                _ => Err(Error::Sdo(error)),
+            },
+        })
+        .collect()
+}
+
+fn number(value: Option<&Value>) -> Option<u64> {
+    value.and_then(Value::as_u64)
+}
+
+fn small<T: TryFrom<u64>>(value: Option<&Value>) -> Option<T> {
+    number(value).and_then(|number| T::try_from(number).ok())
+}
+
+/// Reads the identity of nodes that are there.
+pub fn identities(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<Vec<Identity>, Error> {
+    let objects = [
+        (ObjectId::new(0x1000, 0), U32),
+        (ObjectId::new(0x1018, 1), U32),
+        (ObjectId::new(0x1018, 2), U32),
+        (ObjectId::new(0x1018, 3), U32),
+        (ObjectId::new(0x1018, 4), U32),
+        (ObjectId::new(0x1008, 0), DataType::VisibleString),
+    ];
+    let items: Vec<Item> =
+        nodes.iter().flat_map(|&node| objects.map(|(object, data_type)| (node, object, data_type))).collect();
+    let values = read_known(master, &items)?;
+    Ok(values
+        .chunks(objects.len())
+        .map(|values| Identity {
+            device_type: small(values[0].as_ref()),
+            vendor: small(values[1].as_ref()),
+            product: small(values[2].as_ref()),
+            revision: small(values[3].as_ref()),
+            serial: small(values[4].as_ref()),
+            name: match &values[5] {
+                Some(Value::Text(name)) => Some(name.clone()),
+                _ => None,
+            },
+        })
+        .collect())
+}
+
+/// Reads everything of the nodes: identity, signals with unit and digits, TPDOs.
+///
+/// # Errors
+/// A node that does not answer, and what stops everything.
+pub fn instruments(master: &mut Master<'_>, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Instrument>, Error> {
+    let mut instruments = recognised(master, nodes, overrides)?;
+    read_services(master, &mut instruments)?;
+    read_tpdos(master, &mut instruments)?;
+    find_signals(master, &mut instruments)?;
+    read_units(master, &mut instruments)?;
+    Ok(instruments)
+}
+
+/// Reads identities and finds the descriptions that they fit.
+///
+/// # Errors
+/// A node that does not answer, and what stops everything.
+pub fn recognised(master: &mut Master<'_>, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Instrument>, Error> {
+    // A device whose reads need a quirk can only be read once the user has named its description.
+    for (node, model) in overrides {
+        master.set_quirks(*node, &model.description.quirks);
+    }
+    let identities = identities(master, nodes)?;
+    let mut traits: Vec<Traits> = identities.iter().map(Identity::traits).collect();
+    let questions: Vec<(usize, ObjectId)> = nodes
+        .iter()
+        .enumerate()
+        .filter(|(_, node)| !overrides.contains_key(node))
+        .flat_map(|(at, _)| to_ask(&traits[at]).into_iter().map(move |object| (at, object)))
+        .collect();
+    let requests = questions.iter().map(|&(at, object)| Request::read(nodes[at], object)).collect();
+    for (&(at, object), answer) in questions.iter().zip(master.transfer(requests, &mut |_| {})?) {
+        match answer {
+            Ok(answer) => {
+                traits[at].answers.extend(answer.uploaded.map(|uploaded| (object, uploaded.bytes)));
+            }
+            Err(SdoError { failure: SdoFailure::Refused(_), .. }) => {}
+            Err(error) => return Err(Error::Sdo(error)),
+        }
+    }
+    let mut instruments: Vec<Instrument> = nodes.iter().map(|&node| Instrument::new(node)).collect();
+    for ((instrument, identity), traits) in instruments.iter_mut().zip(identities).zip(&traits) {
+        let given = overrides.get(&instrument.node).cloned();
+        instrument.model = given.or_else(|| recognise(traits));
+        instrument.identity = identity;
+        if let Some(model) = &instrument.model {
+            master.set_quirks(instrument.node, &model.description.quirks);
+        }
+    }
+    Ok(instruments)
+}
+
+fn read_services(master: &mut Master<'_>, instruments: &mut [Instrument]) -> Result<(), Error> {
+    let objects = [(ObjectId::new(0x1017, 0), U16), (ObjectId::new(0x1014, 0), U32), (ObjectId::new(0x1005, 0), U32)];
+    let items: Vec<Item> = instruments
+        .iter()
+        .flat_map(|instrument| objects.map(|(object, data_type)| (instrument.node, object, data_type)))
+        .collect();
+    let values = read_known(master, &items)?;
+    for (instrument, values) in instruments.iter_mut().zip(values.chunks(objects.len())) {
+        instrument.heartbeat_ms = small(values[0].as_ref());
+        if let Some(word) = small(values[1].as_ref()).map(CobId).filter(|word| word.is_valid()) {
+            instrument.emergency = word.can_id();
+        }
+        if let Some(word) = small(values[2].as_ref()).map(CobId) {
+            instrument.sync = word.can_id();
+        }
+    }
+    Ok(())
+}
+
+fn read_tpdos(master: &mut Master<'_>, instruments: &mut [Instrument]) -> Result<(), Error> {
+    let numbers = |instrument: &Instrument| -> Vec<TpdoNumber> {
+        let described = |number: &TpdoNumber| match &instrument.model {
+            Some(model) => model.dictionary.has_index(number.communication(0).index),
+            None => number.get() <= TPDOS_TRIED,
+        };
+        (1..=512).filter_map(TpdoNumber::new).filter(described).collect()
+    };
+    let wanted: Vec<(usize, TpdoNumber)> = instruments
+        .iter()
+        .enumerate()
+        .flat_map(|(at, instrument)| numbers(instrument).into_iter().map(move |number| (at, number)))
+        .collect();
+    let node = |at: usize, instruments: &[Instrument]| instruments[at].node;
+    let items: Vec<Item> =
+        wanted.iter().map(|&(at, number)| (node(at, instruments), number.communication(1), U32)).collect();
+    let cob_ids = read_known(master, &items)?;
+    let found: Vec<(usize, TpdoNumber, CobId)> = wanted
+        .iter()
+        .zip(&cob_ids)
+        .filter_map(|(&(at, number), value)| Some((at, number, CobId(small(value.as_ref())?))))
+        .collect();
+    let items: Vec<Item> = found
+        .iter()
+        .flat_map(|&(at, number, _)| {
+            let node = node(at, instruments);
+            [(node, number.communication(2), U8), (node, number.communication(5), U16), (node, number.mapping(0), U8)]
+        })
+        .collect();
+    let values = read_known(master, &items)?;
+    let counts: Vec<u8> = values.chunks(3).map(|values| small(values[2].as_ref()).unwrap_or(0)).collect();
+    // FEh and FFh stand for multiplexed PDOs (CiA 301, 7.5.2.38), which measuring devices do not send.
+    let entries = |count: u8| 1..=if count > 64 { 0 } else { count };
+    let items: Vec<Item> = found
+        .iter()
+        .zip(&counts)
+        .flat_map(|(&(at, number, _), &count)| {
+            let node = node(at, instruments);
+            entries(count).map(move |sub| (node, number.mapping(sub), U32))
+        })
+        .collect();
+    let mut words = read_known(master, &items)?.into_iter();
+    for ((&(at, number, cob_id), values), &count) in found.iter().zip(values.chunks(3)).zip(&counts) {
+        let mapping: Option<Vec<MappingEntry>> = entries(count)
+            .map(|_| words.next().flatten())
+            .map(|word| small(word.as_ref()).map(MappingEntry::from_word))
+            .collect();
+        instruments[at].tpdos.push(Tpdo {
+            number,
+            cob_id,
+            transmission: small(values[0].as_ref()).map(Transmission::from_code),
+            event_timer_ms: small(values[1].as_ref()),
+            mapping: mapping.unwrap_or_default(),
+        });
+    }
+    Ok(())
+}
+
+/// The signals of a description, or those that the objects of CiA 404 tell.
+fn find_signals(master: &mut Master<'_>, instruments: &mut [Instrument]) -> Result<(), Error> {
+    let mut unknown = Vec::new();
+    for (at, instrument) in instruments.iter_mut().enumerate() {
+        match instrument.model.clone().filter(|model| !model.description.signals.is_empty()) {
+            Some(model) => {
+                let signals = model.description.signals.iter();
+                instrument.signals = signals.map(|entry| described(instrument, entry)).collect();
+            }
+            None => unknown.push(at),
+        }
+    }
+    let items: Vec<Item> = unknown
+        .iter()
+        .flat_map(|&at| PROCESS_VALUES.map(|(index, _)| (instruments[at].node, ObjectId::new(index, 0), U8)))
+        .collect();
+    let counts = read_known(master, &items)?;
+    for (&at, counts) in unknown.iter().zip(counts.chunks(PROCESS_VALUES.len())) {
+        let channels = |value: &Option<Value>| small::<u8>(value.as_ref()).unwrap_or(0).min(199);
+        let family = PROCESS_VALUES.iter().zip(counts).find(|(_, count)| channels(count) > 0);
+        let instrument = &mut instruments[at];
+        let mut known: Vec<u8> = match family {
+            Some((_, count)) => (1..=channels(count)).collect(),
+            // Sub-index 0 may be missing; what is mapped is there.
+            None => instrument
+                .tpdos
+                .iter()
+                .flat_map(|tpdo| &tpdo.mapping)
+                .filter(|entry| PROCESS_VALUES.iter().any(|&(index, _)| index == entry.object.index))
+                .map(|entry| entry.object.sub)
+                .collect(),
+        };
+        known.sort_unstable();
+        known.dedup();
+        let (index, data_type) = family.map_or(PROCESS_VALUES[0], |(&family, _)| family);
+        instrument.signals = known
+            .into_iter()
+            .map(|channel| Signal {
+                name: format!("ch{channel}"),
+                channel,
+                value: (
+                    ObjectId::new(index, channel),
+                    instrument.data_type(ObjectId::new(index, channel), bits(data_type)),
+                ),
+                also: Vec::new(),
+                status: Some(ObjectId::new(0x6150, channel)),
+                marker: false,
+                unit: None,
+                digits: None,
+            })
+            .collect();
+    }
+    Ok(())
+}
+
+fn bits(data_type: DataType) -> u8 {
+    data_type.width().and_then(|width| u8::try_from(8 * width).ok()).unwrap_or(32)
+}
+
+fn described(instrument: &Instrument, entry: &SignalEntry) -> Signal {
+    let model = instrument.model.as_ref();
+    let known = model.and_then(|model| model.dictionary.get(entry.value)).map(|entry| entry.data_type);
+    Signal {
+        name: entry.name.clone(),
+        channel: entry.channel,
+        value: (entry.value, known.unwrap_or(DataType::Real32)),
+        also: entry.also.clone(),
+        status: entry.status,
+        marker: entry.marker,
+        unit: None,
+        digits: None,
+    }
+}
+
+fn read_units(master: &mut Master<'_>, instruments: &mut [Instrument]) -> Result<(), Error> {
+    let items: Vec<Item> = instruments
+        .iter()
+        .flat_map(|instrument| {
+            instrument.signals.iter().flat_map(|signal| {
+                [
+                    (instrument.node, ObjectId::new(0x6131, signal.channel), U32),
+                    (instrument.node, ObjectId::new(0x6132, signal.channel), U8),
+                ]
+            })
+        })
+        .collect();
+    let mut values = read_known(master, &items)?.into_iter();
+    for signal in instruments.iter_mut().flat_map(|instrument| &mut instrument.signals) {
+        signal.unit = values
+            .next()
+            .flatten()
+            .as_ref()
+            .and_then(Value::as_u64)
+            .and_then(|code| u32::try_from(code).ok())
+            .map(Unit);
+        signal.digits =
+            values.next().flatten().as_ref().and_then(Value::as_u64).and_then(|digits| u8::try_from(digits).ok());
+    }
+    Ok(())
+}
