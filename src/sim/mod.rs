@@ -9,6 +9,7 @@
 //! [`MemoryBus`](crate::bus::memory::MemoryBus) or, through [`host`], on a real bus.
 
 mod abort;
+mod channels;
 mod model;
 mod number;
 mod objects;
