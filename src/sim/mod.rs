@@ -10,10 +10,14 @@
 
 mod abort;
 mod channels;
+mod emergency;
 mod model;
 mod number;
 mod objects;
+mod record;
 mod sdo_server;
+mod tpdo;
 
 pub use abort::Abort;
 pub use model::{Direction, Overload};
+pub use record::{HEADER, Recorder};
