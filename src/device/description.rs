@@ -28,6 +28,9 @@ pub struct Description {
     /// How its SDO server behaves.
     #[serde(default)]
     pub sdo: SdoStyle,
+    /// How its PDOs are configured.
+    #[serde(default)]
+    pub pdo: PdoStyle,
     /// Deviations from the standard that code has to know about.
     #[serde(default)]
     pub quirks: Vec<super::quirk::Quirk>,
@@ -100,6 +103,26 @@ pub enum SizeIndication {
     Omitted,
 }
 
+/// How PDOs are configured.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PdoStyle {
+    /// What has to be done before the mapping can be changed.
+    #[serde(default)]
+    pub remap: Remap,
+}
+
+/// What has to be done before a mapping can be changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Remap {
+    /// CiA 301: bit 31 of the COB-ID set, then the number of entries 0.
+    #[default]
+    Invalidate,
+    /// The number of entries 0, in PRE-OPERATIONAL; meanwhile the PDO has no bytes. Bit 31 is not needed.
+    CountOnly,
+}
+
 /// One measured quantity.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -155,11 +178,17 @@ pub struct ObjectEntry {
     pub values: BTreeMap<String, String>,
     /// The signature that must be written: `save`, `load`, `zero`, `set`.
     pub signature: Option<String>,
+    /// Objects that must all be 0 before this one can be written with anything else: heartbeat and node
+    /// guarding exclude each other on some devices.
+    #[serde(default)]
+    pub only_if_zero: Vec<ObjectId>,
     /// Whether a TPDO may carry it.
     #[serde(default)]
     pub pdo: bool,
     /// Unit of the number, where it is fixed: `ms`, `100us`.
     pub unit: Option<String>,
+    /// The channel whose physical unit (6131h) its number is in, for objects of which CiA 404 does not say so.
+    pub follows_unit: Option<u8>,
     /// Which store group keeps it: `comm`, `app`, `all`; absent when 1010h does not.
     pub stored: Option<String>,
     /// What it is and does, in one or two sentences.
@@ -174,6 +203,29 @@ pub struct ObjectEntry {
 }
 
 impl ObjectEntry {
+    /// The object that the entry stands for, or every one of a run of sub-indices.
+    ///
+    /// # Errors
+    /// An address that is none, in words.
+    pub fn objects(&self) -> Result<impl Iterator<Item = ObjectId>, String> {
+        let run = self.at.split_once(':').and_then(|(_, subs)| subs.split_once('-'));
+        let (first, last) = match run {
+            Some((_, last)) => {
+                let start = self.at.rsplit_once('-').map_or("", |(start, _)| start);
+                let last: u8 = last.parse().map_err(|_| format!("\"{}\" is not an object or a run", self.at))?;
+                (start, Some(last))
+            }
+            None => (self.at.as_str(), None),
+        };
+        let first: ObjectId = first.parse().map_err(|error| format!("{error}"))?;
+        Ok((first.sub..=last.unwrap_or(first.sub)).map(move |sub| first.with_sub(sub)))
+    }
+
+    /// Whether the entry stands for a run of sub-indices, be it of one.
+    pub fn is_run(&self) -> bool {
+        self.at.split_once(':').is_some_and(|(_, subs)| subs.contains('-'))
+    }
+
     /// Whether `number` lies within the limits and, where values are listed, is one of them.
     pub fn allows(&self, number: f64) -> bool {
         let limit = |scalar: &Option<Scalar>| match scalar {
@@ -259,6 +311,13 @@ pub struct SimEntry {
     /// 1018h:4 of the first device; the next ones count up.
     #[serde(default)]
     pub serial: u32,
+    /// How often a new value is there, in microseconds; 1 ms if the manual does not say.
+    pub sample_us: Option<u32>,
+    /// How far beyond the measuring range an overload begins, in percent of the range.
+    #[serde(default)]
+    pub overload_percent: f64,
+    /// The emergency of an overload, if it raises one.
+    pub overload_emcy: Option<u16>,
     /// The measured quantities, one per signal.
     #[serde(default, rename = "channel")]
     pub channels: Vec<SimChannel>,
@@ -284,6 +343,8 @@ pub struct SimChannel {
     pub start: f64,
     /// End of the measuring range.
     pub end: f64,
+    /// The field value (x100h) at the start and at the end of the range; CiA 404's 0 and 10000 else.
+    pub field: Option<[f64; 2]>,
 }
 
 fn from_text<'de, D, T>(deserializer: D) -> Result<T, D::Error>

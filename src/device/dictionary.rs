@@ -116,20 +116,11 @@ impl Dictionary {
     /// # Errors
     /// An address that is none, in words.
     pub fn insert_described(&mut self, described: &ObjectEntry) -> Result<(), String> {
-        let (first, last) = match described.at.split_once(':').and_then(|(_, subs)| subs.split_once('-')) {
-            Some((_, last)) => {
-                let start = described.at.rsplit_once('-').map_or("", |(start, _)| start);
-                let last: u8 = last.parse().map_err(|_| format!("\"{}\" is not an object or a run", described.at))?;
-                (start, Some(last))
-            }
-            None => (described.at.as_str(), None),
-        };
-        let first: ObjectId = first.parse().map_err(|error| format!("{error}"))?;
-        for sub in first.sub..=last.unwrap_or(first.sub) {
+        for object in described.objects()? {
             self.insert(Entry {
-                object: first.with_sub(sub),
+                object,
                 name: described.name.clone(),
-                numbered: last.is_some(),
+                numbered: described.is_run(),
                 data_type: described.data_type,
                 access: described.access,
                 default: described.default.clone(),

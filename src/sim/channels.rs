@@ -1,0 +1,467 @@
+//! The measuring channels of a simulated device: the quantity behind each, and the objects that show it
+//! (CiA 404: x100h, x130h, 6150h and what belongs to them).
+
+use super::model::{Direction, Overload, Quantity};
+use super::number;
+use super::objects::Objects;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
+use crate::device::catalog::Model;
+use crate::device::description::{SignalEntry, SimChannel};
+use crate::device::unit::Unit;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// The first digit of an index: REAL32, INTEGER16, INTEGER24, INTEGER32.
+const FAMILIES: [u16; 4] = [0x6000, 0x7000, 0x8000, 0x9000];
+
+/// What an object shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shows {
+    Value,
+    Field,
+    Status,
+    Lowest,
+    Highest,
+}
+
+/// How a number that is kept in the unit of its channel changes with the unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// A point on the scale: limits and ends of the range.
+    Point,
+    /// A distance on the scale: offsets, deltas, hysteresis.
+    Distance,
+}
+
+/// What CiA 404 keeps in the unit of 6131h beside the value itself.
+const IN_PV_UNIT: [(u16, Kind); 7] = [
+    (0x124, Kind::Distance),
+    (0x133, Kind::Distance),
+    (0x134, Kind::Point),
+    (0x135, Kind::Point),
+    (0x136, Kind::Distance),
+    (0x148, Kind::Point),
+    (0x149, Kind::Point),
+];
+
+/// All channels of one device.
+#[derive(Clone, Debug)]
+pub(super) struct Channels {
+    list: Vec<Channel>,
+    shown: BTreeMap<ObjectId, (usize, Shows)>,
+}
+
+#[derive(Clone, Debug)]
+struct Channel {
+    signal: SignalEntry,
+    quantity: Quantity,
+    /// The lowest and highest value that was looked at.
+    seen: Option<(f64, f64)>,
+    /// Other objects in its unit.
+    follows: Vec<(ObjectId, Kind)>,
+}
+
+/// One measured value as it went out.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Reading {
+    pub(super) signal: String,
+    pub(super) unit: Unit,
+    /// Digits behind the point of an integer, none of a real number.
+    pub(super) digits: Option<u32>,
+    pub(super) overload: Option<Direction>,
+    /// Whether an overload shows in the value itself.
+    pub(super) marker: bool,
+}
+
+impl Channels {
+    pub(super) fn new(
+        model: &Model,
+        objects: &Objects,
+        channels: &[SimChannel],
+        overloads: &[(u8, Overload)],
+        seed: u64,
+        serial: u32,
+    ) -> Channels {
+        let sim = &model.description.sim;
+        let sample = Duration::from_micros(u64::from(sim.sample_us.unwrap_or(1000)));
+        let list = model.description.signals.iter().filter_map(|signal| {
+            let channel = channels.iter().find(|channel| channel.channel == signal.channel)?.clone();
+            let mine = overloads.iter().filter(|(number, _)| *number == signal.channel);
+            let mine = mine.map(|(_, overload)| *overload).collect();
+            let quantity = Quantity::new(channel, sample, sim.overload_percent, mine, seed, serial);
+            Some(Channel::new(signal, quantity, model, objects))
+        });
+        let list: Vec<Channel> = list.collect();
+        let mut shown = BTreeMap::new();
+        for (index, channel) in list.iter().enumerate() {
+            channel.shown(objects).into_iter().for_each(|(object, shows)| {
+                shown.insert(object, (index, shows));
+            });
+        }
+        Channels { list, shown }
+    }
+
+    /// The bytes of an object that shows a measurement at `time`; `None` of every other object.
+    pub(super) fn read(&mut self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Vec<u8>> {
+        let (index, shows) = *self.shown.get(&object)?;
+        let data_type = objects.spec(object)?.data_type;
+        let channel = self.list.get_mut(index)?;
+        Some(channel.read(objects, shows, data_type, time))
+    }
+
+    /// What a mapped object means, if it is a measured value.
+    pub(super) fn reading(&self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Reading> {
+        let (index, Shows::Value) = *self.shown.get(&object)? else { return None };
+        let channel = self.list.get(index)?;
+        let integer = matches!(objects.spec(object)?.data_type, DataType::Integer(_) | DataType::Unsigned(_));
+        Some(Reading {
+            signal: channel.signal.name.clone(),
+            unit: channel.unit(objects),
+            digits: integer.then(|| channel.digits(objects)),
+            overload: channel.quantity.overload(time),
+            marker: channel.signal.marker,
+        })
+    }
+
+    /// The measured value at `time` in the numbers of the object (an integer counts its digits), without
+    /// marker and rounding.
+    pub(super) fn number(&self, objects: &Objects, object: ObjectId, time: Duration) -> Option<f64> {
+        let (channel, data_type) = self.value_of(objects, object)?;
+        Some(channel.scaled(objects, data_type, channel.value(objects, channel.quantity.at(time))))
+    }
+
+    /// The lowest and highest number that [`Channels::number`] can come to.
+    pub(super) fn reach(&self, objects: &Objects, object: ObjectId) -> Option<(f64, f64)> {
+        let (channel, data_type) = self.value_of(objects, object)?;
+        let (low, high) = channel.quantity.reach();
+        let [a, b] = [low, high].map(|raw| channel.scaled(objects, data_type, channel.value(objects, raw)));
+        Some((a.min(b), a.max(b)))
+    }
+
+    /// When the next value of an object is there.
+    pub(super) fn next_sample(&self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Duration> {
+        let (channel, _) = self.value_of(objects, object)?;
+        Some(channel.quantity.next_sample(time))
+    }
+
+    fn value_of(&self, objects: &Objects, object: ObjectId) -> Option<(&Channel, DataType)> {
+        let (index, Shows::Value) = *self.shown.get(&object)? else { return None };
+        Some((self.list.get(index)?, objects.spec(object)?.data_type))
+    }
+
+    /// Every channel with the side on which it is overloaded at `time`.
+    pub(super) fn overloads(&self, time: Duration) -> impl Iterator<Item = (u8, Option<Direction>)> {
+        self.list.iter().map(move |channel| (channel.signal.channel, channel.quantity.overload(time)))
+    }
+
+    /// When [`Channels::overloads`] may change next.
+    pub(super) fn next_overload_change(&self, time: Duration) -> Option<Duration> {
+        self.list.iter().filter_map(|channel| channel.quantity.next_change(time)).min()
+    }
+
+    /// The present value becomes zero: the offset takes it up. `false` if the channel has none.
+    pub(super) fn autozero(&self, objects: &mut Objects, number: u8, time: Duration) -> bool {
+        let Some(channel) = self.by_number(number) else { return false };
+        let Some(object) = channel.offset_object(objects) else { return false };
+        let offset = channel.pv(objects, object).unwrap_or(0.0);
+        channel.put_pv(objects, object, offset - channel.value(objects, channel.quantity.at(time)));
+        true
+    }
+
+    /// Minimum and maximum begin anew.
+    pub(super) fn forget_extremes(&mut self, number: u8) {
+        self.list.iter_mut().filter(|channel| channel.signal.channel == number).for_each(|channel| channel.seen = None);
+    }
+
+    /// Whether an object holds the unit of a channel.
+    pub(super) fn is_unit(&self, object: ObjectId) -> bool {
+        self.list.iter().any(|channel| channel.signal.unit == Some(object))
+    }
+
+    /// A channel gets another unit, and what is kept in it changes along. `false` if the value cannot be
+    /// converted.
+    pub(super) fn change_unit(&self, objects: &mut Objects, object: ObjectId, to: Unit) -> bool {
+        let Some(channel) = self.list.iter().find(|channel| channel.signal.unit == Some(object)) else { return false };
+        let from = channel.unit(objects);
+        let (Some(_), Some(zero)) = (Unit(channel.quantity.channel().unit).convert(0.0, to), from.convert(0.0, to))
+        else {
+            return false;
+        };
+        for (kept, kind) in &channel.follows {
+            let Some(old) = channel.pv(objects, *kept) else { continue };
+            let Some(point) = from.convert(old, to) else { continue };
+            channel.put_pv(objects, *kept, if *kind == Kind::Point { point } else { point - zero });
+        }
+        objects.put(object, to.0.to_le_bytes().to_vec());
+        true
+    }
+
+    fn by_number(&self, number: u8) -> Option<&Channel> {
+        self.list.iter().find(|channel| channel.signal.channel == number)
+    }
+}
+
+impl Channel {
+    fn new(signal: &SignalEntry, quantity: Quantity, model: &Model, objects: &Objects) -> Channel {
+        let sub = signal.channel;
+        let in_family =
+            |(low, kind): (u16, Kind)| FAMILIES.iter().map(move |family| (ObjectId::new(family | low, sub), kind));
+        let offset = (ObjectId::new(0x6127, sub), Kind::Distance);
+        let described = model.description.objects.iter().filter(|entry| entry.follows_unit == Some(sub));
+        let described = described.flat_map(|entry| entry.objects().into_iter().flatten());
+        let follows = IN_PV_UNIT
+            .into_iter()
+            .flat_map(in_family)
+            .chain([offset])
+            .chain(described.map(|object| (object, Kind::Distance)))
+            .filter(|(object, _)| objects.has(*object))
+            .collect();
+        Channel { signal: signal.clone(), quantity, seen: None, follows }
+    }
+
+    /// The objects that show this channel.
+    fn shown(&self, objects: &Objects) -> Vec<(ObjectId, Shows)> {
+        let sub = self.signal.channel;
+        let mut shown: Vec<(ObjectId, Shows)> = Vec::new();
+        for family in FAMILIES {
+            shown.push((ObjectId::new(family | 0x130, sub), Shows::Value));
+            shown.push((ObjectId::new(family | 0x100, sub), Shows::Field));
+        }
+        shown.push((self.signal.value, Shows::Value));
+        shown.extend(self.signal.also.iter().map(|object| (*object, Shows::Value)));
+        shown.extend(self.signal.status.map(|object| (object, Shows::Status)));
+        // The two are the manufacturer's own and have names instead of fixed indices.
+        shown.extend(objects.specs().filter(|(object, _)| object.sub == sub).filter_map(|(object, spec)| {
+            match spec.name.as_str() {
+                "minimum-pv" => Some((object, Shows::Lowest)),
+                "maximum-pv" => Some((object, Shows::Highest)),
+                _ => None,
+            }
+        }));
+        shown.retain(|(object, _)| objects.has(*object));
+        shown
+    }
+
+    fn read(&mut self, objects: &Objects, shows: Shows, data_type: DataType, time: Duration) -> Vec<u8> {
+        let raw = self.quantity.at(time);
+        let (low, high) = self.seen.unwrap_or((raw, raw));
+        let (low, high) = (low.min(raw), high.max(raw));
+        self.seen = Some((low, high));
+        let overload = self.quantity.overload(time);
+        match shows {
+            Shows::Value if overload.is_some() && self.signal.marker => marker(data_type),
+            Shows::Value => self.encode(objects, data_type, raw),
+            Shows::Lowest => self.encode(objects, data_type, low),
+            Shows::Highest => self.encode(objects, data_type, high),
+            Shows::Status => number::to_bytes(f64::from(status(overload)), data_type),
+            Shows::Field => {
+                let channel = self.quantity.channel();
+                let [start, end] = channel.field.unwrap_or([0.0, 10_000.0]);
+                let part = (raw - channel.start) / (channel.end - channel.start);
+                number::to_bytes(start + part * (end - start), data_type)
+            }
+        }
+    }
+
+    /// A measured quantity as a value in the current unit, with factor and offset.
+    fn value(&self, objects: &Objects, raw: f64) -> f64 {
+        let converted = Unit(self.quantity.channel().unit).convert(raw, self.unit(objects)).unwrap_or(raw);
+        let factor = objects.real(ObjectId::new(0x6126, self.signal.channel)).unwrap_or(1.0);
+        let offset = self.offset_object(objects).and_then(|object| self.pv(objects, object)).unwrap_or(0.0);
+        converted * factor + offset
+    }
+
+    /// Where the offset stands: 6127h beside the factor, else x124h.
+    fn offset_object(&self, objects: &Objects) -> Option<ObjectId> {
+        let sub = self.signal.channel;
+        let candidates = [0x6127, 0x6124, 0x7124, 0x8124, 0x9124];
+        candidates.into_iter().map(|index| ObjectId::new(index, sub)).find(|object| objects.has(*object))
+    }
+
+    fn encode(&self, objects: &Objects, data_type: DataType, raw: f64) -> Vec<u8> {
+        number::to_bytes(self.scaled(objects, data_type, self.value(objects, raw)), data_type)
+    }
+
+    /// A value in the numbers of a type: integers count their digits.
+    fn scaled(&self, objects: &Objects, data_type: DataType, value: f64) -> f64 {
+        match data_type {
+            DataType::Real32 | DataType::Real64 => value,
+            _ => value * self.power(objects),
+        }
+    }
+
+    fn digits(&self, objects: &Objects) -> u32 {
+        self.signal.digits.map_or(0, |object| objects.number(object)).min(9)
+    }
+
+    fn power(&self, objects: &Objects) -> f64 {
+        (0..self.digits(objects)).fold(1.0, |power, _| power * 10.0)
+    }
+
+    fn unit(&self, objects: &Objects) -> Unit {
+        let told = self.signal.unit.filter(|object| objects.has(*object));
+        Unit(told.map_or(self.quantity.channel().unit, |object| objects.number(object)))
+    }
+
+    /// The value of an object that is kept in the unit of the channel.
+    fn pv(&self, objects: &Objects, object: ObjectId) -> Option<f64> {
+        let number = objects.real(object)?;
+        Some(match objects.spec(object)?.data_type {
+            DataType::Real32 | DataType::Real64 => number,
+            _ => number / self.power(objects),
+        })
+    }
+
+    fn put_pv(&self, objects: &mut Objects, object: ObjectId, value: f64) {
+        if let Some(data_type) = objects.spec(object).map(|spec| spec.data_type) {
+            let bytes = number::to_bytes(self.scaled(objects, data_type, value), data_type);
+            objects.put(object, bytes);
+        }
+    }
+}
+
+/// 6150h: bit 0 not valid, bit 1 positive, bit 2 negative overload.
+pub(super) fn status(overload: Option<Direction>) -> u8 {
+    match overload {
+        None => 0b000,
+        Some(Direction::High) => 0b011,
+        Some(Direction::Low) => 0b101,
+    }
+}
+
+/// What stands in the place of a value that is not valid (MH-4, 4.2.15): not a number, the smallest integer.
+fn marker(data_type: DataType) -> Vec<u8> {
+    match data_type {
+        DataType::Integer(_) => number::to_bytes(f64::NEG_INFINITY, data_type),
+        _ => number::to_bytes(f64::NAN, data_type),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::canopen::id::NodeId;
+    use crate::device::catalog;
+
+    fn id(text: &str) -> ObjectId {
+        text.parse().expect("an object")
+    }
+
+    const AT: Duration = Duration::from_millis(500);
+
+    /// A device whose every channel stands still at `base`, given in its own unit.
+    fn still(name: &str, base: f64, overloads: &[(u8, Overload)]) -> (Objects, Channels) {
+        let model = catalog::by_name(name).expect("built in");
+        let objects = Objects::new(&model, NodeId::new(5).expect("a node-ID"));
+        let still = |channel: &SimChannel| SimChannel { base, amplitude: 0.0, noise: 0.0, ..channel.clone() };
+        let channels: Vec<SimChannel> = model.description.sim.channels.iter().map(still).collect();
+        let channels = Channels::new(&model, &objects, &channels, overloads, 1, 1);
+        (objects, channels)
+    }
+
+    fn real(bytes: &[u8]) -> f32 {
+        f32::from_le_bytes(bytes.try_into().expect("four bytes"))
+    }
+
+    #[test]
+    fn one_quantity_in_every_family() {
+        let (objects, mut channels) = still("mh4", 5.25, &[]);
+        assert_eq!(real(&channels.read(&objects, id("6130:1"), AT).expect("shown")), 5.25);
+        assert_eq!(channels.read(&objects, id("7130:1"), AT), Some(5250i16.to_le_bytes().to_vec()));
+        assert_eq!(channels.read(&objects, id("9130:1"), AT), Some(5250i32.to_le_bytes().to_vec()));
+        // 0 to 10 bar are 0 to 10000.
+        assert_eq!(channels.read(&objects, id("7100:1"), AT), Some(5250i16.to_le_bytes().to_vec()));
+        assert_eq!(channels.read(&objects, id("6150:1"), AT), Some(vec![0]));
+        assert_eq!(channels.read(&objects, id("1000"), AT), None);
+        assert_eq!(channels.read(&objects, id("6130:0"), AT), None);
+    }
+
+    #[test]
+    fn field_values_of_the_mc1609_manual() {
+        // FV 40000 is 798.5 degC.
+        let (objects, mut channels) = still("mc1609", 798.5, &[]);
+        assert_eq!(channels.read(&objects, id("7130:2"), AT), Some(7985i16.to_le_bytes().to_vec()));
+        let field = channels.read(&objects, id("7100:2"), AT).expect("shown");
+        assert_eq!(u16::from_le_bytes(field.try_into().expect("two bytes")), 40002, "40000 is 798.45");
+    }
+
+    #[test]
+    fn the_dps_manual_changes_psi_to_bar() {
+        // Table 19: 50.000 psi, then 3.448 bar (3.447 by exact conversion).
+        let (mut objects, mut channels) = still("dps", 50.0, &[]);
+        assert_eq!(channels.read(&objects, id("6130:1"), AT), Some(vec![0x50, 0xc3, 0, 0]));
+        assert!(channels.change_unit(&mut objects, id("6131:1"), Unit(0x4e_0000)));
+        assert_eq!(channels.read(&objects, id("6130:1"), AT), Some(3447i32.to_le_bytes().to_vec()));
+        // Table 18: the span goes along; 100 psi are 6.895 bar.
+        assert_eq!(objects.real(id("6149:1")), Some(6895.0));
+        assert_eq!(objects.real(id("2006")), Some(6895.0));
+        // To a temperature it cannot change, and nothing is changed then.
+        assert!(!channels.change_unit(&mut objects, id("6131:1"), Unit(0x2d_0000)));
+        assert_eq!(objects.number(id("6131:1")), 0x4e_0000);
+    }
+
+    #[test]
+    fn points_and_distances_convert_each_in_their_way() {
+        let (mut objects, mut channels) = still("mh4", 25.0, &[]);
+        objects.put(id("6133:2"), 10f32.to_le_bytes().to_vec());
+        assert!(channels.change_unit(&mut objects, id("6131:2"), Unit(0xac_0000)));
+        assert_eq!(objects.real(id("6133:2")), Some(18.0), "a difference of 10 K is one of 18 degF");
+        assert_eq!(objects.real(id("6149:2")), Some(257.0), "125 degC are 257 degF");
+        assert_eq!(real(&channels.read(&objects, id("6130:2"), AT).expect("shown")), 77.0);
+        assert_eq!(objects.real(id("6149:1")), Some(10.0), "the other channel keeps its unit");
+    }
+
+    #[test]
+    fn autozero_takes_the_value_into_the_offset() {
+        let (mut objects, mut channels) = still("mh4", 0.25, &[]);
+        assert!(channels.autozero(&mut objects, 1, AT));
+        assert_eq!(objects.real(id("6127:1")), Some(-0.25));
+        assert_eq!(real(&channels.read(&objects, id("6130:1"), AT).expect("shown")), 0.0);
+        // Again at zero changes nothing.
+        assert!(channels.autozero(&mut objects, 1, AT));
+        assert_eq!(objects.real(id("6127:1")), Some(-0.25));
+        let (mut objects, mut channels) = still("dps", 0.5, &[]);
+        assert!(channels.autozero(&mut objects, 1, AT));
+        assert_eq!(channels.read(&objects, id("6130:1"), AT), Some(vec![0; 4]));
+        assert!(!channels.autozero(&mut objects, 2, AT), "no such channel");
+    }
+
+    #[test]
+    fn an_overload_shows_as_the_manual_says() {
+        let overload = |direction| [(1, Overload { from: Duration::ZERO, until: Duration::MAX, direction })];
+        for (direction, bits) in [(Direction::High, 0x03), (Direction::Low, 0x05)] {
+            let (objects, mut channels) = still("mh4", 5.0, &overload(direction));
+            assert!(real(&channels.read(&objects, id("6130:1"), AT).expect("shown")).is_nan());
+            assert_eq!(channels.read(&objects, id("7130:1"), AT), Some(vec![0, 0x80]));
+            assert_eq!(channels.read(&objects, id("9130:1"), AT), Some(vec![0, 0, 0, 0x80]));
+            assert_eq!(channels.read(&objects, id("6150:1"), AT), Some(vec![bits]));
+            assert_eq!(channels.read(&objects, id("6150:2"), AT), Some(vec![0]), "the other channel is well");
+        }
+        // Without a marker the value itself is beyond the range of 100 psi.
+        let (objects, mut channels) = still("dps", 5.0, &overload(Direction::High));
+        assert_eq!(channels.read(&objects, id("6130:1"), AT), Some(105_000i32.to_le_bytes().to_vec()));
+    }
+
+    #[test]
+    fn extremes_are_those_of_what_was_looked_at() {
+        let model = catalog::by_name("mh4").expect("built in");
+        let objects = Objects::new(&model, NodeId::new(5).expect("a node-ID"));
+        let mut channels = Channels::new(&model, &objects, &model.description.sim.channels, &[], 1, 1);
+        let mut values = Vec::new();
+        for millisecond in 0..200 {
+            let at = Duration::from_millis(millisecond * 100);
+            values.push(real(&channels.read(&objects, id("6130:1"), at).expect("shown")));
+        }
+        let last = Duration::from_millis(19_900);
+        let lowest = values.iter().copied().fold(f32::INFINITY, f32::min);
+        let highest = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        assert!(lowest < highest);
+        assert_eq!(real(&channels.read(&objects, id("2020:1"), last).expect("shown")), lowest);
+        assert_eq!(real(&channels.read(&objects, id("2021:1"), last).expect("shown")), highest);
+        channels.forget_extremes(1);
+        let now = values.last().copied().expect("values");
+        assert_eq!(real(&channels.read(&objects, id("2020:1"), last).expect("shown")), now);
+        assert_eq!(real(&channels.read(&objects, id("2021:1"), last).expect("shown")), now);
+    }
+}

@@ -1,0 +1,251 @@
+//! Emergencies of a simulated device: what is pending, the error register, the history, and the frames.
+
+use super::objects::Objects;
+use crate::bus::time::Mono;
+use crate::canopen::frame::Frame;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::object::ObjectId;
+use crate::device::description::EmergencyEntry;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+const ERROR_REGISTER: ObjectId = ObjectId::new(0x1001, 0);
+const HISTORY: ObjectId = ObjectId::new(0x1003, 0);
+const EMCY_COB_ID: ObjectId = ObjectId::new(0x1014, 0);
+const INHIBIT_TIME: ObjectId = ObjectId::new(0x1015, 0);
+
+/// The emergencies of one device.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Emergencies {
+    described: Vec<EmergencyEntry>,
+    /// Codes that are pending, and on which channels; channel 0 stands for the device.
+    pending: BTreeMap<u16, BTreeSet<u8>>,
+    history: VecDeque<u32>,
+    waiting: VecDeque<[u8; 8]>,
+    /// Before this moment the inhibit time forbids the next frame.
+    free: Mono,
+}
+
+impl Emergencies {
+    pub(super) fn new(described: &[EmergencyEntry]) -> Emergencies {
+        Emergencies { described: described.to_vec(), ..Emergencies::default() }
+    }
+
+    /// Whether the device knows this emergency.
+    pub(super) fn knows(&self, code: u16) -> bool {
+        self.described.iter().any(|entry| entry.code == code)
+    }
+
+    /// An error appears on a channel. One message an error event: none while the same code is pending.
+    pub(super) fn raise(&mut self, objects: &mut Objects, code: u16, channel: u8, status: u8) {
+        let known = self.pending.contains_key(&code);
+        self.pending.entry(code).or_default().insert(channel);
+        if known {
+            return;
+        }
+        let described = self.described.iter().find(|entry| entry.code == code);
+        let mut extra = [0; 5];
+        for (byte, meaning) in extra.iter_mut().zip(described.map_or(&[][..], |entry| &entry.bytes)) {
+            *byte = meaning_of(meaning, channel, status);
+        }
+        let entries = self.capacity(objects);
+        if entries > 0 {
+            // MH-4, 4.1.3: byte 4 of the message in bits 16 to 23, byte 3 in bits 24 to 31.
+            let [low, high] = code.to_le_bytes();
+            self.history.push_front(u32::from_le_bytes([low, high, extra[1], extra[0]]));
+            self.history.truncate(entries);
+        }
+        self.publish(objects);
+        self.queue(objects, code, extra);
+    }
+
+    /// An error has gone.
+    pub(super) fn clear(&mut self, objects: &mut Objects, code: u16, channel: u8) {
+        let Some(channels) = self.pending.get_mut(&code) else { return };
+        channels.remove(&channel);
+        if channels.is_empty() {
+            self.pending.remove(&code);
+            self.publish(objects);
+            self.queue(objects, 0x0000, [0; 5]);
+        }
+    }
+
+    /// The history is deleted; what is pending stays pending.
+    pub(super) fn clear_history(&mut self, objects: &mut Objects) {
+        self.history.clear();
+        self.publish(objects);
+    }
+
+    /// As after power-on.
+    pub(super) fn forget(&mut self) {
+        self.pending.clear();
+        self.history.clear();
+        self.waiting.clear();
+    }
+
+    /// Nothing that waits is sent any more, as in STOPPED.
+    pub(super) fn drop_waiting(&mut self) {
+        self.waiting.clear();
+    }
+
+    /// Puts register and history into the objects that show them.
+    pub(super) fn publish(&self, objects: &mut Objects) {
+        objects.put(ERROR_REGISTER, vec![self.register()]);
+        let count = u8::try_from(self.history.len()).unwrap_or(u8::MAX);
+        objects.put(HISTORY, vec![count]);
+        for sub in 1..=u8::try_from(self.capacity(objects)).unwrap_or(u8::MAX) {
+            let error = self.history.get(usize::from(sub) - 1).copied().unwrap_or(0);
+            objects.put(HISTORY.with_sub(sub), error.to_le_bytes().to_vec());
+        }
+    }
+
+    /// 1001h: bit 0 with every error.
+    fn register(&self) -> u8 {
+        self.pending.keys().fold(0, |register, code| {
+            let described = self.described.iter().find(|entry| entry.code == *code);
+            let own = described.map_or(0, |entry| {
+                entry.register.unwrap_or(0)
+                    | entry.register_bit.map_or(0, |bit| 1u8.checked_shl(bit.into()).unwrap_or(0))
+            });
+            register | own | 1
+        })
+    }
+
+    /// How many errors 1003h keeps.
+    fn capacity(&self, objects: &Objects) -> usize {
+        (1..=254).take_while(|sub| objects.has(HISTORY.with_sub(*sub))).count()
+    }
+
+    fn queue(&mut self, objects: &Objects, code: u16, extra: [u8; 5]) {
+        let [low, high] = code.to_le_bytes();
+        let register = objects.bytes(ERROR_REGISTER).and_then(|bytes| bytes.first().copied()).unwrap_or(0);
+        let [a, b, c, d, e] = extra;
+        self.waiting.push_back([low, high, register, a, b, c, d, e]);
+    }
+
+    /// The next message, if one waits and the inhibit time allows it.
+    pub(super) fn next_frame(&mut self, objects: &Objects, node: NodeId, now: Mono) -> Option<Frame> {
+        if now < self.free {
+            return None;
+        }
+        let message = self.waiting.pop_front()?;
+        self.free = now + Duration::from_micros(100) * objects.number(INHIBIT_TIME);
+        Some(Frame::full(cob_id(objects, node)?, message))
+    }
+
+    /// When [`Emergencies::next_frame`] has something.
+    pub(super) fn next_wake(&self) -> Option<Mono> {
+        self.waiting.front().map(|_| self.free)
+    }
+}
+
+/// The identifier of emergencies: 1014h, unless its bit 31 switches them off.
+fn cob_id(objects: &Objects, node: NodeId) -> Option<CanId> {
+    if !objects.has(EMCY_COB_ID) {
+        return Some(CanId::emergency(node));
+    }
+    let cob_id = objects.number(EMCY_COB_ID);
+    let id = u16::try_from(cob_id & 0x7ff).ok()?;
+    if cob_id & 0x8000_0000 == 0 { CanId::standard(id) } else { None }
+}
+
+/// What a byte of the message holds: "1 (channel)", "AI status 6150h", "0".
+fn meaning_of(meaning: &str, channel: u8, status: u8) -> u8 {
+    let meaning = meaning.to_ascii_lowercase();
+    if meaning.contains("channel") {
+        channel
+    } else if meaning.contains("status") {
+        status
+    } else {
+        meaning.trim().parse().unwrap_or(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::catalog;
+
+    fn node() -> NodeId {
+        NodeId::new(5).expect("a node-ID")
+    }
+
+    fn mh4() -> (Objects, Emergencies) {
+        let model = catalog::by_name("mh4").expect("built in");
+        (Objects::new(&model, node()), Emergencies::new(&model.description.emergencies))
+    }
+
+    fn frames(objects: &Objects, emergencies: &mut Emergencies) -> Vec<String> {
+        std::iter::from_fn(|| emergencies.next_frame(objects, node(), Mono::START))
+            .map(|frame| frame.to_string())
+            .collect()
+    }
+
+    #[test]
+    fn one_message_an_event_and_one_when_it_is_over() {
+        let (mut objects, mut emergencies) = mh4();
+        emergencies.raise(&mut objects, 0xf001, 1, 0x03);
+        assert_eq!(frames(&objects, &mut emergencies), ["085#01F0810103000000"]);
+        assert_eq!(objects.number(ERROR_REGISTER), 0x81);
+        assert_eq!(objects.number(HISTORY), 1);
+        // Byte 4 in bits 16 to 23, byte 3 in bits 24 to 31.
+        assert_eq!(objects.number(HISTORY.with_sub(1)), 0x0103_f001);
+        // The same code on another channel while it is pending: nothing.
+        emergencies.raise(&mut objects, 0xf001, 2, 0x05);
+        emergencies.clear(&mut objects, 0xf001, 1);
+        assert_eq!(frames(&objects, &mut emergencies), Vec::<String>::new());
+        emergencies.clear(&mut objects, 0xf001, 2);
+        assert_eq!(frames(&objects, &mut emergencies), ["085#0000000000000000"]);
+        assert_eq!(objects.number(ERROR_REGISTER), 0);
+        assert_eq!(objects.number(HISTORY), 1, "the history stays");
+        emergencies.clear(&mut objects, 0xf001, 2);
+        assert_eq!(frames(&objects, &mut emergencies), Vec::<String>::new());
+        emergencies.clear_history(&mut objects);
+        assert_eq!((objects.number(HISTORY), objects.number(HISTORY.with_sub(1))), (0, 0));
+    }
+
+    #[test]
+    fn what_is_still_pending_stays_in_the_register() {
+        let (mut objects, mut emergencies) = mh4();
+        emergencies.raise(&mut objects, 0xf001, 1, 0x03);
+        emergencies.raise(&mut objects, 0x8240, 0, 0);
+        emergencies.clear(&mut objects, 0xf001, 1);
+        assert_eq!(
+            frames(&objects, &mut emergencies),
+            ["085#01F0810103000000", "085#4082910000000000", "085#0000110000000000"]
+        );
+    }
+
+    #[test]
+    fn the_history_keeps_the_newest() {
+        let (mut objects, mut emergencies) = mh4();
+        for code in [0x1000, 0x4200, 0x5030, 0x8110, 0x8120] {
+            emergencies.raise(&mut objects, code, 0, 0);
+        }
+        assert_eq!(objects.number(HISTORY), 4);
+        let codes: Vec<u32> = (1..=4).map(|sub| objects.number(HISTORY.with_sub(sub)) & 0xffff).collect();
+        assert_eq!(codes, [0x8120, 0x8110, 0x5030, 0x4200]);
+    }
+
+    #[test]
+    fn the_inhibit_time_holds_messages_back() {
+        let (mut objects, mut emergencies) = mh4();
+        objects.put(INHIBIT_TIME, 50u16.to_le_bytes().to_vec());
+        emergencies.raise(&mut objects, 0xf001, 1, 0x03);
+        emergencies.clear(&mut objects, 0xf001, 1);
+        assert!(emergencies.next_frame(&objects, node(), Mono::START).is_some());
+        assert!(emergencies.next_frame(&objects, node(), Mono::at(Duration::from_micros(4999))).is_none());
+        assert_eq!(emergencies.next_wake(), Some(Mono::at(Duration::from_millis(5))));
+        assert!(emergencies.next_frame(&objects, node(), Mono::at(Duration::from_millis(5))).is_some());
+        assert_eq!(emergencies.next_wake(), None);
+    }
+
+    #[test]
+    fn dps_has_its_own_codes_and_registers() {
+        let model = catalog::by_name("dps").expect("built in");
+        let mut objects = Objects::new(&model, node());
+        let mut emergencies = Emergencies::new(&model.description.emergencies);
+        emergencies.raise(&mut objects, 0x3201, 1, 0x03);
+        assert_eq!(frames(&objects, &mut emergencies), ["085#0132050000000000"]);
+    }
+}

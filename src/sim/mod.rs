@@ -1,0 +1,23 @@
+//! Simulated devices, built from the device descriptions: object dictionary, SDO server, NMT, heartbeat,
+//! TPDOs, emergencies and a measured quantity that moves.
+//!
+//! Written from CiA 301, CiA 404 and the manuals, not with the client's encoders: two halves that share a
+//! mistake would agree with each other. Nothing here asks for a device's name; what differs between
+//! devices stands in their descriptions.
+//!
+//! A device is a [`Station`](crate::bus::memory::Station). It sits on a
+//! [`MemoryBus`](crate::bus::memory::MemoryBus) or, through [`host`], on a real bus.
+
+mod abort;
+mod channels;
+mod emergency;
+mod model;
+mod number;
+mod objects;
+mod record;
+mod sdo_server;
+mod tpdo;
+
+pub use abort::Abort;
+pub use model::{Direction, Overload};
+pub use record::{HEADER, Recorder};

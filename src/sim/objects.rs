@@ -1,0 +1,502 @@
+//! The memory of a simulated device: working values, what is saved beyond a reset, and the rules that hold
+//! for every write.
+
+use super::abort::Abort;
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
+use crate::device::catalog::Model;
+use crate::device::description::{Access, ObjectEntry, Scalar, parse_range};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What the description says of one entry, laid out for the server.
+#[derive(Clone, Debug)]
+pub(super) struct Spec {
+    pub(super) name: String,
+    pub(super) data_type: DataType,
+    pub(super) pdo: bool,
+    pub(super) signature: Option<Signature>,
+    pub(super) only_if_zero: Vec<ObjectId>,
+    access: Access,
+    low: Option<f64>,
+    high: Option<f64>,
+    allow: Vec<(u32, u32)>,
+    default: Option<Scalar>,
+    group: Option<Group>,
+}
+
+/// What must be written to an object that does something instead of holding a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Signature {
+    /// "save": keeps parameters beyond a reset.
+    Save,
+    /// "load": forgets the kept ones.
+    Load,
+    /// "zero": autozero, or forgets minimum and maximum.
+    Zero,
+    /// "set" behind the value: node-ID and bit rate.
+    Set,
+}
+
+impl Signature {
+    fn read(text: &str) -> Option<Signature> {
+        Some(match text {
+            "save" => Signature::Save,
+            "load" => Signature::Load,
+            "zero" => Signature::Zero,
+            "set" => Signature::Set,
+            _ => return None,
+        })
+    }
+
+    /// Whether these bytes carry the signature. "set" leaves the lowest byte to the value.
+    fn fits(self, bytes: &[u8]) -> bool {
+        match self {
+            Signature::Save => bytes == b"save",
+            Signature::Load => bytes == b"load",
+            Signature::Zero => bytes == b"zero",
+            Signature::Set => bytes.get(1..) == Some(b"set"),
+        }
+    }
+}
+
+/// Parameters that are saved and restored together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Group {
+    All,
+    Communication,
+    Application,
+}
+
+impl Group {
+    /// The group of a sub-index of 1010h and 1011h.
+    pub(super) fn of_sub(sub: u8) -> Option<Group> {
+        Some(match sub {
+            1 => Group::All,
+            2 => Group::Communication,
+            3 => Group::Application,
+            _ => return None,
+        })
+    }
+
+    fn read(text: &str) -> Option<Group> {
+        Some(match text {
+            "all" => Group::All,
+            "comm" => Group::Communication,
+            "app" => Group::Application,
+            _ => return None,
+        })
+    }
+
+    /// Whether a command for `self` reaches an entry of group `entry`.
+    fn reaches(self, entry: Group) -> bool {
+        self == Group::All || self == entry
+    }
+}
+
+/// Which part of the dictionary a reset takes back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Area {
+    /// Everything.
+    All,
+    /// 1000h to 1FFFh.
+    Communication,
+}
+
+impl Area {
+    fn holds(self, object: ObjectId) -> bool {
+        self == Area::All || (0x1000..0x2000).contains(&object.index)
+    }
+}
+
+/// The object dictionary of one device.
+#[derive(Clone, Debug)]
+pub(super) struct Objects {
+    specs: Arc<BTreeMap<ObjectId, Spec>>,
+    /// Without `stored` marks in the description everything writable is kept, by area.
+    marked: bool,
+    values: BTreeMap<ObjectId, Vec<u8>>,
+    saved: BTreeMap<ObjectId, Vec<u8>>,
+}
+
+impl Objects {
+    /// As delivered, under `node`.
+    pub(super) fn new(model: &Model, node: NodeId) -> Objects {
+        let mut specs = BTreeMap::new();
+        for entry in &model.description.objects {
+            for object in entry.objects().into_iter().flatten() {
+                specs.insert(object, Spec::new(entry));
+            }
+        }
+        let marked = specs.values().any(|spec| spec.group.is_some());
+        let mut objects = Objects { specs: Arc::new(specs), marked, values: BTreeMap::new(), saved: BTreeMap::new() };
+        objects.reset(Area::All, node);
+        objects
+    }
+
+    pub(super) fn spec(&self, object: ObjectId) -> Option<&Spec> {
+        self.specs.get(&object)
+    }
+
+    /// Every entry of the description.
+    pub(super) fn specs(&self) -> impl Iterator<Item = (ObjectId, &Spec)> {
+        self.specs.iter().map(|(object, spec)| (*object, spec))
+    }
+
+    pub(super) fn has(&self, object: ObjectId) -> bool {
+        self.specs.contains_key(&object)
+    }
+
+    pub(super) fn has_index(&self, index: u16) -> bool {
+        self.specs.range(ObjectId::new(index, 0)..=ObjectId::new(index, 255)).next().is_some()
+    }
+
+    /// The working value.
+    pub(super) fn bytes(&self, object: ObjectId) -> Option<&[u8]> {
+        self.values.get(&object).map(Vec::as_slice)
+    }
+
+    /// The working value as an unsigned number of at most four bytes, 0 where there is none.
+    pub(super) fn number(&self, object: ObjectId) -> u32 {
+        let mut wide = [0; 4];
+        let bytes = self.bytes(object).unwrap_or_default();
+        let len = bytes.len().min(4);
+        wide[..len].copy_from_slice(&bytes[..len]);
+        u32::from_le_bytes(wide)
+    }
+
+    /// The working value as a number of its type.
+    pub(super) fn real(&self, object: ObjectId) -> Option<f64> {
+        self.spec(object)?.data_type.decode(self.bytes(object)?).ok()?.as_f64()
+    }
+
+    /// Puts a working value in place, whatever the access says.
+    pub(super) fn put(&mut self, object: ObjectId, bytes: Vec<u8>) {
+        if self.has(object) {
+            self.values.insert(object, bytes);
+        }
+    }
+
+    /// Keeps a value beyond a reset, as if it had been written and saved.
+    pub(super) fn preset(&mut self, object: ObjectId, bytes: Vec<u8>) {
+        self.saved.insert(object, bytes.clone());
+        self.put(object, bytes);
+    }
+
+    /// Whether the entry exists and can be written.
+    pub(super) fn check_writable(&self, object: ObjectId) -> Result<&Spec, Abort> {
+        let spec = self.find(object)?;
+        if spec.access.is_writable() { Ok(spec) } else { Err(Abort::READ_ONLY) }
+    }
+
+    /// Whether the entry exists and can be read.
+    pub(super) fn check_readable(&self, object: ObjectId) -> Result<&Spec, Abort> {
+        let spec = self.find(object)?;
+        if spec.access.is_readable() { Ok(spec) } else { Err(Abort::WRITE_ONLY) }
+    }
+
+    fn find(&self, object: ObjectId) -> Result<&Spec, Abort> {
+        match self.spec(object) {
+            Some(spec) => Ok(spec),
+            None if self.has_index(object.index) => Err(Abort::NO_SUB_INDEX),
+            None => Err(Abort::NO_OBJECT),
+        }
+    }
+
+    /// Whether `bytes` may be written to the entry: access, length, signature, limits.
+    pub(super) fn check_write(&self, object: ObjectId, bytes: &[u8]) -> Result<&Spec, Abort> {
+        let spec = self.check_writable(object)?;
+        if spec.data_type.width().is_some_and(|width| width != bytes.len()) {
+            return Err(Abort::LENGTH);
+        }
+        if let Some(signature) = spec.signature {
+            return if signature.fits(bytes) { Ok(spec) } else { Err(Abort::NOT_STORED) };
+        }
+        if spec.only_if_zero.iter().any(|&other| self.number(other) != 0) && bytes.iter().any(|&byte| byte != 0) {
+            return Err(Abort::NOT_STORED);
+        }
+        spec.check_limits(bytes)?;
+        Ok(spec)
+    }
+
+    /// Working values become what is saved, else what was delivered.
+    pub(super) fn reset(&mut self, area: Area, node: NodeId) {
+        for (object, spec) in self.specs.iter().filter(|(object, _)| area.holds(**object)) {
+            let value = self.saved.get(object).cloned().unwrap_or_else(|| spec.delivered(node));
+            self.values.insert(*object, value);
+        }
+    }
+
+    /// Saves the working values of a group. What is as delivered is not kept, so that defaults which hold the
+    /// node-ID follow it.
+    pub(super) fn save(&mut self, group: Group, node: NodeId) {
+        let specs = Arc::clone(&self.specs);
+        for (object, spec) in specs.iter() {
+            if !self.is_kept(group, *object, spec) {
+                continue;
+            }
+            match self.values.get(object) {
+                Some(value) if *value != spec.delivered(node) => self.saved.insert(*object, value.clone()),
+                _ => self.saved.remove(object),
+            };
+        }
+    }
+
+    /// Forgets what is saved of a group; the working values change at the next reset.
+    pub(super) fn restore(&mut self, group: Group) {
+        let specs = Arc::clone(&self.specs);
+        for (object, spec) in specs.iter() {
+            // Node-ID and bit rate stay (MH-4, 4.3.8 and 4.3.9).
+            if spec.signature != Some(Signature::Set) && self.is_kept(group, *object, spec) {
+                self.saved.remove(object);
+            }
+        }
+    }
+
+    fn is_kept(&self, group: Group, object: ObjectId, spec: &Spec) -> bool {
+        if self.marked {
+            return spec.group.is_some_and(|entry| group.reaches(entry));
+        }
+        let by_area = if object.index < 0x2000 { Group::Communication } else { Group::Application };
+        let holds_a_value = spec.signature.is_none_or(|signature| signature == Signature::Set);
+        spec.access == Access::Rw && holds_a_value && group.reaches(by_area)
+    }
+}
+
+impl Spec {
+    fn new(entry: &ObjectEntry) -> Spec {
+        let limit = |scalar: &Option<Scalar>| match scalar {
+            Some(Scalar::Integer(number)) => Some(*number as f64),
+            Some(Scalar::Real(number)) => Some(*number),
+            Some(Scalar::Text(_)) | None => None,
+        };
+        Spec {
+            name: entry.name.clone(),
+            data_type: entry.data_type,
+            pdo: entry.pdo,
+            signature: entry.signature.as_deref().and_then(Signature::read),
+            only_if_zero: entry.only_if_zero.clone(),
+            access: entry.access,
+            low: limit(&entry.low),
+            high: limit(&entry.high),
+            allow: entry.allow.iter().filter_map(|part| parse_range(part)).collect(),
+            default: entry.default.clone(),
+            group: entry.stored.as_deref().and_then(Group::read),
+        }
+    }
+
+    /// The value as delivered; where the description has none: zeros, or no text.
+    fn delivered(&self, node: NodeId) -> Vec<u8> {
+        let described = self.default.as_ref().and_then(|default| default.encode(self.data_type, node).ok());
+        described.unwrap_or_else(|| vec![0; self.data_type.width().unwrap_or(0)])
+    }
+
+    /// Bytes of a person's number in the entry's type.
+    pub(super) fn encode(&self, value: &Scalar, node: NodeId) -> Result<Vec<u8>, String> {
+        value.encode(self.data_type, node).map_err(|error| error.to_string())
+    }
+
+    fn check_limits(&self, bytes: &[u8]) -> Result<(), Abort> {
+        let Some(number) = self.data_type.decode(bytes).ok().and_then(|value| value.as_f64()) else {
+            return Ok(());
+        };
+        if self.high.is_some_and(|high| number > high) {
+            return Err(Abort::TOO_HIGH);
+        }
+        if self.low.is_some_and(|low| number < low) {
+            return Err(Abort::TOO_LOW);
+        }
+        let listed = |&(low, high): &(u32, u32)| f64::from(low) <= number && number <= f64::from(high);
+        if !self.allow.is_empty() && !self.allow.iter().any(listed) {
+            return Err(Abort::VALUE);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DEVICE: &str = r#"
+        name = "t"
+        title = ""
+        vendor = ""
+        source = ""
+        [identify]
+        [[object]]
+        at = "0x1010:1"
+        name = "store-all"
+        type = "u32"
+        access = "rw"
+        signature = "save"
+        default = 1
+        [[object]]
+        at = "0x1017"
+        name = "producer-heartbeat-time"
+        type = "u16"
+        access = "rw"
+        default = 0
+        stored = "comm"
+        only_if_zero = ["0x100C"]
+        [[object]]
+        at = "0x100C"
+        name = "guard-time"
+        type = "u16"
+        access = "rw"
+        default = 0
+        [[object]]
+        at = "0x1800:1"
+        name = "tpdo1-cob-id"
+        type = "u32"
+        access = "rw"
+        default = "$NODEID+0x40000180"
+        stored = "comm"
+        [[object]]
+        at = "0x6131:1"
+        name = "unit"
+        type = "u32"
+        access = "rw"
+        default = 0x4E0000
+        allow = ["0x4E0000", "0xAB0000"]
+        stored = "app"
+        [[object]]
+        at = "0x6132:1-2"
+        name = "digits"
+        type = "u8"
+        access = "rw"
+        low = 1
+        high = 5
+        stored = "app"
+        [[object]]
+        at = "0x6127:1"
+        name = "offset"
+        type = "r32"
+        access = "ro"
+        [[object]]
+        at = "0x6125:1"
+        name = "autozero"
+        type = "u32"
+        access = "wo"
+        signature = "zero"
+        [[object]]
+        at = "0x2320"
+        name = "node-id"
+        type = "u32"
+        access = "rw"
+        signature = "set"
+        default = "$NODEID"
+        stored = "all"
+    "#;
+
+    fn node(id: u8) -> NodeId {
+        NodeId::new(id).expect("a node-ID")
+    }
+
+    fn objects() -> Objects {
+        Objects::new(&Model::from_toml(DEVICE).expect("a description"), node(5))
+    }
+
+    fn id(text: &str) -> ObjectId {
+        text.parse().expect("an object")
+    }
+
+    fn refusal(objects: &Objects, object: &str, bytes: &[u8]) -> Option<u32> {
+        objects.check_write(id(object), bytes).err().map(|Abort(code)| code)
+    }
+
+    #[test]
+    fn delivered_values() {
+        let objects = objects();
+        assert_eq!(objects.number(id("0x1800:1")), 0x4000_0185);
+        assert_eq!(objects.bytes(id("0x6127:1")), Some([0; 4].as_slice()));
+        assert_eq!(objects.bytes(id("0x6127:2")), None);
+    }
+
+    #[test]
+    fn each_refusal_has_its_code() {
+        let objects = objects();
+        for (object, bytes, code) in [
+            ("0x2000", &[0][..], 0x0602_0000),
+            ("0x6132:3", &[2], 0x0609_0011),
+            ("0x6127:1", &[0; 4], 0x0601_0002),
+            ("0x6132:1", &[2, 0], 0x0607_0010),
+            ("0x6132:2", &[6], 0x0609_0031),
+            ("0x6132:2", &[0], 0x0609_0032),
+            ("0x6131:1", &[0, 0, 0x4f, 0], 0x0609_0030),
+            ("0x1010:1", b"evas", 0x0800_0020),
+            ("0x6125:1", b"load", 0x0800_0020),
+            ("0x2320", &[3, 0, 0, 0], 0x0800_0020),
+        ] {
+            assert_eq!(refusal(&objects, object, bytes), Some(code), "{object} {bytes:x?}");
+        }
+        for (object, bytes) in [
+            ("0x6132:2", &[5][..]),
+            ("0x6131:1", &[0, 0, 0xab, 0]),
+            ("0x1010:1", b"save"),
+            ("0x6125:1", b"zero"),
+            ("0x2320", b"\x03set"),
+        ] {
+            assert_eq!(refusal(&objects, object, bytes), None, "{object} {bytes:x?}");
+        }
+        assert_eq!(objects.check_readable(id("0x6125:1")).err(), Some(Abort::WRITE_ONLY));
+        assert!(objects.check_readable(id("0x6127:1")).is_ok());
+    }
+
+    #[test]
+    fn writable_only_while_another_is_zero() {
+        let mut objects = objects();
+        assert_eq!(refusal(&objects, "0x1017", &[100, 0]), None);
+        objects.put(id("0x100C"), vec![50, 0]);
+        assert_eq!(refusal(&objects, "0x1017", &[100, 0]), Some(0x0800_0020));
+        assert_eq!(refusal(&objects, "0x1017", &[0, 0]), None, "off is off");
+    }
+
+    #[test]
+    fn saved_is_what_its_group_was_asked_for() {
+        let mut objects = objects();
+        let change = |objects: &mut Objects| {
+            objects.put(id("0x1017"), vec![100, 0]);
+            objects.put(id("0x6131:1"), vec![0, 0, 0xab, 0]);
+            objects.put(id("0x100C"), vec![7, 0]);
+        };
+        change(&mut objects);
+        objects.save(Group::Application, node(5));
+        objects.reset(Area::All, node(5));
+        assert_eq!(objects.number(id("0x6131:1")), 0xab_0000);
+        assert_eq!(objects.number(id("0x1017")), 0, "not of the group");
+        assert_eq!(objects.number(id("0x100C")), 0, "not marked as stored");
+        change(&mut objects);
+        objects.save(Group::All, node(5));
+        objects.reset(Area::All, node(9));
+        assert_eq!(objects.number(id("0x1017")), 100);
+        assert_eq!(objects.number(id("0x1800:1")), 0x4000_0189, "as delivered: follows the node-ID");
+        // Restoring takes effect with the reset.
+        objects.restore(Group::Communication);
+        assert_eq!(objects.number(id("0x1017")), 100);
+        objects.reset(Area::All, node(9));
+        assert_eq!(objects.number(id("0x1017")), 0);
+        assert_eq!(objects.number(id("0x6131:1")), 0xab_0000);
+    }
+
+    #[test]
+    fn a_reset_of_the_communication_leaves_the_rest() {
+        let mut objects = objects();
+        objects.put(id("0x1017"), vec![100, 0]);
+        objects.put(id("0x6131:1"), vec![0, 0, 0xab, 0]);
+        objects.reset(Area::Communication, node(5));
+        assert_eq!(objects.number(id("0x1017")), 0);
+        assert_eq!(objects.number(id("0x6131:1")), 0xab_0000);
+    }
+
+    #[test]
+    fn restoring_leaves_node_id_and_bit_rate() {
+        let mut objects = objects();
+        objects.put(id("0x2320"), vec![9, 0, 0, 0]);
+        objects.save(Group::All, node(5));
+        objects.restore(Group::All);
+        objects.reset(Area::All, node(5));
+        assert_eq!(objects.number(id("0x2320")), 9);
+    }
+}

@@ -1,0 +1,308 @@
+//! TPDOs of a simulated device (CiA 301, 7.2.2 and 7.5.2.35 to 7.5.2.38): the rules for their parameters,
+//! and when one is sent.
+
+use super::abort::Abort;
+use super::channels::Channels;
+use super::objects::Objects;
+use crate::bus::time::Mono;
+use crate::canopen::id::CanId;
+use crate::canopen::object::ObjectId;
+use crate::device::description::Remap;
+use std::time::Duration;
+
+/// One TPDO.
+#[derive(Clone, Debug)]
+pub(super) struct Tpdo {
+    /// 0 for 1800h and 1A00h.
+    number: u16,
+    /// SYNCs since the last transmission.
+    syncs: u8,
+    /// What was sent last, for "if changed".
+    sent: Option<Vec<u8>>,
+    sent_at: Option<Mono>,
+    /// When the event timer elapses.
+    timer: Option<Mono>,
+    /// An event that waits for the inhibit time.
+    held_back: Option<Mono>,
+    watches: Vec<Watch>,
+    /// When the values that can cause an event are looked at next.
+    look: Option<Mono>,
+}
+
+/// A mapped value whose change can cause an event (CiA 404: x133h to x136h).
+#[derive(Clone, Debug)]
+struct Watch {
+    object: ObjectId,
+    delta: f64,
+    /// Lower and upper limit; both 0 are none.
+    limits: Option<(f64, f64)>,
+    hysteresis: f64,
+    /// The value of the last transmission.
+    reference: f64,
+    below: bool,
+    above: bool,
+}
+
+/// Why a TPDO goes out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cause {
+    /// Its turn, or its timer.
+    Due,
+    /// A SYNC; to be sent only if something changed.
+    IfChanged,
+}
+
+impl Tpdo {
+    /// The TPDOs that a device describes.
+    pub(super) fn all(objects: &Objects) -> Vec<Tpdo> {
+        (0..512).filter(|number| objects.has_index(0x1800 + number)).map(Tpdo::new).collect()
+    }
+
+    fn new(number: u16) -> Tpdo {
+        Tpdo {
+            number,
+            syncs: 0,
+            sent: None,
+            sent_at: None,
+            timer: None,
+            held_back: None,
+            watches: Vec::new(),
+            look: None,
+        }
+    }
+
+    fn communication(&self, sub: u8) -> ObjectId {
+        ObjectId::new(0x1800 + self.number, sub)
+    }
+
+    fn kind(&self, objects: &Objects) -> u32 {
+        objects.number(self.communication(2))
+    }
+
+    fn event_timer(&self, objects: &Objects) -> Option<Duration> {
+        let milliseconds = objects.number(self.communication(5));
+        (milliseconds > 0 && self.is_event_driven(objects)).then(|| Duration::from_millis(milliseconds.into()))
+    }
+
+    fn is_event_driven(&self, objects: &Objects) -> bool {
+        matches!(self.kind(objects), 254 | 255)
+    }
+
+    /// The identifier, if the TPDO is valid.
+    pub(super) fn cob_id(&self, objects: &Objects) -> Option<CanId> {
+        let cob_id = objects.number(self.communication(1));
+        let id = u16::try_from(cob_id & 0x7ff).ok()?;
+        if is_valid(cob_id) { CanId::standard(id) } else { None }
+    }
+
+    /// What is mapped at present.
+    pub(super) fn mapping(&self, objects: &Objects) -> Vec<ObjectId> {
+        let map = 0x1a00 + self.number;
+        let count = u8::try_from(objects.number(ObjectId::new(map, 0))).unwrap_or(0);
+        (1..=count).map(|sub| mapped(objects.number(ObjectId::new(map, sub))).0).collect()
+    }
+
+    /// The node has become OPERATIONAL, or a parameter was written: begins anew. Nothing is sent by that.
+    pub(super) fn start(&mut self, objects: &Objects, channels: &Channels, now: Mono) {
+        *self = Tpdo::new(self.number);
+        self.timer = self.event_timer(objects).map(|period| now + period);
+        if !self.is_event_driven(objects) || self.cob_id(objects).is_none() {
+            return;
+        }
+        let time = now.since_start();
+        for object in self.mapping(objects) {
+            self.watches.extend(Watch::new(objects, channels, object, time));
+        }
+        self.plan_look(objects, channels, now);
+    }
+
+    /// The node has left OPERATIONAL.
+    pub(super) fn stop(&mut self) {
+        *self = Tpdo::new(self.number);
+    }
+
+    fn plan_look(&mut self, objects: &Objects, channels: &Channels, now: Mono) {
+        let next = |watch: &Watch| channels.next_sample(objects, watch.object, now.since_start());
+        self.look = self.watches.iter().filter_map(next).min().map(Mono::at);
+    }
+
+    /// A SYNC has come: whether that is a reason to send.
+    pub(super) fn sync(&mut self, objects: &Objects) -> Option<Cause> {
+        match self.kind(objects) {
+            0 => Some(Cause::IfChanged),
+            every @ 1..=240 => {
+                self.syncs = self.syncs.saturating_add(1);
+                (u32::from(self.syncs) >= every).then_some(Cause::Due)
+            }
+            _ => None,
+        }
+    }
+
+    /// Time has come to `now`: whether timer or event is a reason to send.
+    pub(super) fn wake(&mut self, objects: &Objects, channels: &Channels, now: Mono) -> Option<Cause> {
+        let mut event = self.held_back.is_some_and(|due| due <= now);
+        if self.look.is_some_and(|due| due <= now) {
+            for watch in &mut self.watches {
+                event |= watch.look(objects, channels, now.since_start());
+            }
+            self.plan_look(objects, channels, now);
+        }
+        event |= self.timer.is_some_and(|due| due <= now);
+        if !event {
+            return None;
+        }
+        // The timer counts from the transmission that it would have caused, so that it does not drift.
+        let from = self.timer.filter(|due| *due <= now).unwrap_or(now);
+        self.timer = self.event_timer(objects).map(|period| from + period);
+        let inhibit = Duration::from_micros(100) * objects.number(self.communication(3));
+        let free = self.sent_at.map_or(now, |sent| sent + inhibit);
+        self.held_back = (free > now).then_some(free);
+        self.held_back.is_none().then_some(Cause::Due)
+    }
+
+    /// When [`Tpdo::wake`] is due.
+    pub(super) fn next_wake(&self) -> Option<Mono> {
+        [self.timer, self.held_back, self.look].into_iter().flatten().min()
+    }
+
+    /// Takes note of a transmission; `false` if it is not to happen, since nothing has changed.
+    pub(super) fn note(
+        &mut self,
+        cause: Cause,
+        data: &[u8],
+        objects: &Objects,
+        channels: &Channels,
+        now: Mono,
+    ) -> bool {
+        if cause == Cause::IfChanged && self.sent.as_deref() == Some(data) {
+            return false;
+        }
+        self.sent = Some(data.to_vec());
+        self.sent_at = Some(now);
+        self.syncs = 0;
+        for watch in &mut self.watches {
+            watch.reference = channels.number(objects, watch.object, now.since_start()).unwrap_or(watch.reference);
+        }
+        true
+    }
+}
+
+impl Watch {
+    /// `None` where nothing can ever happen, so that nobody has to look.
+    fn new(objects: &Objects, channels: &Channels, object: ObjectId, time: Duration) -> Option<Watch> {
+        let value = channels.number(objects, object, time)?;
+        let parameter = |offset| objects.real(ObjectId::new(object.index.saturating_add(offset), object.sub));
+        // Only x130h has its parameters at x133h.
+        let family = object.index & 0x0fff == 0x130;
+        let (delta, lower, upper, hysteresis) =
+            if family { (parameter(3), parameter(4), parameter(5), parameter(6)) } else { (None, None, None, None) };
+        let delta = delta.unwrap_or(0.0);
+        let limits = lower.zip(upper).filter(|limits| *limits != (0.0, 0.0));
+        let (lowest, highest) = channels.reach(objects, object)?;
+        let reachable = limits.is_some_and(|(lower, upper)| lowest < lower || upper < highest);
+        (delta > 0.0 || reachable).then(|| Watch {
+            object,
+            delta,
+            limits,
+            hysteresis: hysteresis.unwrap_or(0.0),
+            reference: value,
+            below: limits.is_some_and(|(lower, _)| value < lower),
+            above: limits.is_some_and(|(_, upper)| value > upper),
+        })
+    }
+
+    /// Whether the value has changed by delta, or has just passed a limit outwards.
+    fn look(&mut self, objects: &Objects, channels: &Channels, time: Duration) -> bool {
+        let Some(value) = channels.number(objects, self.object, time) else { return false };
+        let mut event = self.delta > 0.0 && (value - self.reference).abs() >= self.delta;
+        if let Some((lower, upper)) = self.limits {
+            let (was_below, was_above) = (self.below, self.above);
+            self.below = value < lower || (was_below && value < lower + self.hysteresis);
+            self.above = value > upper || (was_above && value > upper - self.hysteresis);
+            event |= (self.below && !was_below) || (self.above && !was_above);
+        }
+        event
+    }
+}
+
+/// Bit 31 of a COB-ID: the PDO does not exist.
+fn is_valid(cob_id: u32) -> bool {
+    cob_id & 0x8000_0000 == 0
+}
+
+/// A mapping entry: the object, and its length in bits.
+fn mapped(entry: u32) -> (ObjectId, u32) {
+    let [bits, sub, low, high] = entry.to_le_bytes();
+    (ObjectId::new(u16::from_le_bytes([low, high]), sub), bits.into())
+}
+
+/// Whether a write to the parameters of a TPDO is allowed; `None` where the object is none.
+pub(super) fn check(
+    objects: &Objects,
+    remap: Remap,
+    pre_operational: bool,
+    object: ObjectId,
+    bytes: &[u8],
+) -> Result<(), Abort> {
+    let number = bytes.iter().rev().fold(0u32, |number, byte| number << 8 | u32::from(*byte));
+    match object.index {
+        0x1800..=0x19ff => check_communication(objects, object, number),
+        0x1a00..=0x1bff => check_mapping(objects, remap, pre_operational, object, number),
+        _ => Ok(()),
+    }
+}
+
+fn check_communication(objects: &Objects, object: ObjectId, number: u32) -> Result<(), Abort> {
+    let old = objects.number(object.with_sub(1));
+    match object.sub {
+        1 => {
+            let id = CanId::Standard(u16::try_from(number & 0x7ff).unwrap_or(0));
+            // 29 bits are not supported; bits 11 to 28 belong to them.
+            let misplaced = number & 0x3fff_f800 != 0;
+            let moved = is_valid(old) && is_valid(number) && old & 0x7ff != number & 0x7ff;
+            if misplaced || moved || (is_valid(number) && id.is_restricted()) {
+                return Err(Abort::VALUE);
+            }
+        }
+        2 if (241..=253).contains(&number) => return Err(Abort::VALUE),
+        // Only while the PDO does not exist.
+        3 if is_valid(old) && number != objects.number(object) => return Err(Abort::VALUE),
+        _ => {}
+    }
+    Ok(())
+}
+
+fn check_mapping(
+    objects: &Objects,
+    remap: Remap,
+    pre_operational: bool,
+    object: ObjectId,
+    number: u32,
+) -> Result<(), Abort> {
+    match remap {
+        Remap::Invalidate if is_valid(objects.number(ObjectId::new(object.index - 0x200, 1))) => {
+            return Err(Abort::UNSUPPORTED);
+        }
+        Remap::CountOnly if !pre_operational => return Err(Abort::DEVICE_STATE),
+        _ => {}
+    }
+    if object.sub > 0 {
+        if objects.number(object.with_sub(0)) != 0 {
+            return Err(Abort::UNSUPPORTED);
+        }
+        return if number == 0 { Ok(()) } else { check_mappable(objects, number).map(|_| ()) };
+    }
+    let mut bits = 0;
+    for sub in 1..=u8::try_from(number).unwrap_or(u8::MAX) {
+        bits += check_mappable(objects, objects.number(object.with_sub(sub)))?;
+    }
+    if bits > 64 { Err(Abort::PDO_LENGTH) } else { Ok(()) }
+}
+
+/// The length of a mapping entry in bits, if it can be mapped.
+fn check_mappable(objects: &Objects, entry: u32) -> Result<u32, Abort> {
+    let (object, bits) = mapped(entry);
+    let spec = objects.spec(object).filter(|spec| spec.pdo).ok_or(Abort::NOT_MAPPABLE)?;
+    let width = spec.data_type.width().and_then(|bytes| u32::try_from(8 * bytes).ok());
+    if width == Some(bits) { Ok(bits) } else { Err(Abort::NOT_MAPPABLE) }
+}
