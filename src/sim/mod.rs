@@ -10,7 +10,9 @@
 
 mod abort;
 mod channels;
+mod device;
 mod emergency;
+mod memory;
 mod model;
 mod number;
 mod objects;
@@ -19,5 +21,6 @@ mod sdo_server;
 mod tpdo;
 
 pub use abort::Abort;
+pub use device::{Device, Setup};
 pub use model::{Direction, Overload};
 pub use record::{HEADER, Recorder};
