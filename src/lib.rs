@@ -7,13 +7,12 @@
 //! - [`device`] → canopen. What is known of measuring devices: descriptions, units, CiA 404. Data first.
 //! - [`bus`] → canopen (frames). The trait [`bus::Bus`] and its transports. The only place with sockets,
 //!   clocks, signals and `unsafe`.
-
-// Here and not in Cargo.toml: integration tests may panic, that is how they fail.
-#![warn(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
-pub mod bus;
-pub mod canopen;
-pub mod device;
-pub mod master;
-pub mod measure;
-pub mod sim;
+//! - [`master`] → bus (the trait), device, canopen. Drives the machines over a bus: deadlines, retries,
+//!   matching. Never prints; time is told by what is received.
+//! - [`sim`] → bus, device, canopen (frames, ids, values only). Simulated devices, written from the
+//!   standard and the manuals and not with the client's encoders.
+//! - [`measure`] → master, device, canopen. From TPDOs and SDO answers to samples, and their statistics.
+//! - [`tasks`] → measure, master, device, canopen, bus (the trait). The procedures that users think in.
+//!   They return reports and print nothing.
+//! - [`output`] → tasks (reports), measure, device, canopen (values). Rows and text; knows no bus and no
+//!   command line.

@@ -80,3 +80,36 @@ pub struct Stamp {
     /// For people and files.
     pub wall: Wall,
 }
+
+/// A length of time for people: `500 ms`, `5 s`, `2.5 s`, `1h 30m`.
+pub fn spoken(length: Duration) -> String {
+    let milliseconds = length.as_millis();
+    if length >= Duration::from_secs(60) {
+        humantime::format_duration(Duration::from_secs(length.as_secs())).to_string()
+    } else if milliseconds >= 1000 {
+        format!("{} s", (length.as_secs_f64() * 1000.0).round() / 1000.0)
+    } else if milliseconds >= 1 {
+        format!("{} ms", (length.as_secs_f64() * 1e6).round() / 1000.0)
+    } else {
+        format!("{} us", length.as_micros())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_in_words() {
+        for (length, words) in [
+            (Duration::from_millis(500), "500 ms"),
+            (Duration::from_secs(5), "5 s"),
+            (Duration::from_millis(2500), "2.5 s"),
+            (Duration::from_micros(1500), "1.5 ms"),
+            (Duration::from_micros(80), "80 us"),
+            (Duration::from_secs(5400), "1h 30m"),
+        ] {
+            assert_eq!(spoken(length), words);
+        }
+    }
+}

@@ -137,6 +137,19 @@ impl<'bus> Master<'bus> {
         self.sdo.is_busy()
     }
 
+    /// Whether frames still wait to be sent.
+    pub fn is_sending(&self) -> bool {
+        !self.outgoing.is_empty()
+    }
+
+    /// Drops transfers whose end no longer matters: a scan's. Nobody is told; their answers are ignored.
+    pub fn forget(&mut self, tickets: impl Iterator<Item = Ticket>) {
+        for ticket in tickets {
+            self.sdo.forget(ticket);
+            self.outgoing.drop_ticket(ticket);
+        }
+    }
+
     /// Ends every SDO transfer; servers that had begun are told.
     pub fn cancel(&mut self) {
         let mut out = Vec::new();

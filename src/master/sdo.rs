@@ -3,6 +3,7 @@
 
 use super::Timing;
 use super::send::Outgoing;
+use crate::bus::time::spoken;
 use crate::bus::{Mono, Received, Stamp};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
@@ -116,7 +117,7 @@ pub enum SdoFailure {
     #[error("refused by the device ({0})")]
     Refused(AbortCode),
     /// Nothing came.
-    #[error("no answer within {}{}", humantime::format_duration(*.waited), if *.begun { " in the middle of the transfer" } else { "" })]
+    #[error("no answer within {}{}", spoken(*.waited), if *.begun { " in the middle of the transfer" } else { "" })]
     NoAnswer {
         /// The longest wait for one answer.
         waited: Duration,
@@ -129,6 +130,9 @@ pub enum SdoFailure {
     /// The device delivered bytes that make no value of the type.
     #[error("{0}")]
     Fit(FitError),
+    /// The object holds text or bytes where a measured value was asked for.
+    #[error("it is no number")]
+    NotANumber,
     /// We gave up.
     #[error("not finished")]
     Cancelled,
@@ -380,6 +384,16 @@ impl SdoClient {
                 error.operation = request.operation();
             }
             self.finished.push_back((active.ticket, Err(error)));
+        }
+    }
+
+    /// Drops one transfer without telling its server.
+    pub(super) fn forget(&mut self, ticket: Ticket) {
+        for node in self.nodes.values_mut() {
+            node.waiting.retain(|(waiting, _)| *waiting != ticket);
+            if node.active.as_ref().is_some_and(|active| active.ticket == ticket) {
+                node.active = None;
+            }
         }
     }
 

@@ -281,6 +281,7 @@ impl Bus for SocketCan {
     }
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        let mut unwanted = false;
         loop {
             if self.interrupts.take() {
                 return Ok(Event::Interrupted);
@@ -289,9 +290,13 @@ impl Bus for SocketCan {
                 return Ok(event);
             }
             if let Some(message) = self.batch.next() {
-                if let Some(event) = self.take_in(message) {
-                    return Ok(event);
+                match self.take_in(message) {
+                    Some(event) => return Ok(event),
+                    None => unwanted = true,
                 }
+            } else if unwanted && self.mono() >= deadline {
+                // Frames that nobody sees must not keep the deadline from being reached.
+                return Ok(Event::Timeout);
             } else if !self.drained {
                 self.fill()?;
             } else if self.wait(deadline)? {

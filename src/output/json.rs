@@ -1,0 +1,209 @@
+//! JSON Lines: one object a line.
+
+use crate::canopen::id::NodeId;
+use crate::measure::sample::{Number, Sample, Source, Status};
+use crate::tasks::nmt::Report;
+use crate::tasks::scan::Found;
+use crate::tasks::{Failure, Kind};
+use serde::Serialize;
+use std::io::{self, Write};
+
+fn line<T: Serialize>(out: &mut dyn Write, object: &T) -> io::Result<()> {
+    serde_json::to_writer(&mut *out, object)?;
+    out.write_all(b"\n")
+}
+
+/// The name of a kind of failure in the contract.
+pub fn kind_name(kind: Kind) -> &'static str {
+    match kind {
+        Kind::CheckFailed => "check-failed",
+        Kind::Usage => "usage",
+        Kind::NoAnswer => "no-answer",
+        Kind::Refused => "refused",
+        Kind::Bus => "bus",
+        Kind::Unexpected => "unexpected",
+        Kind::Partial => "partial",
+        Kind::Io => "io",
+        Kind::Interrupted => "interrupted",
+    }
+}
+
+/// A failure, for stderr.
+pub fn failure(out: &mut dyn Write, failure: &Failure, exit: u8) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Error<'a> {
+        error: Inner<'a>,
+    }
+    #[derive(Serialize)]
+    struct Inner<'a> {
+        kind: &'a str,
+        exit: u8,
+        message: &'a str,
+        node: Option<u8>,
+        object: Option<String>,
+        abort: Option<String>,
+        hint: Option<&'a str>,
+    }
+    let inner = Inner {
+        kind: kind_name(failure.kind),
+        exit,
+        message: &failure.message,
+        node: failure.node.map(NodeId::get),
+        object: failure.object.map(|object| object.to_string()),
+        abort: failure.abort.map(|abort| format!("0x{:08X}", abort.0)),
+        hint: failure.hint.as_deref(),
+    };
+    line(out, &Error { error: inner })
+}
+
+/// A node that a scan found.
+pub fn found(out: &mut dyn Write, found: &Found) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Node<'a> {
+        node: u8,
+        state: Option<String>,
+        device_type: Option<String>,
+        profile: Option<u32>,
+        vendor: Option<u32>,
+        product: Option<u32>,
+        revision: Option<u32>,
+        serial: Option<u32>,
+        name: Option<&'a str>,
+        device: Option<&'a str>,
+    }
+    let identity = &found.instrument.identity;
+    let node = Node {
+        node: found.node.get(),
+        state: found.state.map(|state| state.to_string()),
+        device_type: identity.device_type.map(|device_type| format!("0x{device_type:08X}")),
+        profile: identity.profile(),
+        vendor: identity.vendor,
+        product: identity.product,
+        revision: identity.revision,
+        serial: identity.serial,
+        name: identity.name.as_deref(),
+        device: found.instrument.model.as_ref().map(|model| model.description.name.as_str()),
+    };
+    line(out, &node)
+}
+
+/// A state.
+pub fn report(out: &mut dyn Write, report: &Report) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct State<'a> {
+        node: u8,
+        state: Option<String>,
+        by: &'a str,
+    }
+    let state = report.state.map(|state| state.to_string());
+    line(out, &State { node: report.node.get(), state, by: report.by.as_str() })
+}
+
+/// A number as JSON has them: decimals keep their digits, what is not finite is null.
+struct JsonNumber(Option<Number>);
+
+impl Serialize for JsonNumber {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0 {
+            Some(Number::Real32(number)) if number.is_finite() => serializer.serialize_f32(number),
+            Some(Number::Decimal { mantissa, digits: 0 }) => match i64::try_from(mantissa) {
+                Ok(number) => serializer.serialize_i64(number),
+                Err(_) => serializer.serialize_f64(Number::Decimal { mantissa, digits: 0 }.as_f64()),
+            },
+            Some(number) if number.is_finite() => serializer.serialize_f64(number.as_f64()),
+            _ => serializer.serialize_none(),
+        }
+    }
+}
+
+/// A measured value of `read`.
+pub fn reading(
+    out: &mut dyn Write,
+    source: &Source,
+    value: Option<Number>,
+    unit: &str,
+    status: Option<Status>,
+) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Reading<'a> {
+        node: u8,
+        signal: &'a str,
+        value: JsonNumber,
+        unit: Option<&'a str>,
+        status: Option<&'a str>,
+    }
+    let reading = Reading {
+        node: source.node.get(),
+        signal: &source.signal,
+        value: JsonNumber(value),
+        unit: Some(unit).filter(|unit| !unit.is_empty()),
+        status: status.map(Status::as_str),
+    };
+    line(out, &reading)
+}
+
+/// A row of `log`.
+pub fn row(out: &mut dyn Write, time: &str, elapsed_s: f64, sample: &Sample, source: &Source) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Row<'a> {
+        time: &'a str,
+        elapsed_s: f64,
+        node: u8,
+        signal: &'a str,
+        value: JsonNumber,
+        unit: Option<&'a str>,
+        status: Option<&'a str>,
+        raw: String,
+    }
+    let row = Row {
+        time,
+        elapsed_s,
+        node: source.node.get(),
+        signal: &source.signal,
+        value: JsonNumber(sample.value),
+        unit: Some(&*source.unit).filter(|unit| !unit.is_empty()),
+        status: sample.status.map(Status::as_str),
+        raw: sample.raw.to_string(),
+    };
+    line(out, &row)
+}
+
+/// A value of the object dictionary.
+#[derive(Debug, Serialize)]
+pub struct ObjectValue<'a> {
+    /// Of which node.
+    pub node: u8,
+    /// `0x1018:1`.
+    pub object: String,
+    /// Its name, where one is known.
+    pub name: Option<String>,
+    /// Its type, where it is known.
+    #[serde(rename = "type")]
+    pub data_type: Option<String>,
+    /// The value: a number or text.
+    pub value: serde_json::Value,
+    /// The bytes in wire order.
+    pub raw: &'a str,
+}
+
+/// A value that `sdo read` found or `sdo write` wrote.
+pub fn object(out: &mut dyn Write, value: &ObjectValue<'_>) -> io::Result<()> {
+    line(out, value)
+}
+
+/// A value of the object dictionary as JSON has it: numbers as numbers, the rest as text.
+pub fn value(value: &crate::canopen::value::Value) -> serde_json::Value {
+    use crate::canopen::value::Value;
+    match value {
+        Value::Bool(bit) => (*bit).into(),
+        Value::Unsigned(number) => (*number).into(),
+        Value::Integer(number) => (*number).into(),
+        Value::Real32(number) if number.is_finite() => {
+            // Through its text, so that 1.1 stays 1.1.
+            number.to_string().parse::<f64>().map_or(serde_json::Value::Null, Into::into)
+        }
+        Value::Real64(number) if number.is_finite() => (*number).into(),
+        Value::Real32(_) | Value::Real64(_) => serde_json::Value::Null,
+        other => other.to_string().into(),
+    }
+}

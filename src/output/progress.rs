@@ -1,0 +1,116 @@
+//! The live lines of a recording: what each node measures now, and how far it has come.
+
+use super::text;
+use crate::measure::sample::{Sample, Source};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// How often lines are redrawn, a second.
+const RATE: u8 = 10;
+
+/// Live lines on stderr.
+#[derive(Debug)]
+pub struct Progress {
+    multi: MultiProgress,
+    nodes: BTreeMap<u8, (ProgressBar, BTreeMap<usize, String>)>,
+    total: ProgressBar,
+    duration: Option<Duration>,
+    count: Option<u64>,
+    changed: bool,
+}
+
+impl Progress {
+    /// Live lines, hidden unless `show`.
+    pub fn new(show: bool, duration: Option<Duration>, count: Option<u64>) -> Progress {
+        let target = if show { ProgressDrawTarget::stderr_with_hz(RATE) } else { ProgressDrawTarget::hidden() };
+        let multi = MultiProgress::with_draw_target(target);
+        let total = match (count, duration) {
+            (Some(count), _) => bar(&multi, count),
+            (None, Some(duration)) => bar(&multi, u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)),
+            (None, None) => {
+                let line = multi.add(ProgressBar::new_spinner());
+                line.set_style(style("{msg}"));
+                line
+            }
+        };
+        Progress { multi, nodes: BTreeMap::new(), total, duration, count, changed: false }
+    }
+
+    /// For lines that must not be torn.
+    pub fn multi(&self) -> MultiProgress {
+        self.multi.clone()
+    }
+
+    /// Whether anybody sees it.
+    pub fn is_hidden(&self) -> bool {
+        self.multi.is_hidden()
+    }
+
+    /// Takes the newest values.
+    pub fn take(&mut self, samples: &[Sample], sources: &[Source]) {
+        if self.is_hidden() {
+            return;
+        }
+        for sample in samples {
+            let Some(source) = sources.get(sample.source) else { continue };
+            let (_, values) = self.nodes.entry(source.node.get()).or_insert_with(|| {
+                let line = self.multi.insert_before(&self.total, ProgressBar::new_spinner());
+                line.set_style(style("{prefix:<4} {wide_msg}"));
+                line.set_prefix(source.node.to_string());
+                (line, BTreeMap::new())
+            });
+            let value = sample.value.map_or_else(|| "-".to_owned(), |value| value.to_string());
+            let status = sample.status.map_or("", |status| status.as_str());
+            values.insert(sample.source, format!("{} {value} {} {status}", source.signal, source.unit));
+            self.changed = true;
+        }
+    }
+
+    /// Redraws.
+    pub fn tick(&mut self, elapsed: Duration, rows: u64) {
+        if self.is_hidden() {
+            return;
+        }
+        if std::mem::take(&mut self.changed) {
+            for (line, values) in self.nodes.values() {
+                let all: Vec<&str> = values.values().map(|value| value.trim_end()).collect();
+                line.set_message(all.join("   "));
+            }
+        }
+        let counted = format!("{} rows", text::grouped(rows));
+        match (self.count, self.duration) {
+            (Some(count), _) => {
+                self.total.set_position(rows.min(count));
+                self.total.set_message(counted);
+            }
+            (None, Some(duration)) => {
+                self.total.set_position(u64::try_from(elapsed.as_millis()).unwrap_or(u64::MAX));
+                let left = Duration::from_secs(duration.saturating_sub(elapsed).as_secs());
+                self.total.set_message(format!("{} left   {counted}", humantime::format_duration(left)));
+            }
+            (None, None) => {
+                let spent = Duration::from_secs(elapsed.as_secs());
+                self.total.set_message(format!("{}   {counted}   Ctrl-C ends", humantime::format_duration(spent)));
+            }
+        }
+    }
+
+    /// Removes the lines.
+    pub fn finish(&mut self) {
+        for (line, _) in self.nodes.values() {
+            line.finish_and_clear();
+        }
+        self.total.finish_and_clear();
+    }
+}
+
+fn bar(multi: &MultiProgress, length: u64) -> ProgressBar {
+    let bar = multi.add(ProgressBar::new(length));
+    bar.set_style(style("[{bar:27}] {msg}").progress_chars("=> "));
+    bar
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}

@@ -1,0 +1,49 @@
+//! Aligned columns.
+
+use std::io::{self, Write};
+
+/// How a column stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Align {
+    /// Text.
+    Left,
+    /// Numbers.
+    Right,
+}
+
+/// Writes rows in aligned columns, two blanks apart, without blanks at the ends of lines.
+pub fn write(out: &mut dyn Write, align: &[Align], rows: &[Vec<String>]) -> io::Result<()> {
+    let width = |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
+    let widths: Vec<usize> = (0..align.len()).map(|column| width(column).unwrap_or(0)).collect();
+    for row in rows {
+        let mut line = String::new();
+        for ((cell, &width), align) in row.iter().zip(&widths).zip(align) {
+            if !line.is_empty() {
+                line.push_str("  ");
+            }
+            match align {
+                Align::Left => line.push_str(&format!("{cell:<width$}")),
+                Align::Right => line.push_str(&format!("{cell:>width$}")),
+            }
+        }
+        writeln!(out, "{}", line.trim_end())?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_aligned() {
+        let rows = [
+            vec!["NODE".into(), "NAME".into()],
+            vec!["1".into(), "MH-4-CAN".into()],
+            vec!["127".into(), String::new()],
+        ];
+        let mut out = Vec::new();
+        write(&mut out, &[Align::Right, Align::Left], &rows).expect("memory");
+        assert_eq!(String::from_utf8_lossy(&out), "NODE  NAME\n   1  MH-4-CAN\n 127\n");
+    }
+}

@@ -1,0 +1,169 @@
+//! Why a task did not do what was asked: the cause, whom it concerns, and what to try next.
+
+use crate::bus::BusError;
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::sdo::AbortCode;
+use crate::master::{Error, SdoError, SdoFailure};
+use std::fmt;
+
+/// The kinds of failure that scripts tell apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// The answer is no, or a safety check stopped the command before anything was changed.
+    CheckFailed,
+    /// Wrong arguments or files; nothing was sent.
+    Usage,
+    /// A device did not answer in time.
+    NoAnswer,
+    /// A device said no.
+    Refused,
+    /// The interface or the connection fails.
+    Bus,
+    /// An answer that breaks the protocol, or a device that is not in the state asked for.
+    Unexpected,
+    /// Some nodes succeeded and some failed.
+    Partial,
+    /// A local file fails.
+    Io,
+    /// Ctrl-C before there was a result.
+    Interrupted,
+}
+
+/// Why something was not done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// Which kind.
+    pub kind: Kind,
+    /// What happened, in one line, with node and object in front.
+    pub message: String,
+    /// Whom it concerns.
+    pub node: Option<NodeId>,
+    /// Which object was asked for.
+    pub object: Option<ObjectId>,
+    /// The device's own reason.
+    pub abort: Option<AbortCode>,
+    /// What to type next.
+    pub hint: Option<String>,
+}
+
+impl Failure {
+    /// A failure that concerns no node in particular.
+    pub fn new(kind: Kind, message: impl Into<String>) -> Failure {
+        Failure { kind, message: message.into(), node: None, object: None, abort: None, hint: None }
+    }
+
+    /// A failure of one node.
+    pub fn of_node(kind: Kind, node: NodeId, message: impl fmt::Display) -> Failure {
+        Failure { node: Some(node), ..Failure::new(kind, format!("node {node}: {message}")) }
+    }
+
+    /// The same with a hint.
+    pub fn hint(mut self, hint: impl Into<String>) -> Failure {
+        self.hint = Some(hint.into());
+        self
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Failure {}
+
+impl From<SdoError> for Failure {
+    fn from(error: SdoError) -> Failure {
+        let (kind, abort, hint) = match error.failure {
+            SdoFailure::Refused(code) => (Kind::Refused, Some(code), None),
+            SdoFailure::NoAnswer { begun: false, .. } => {
+                (Kind::NoAnswer, None, Some("who is there: cangauge scan".to_owned()))
+            }
+            SdoFailure::NoAnswer { begun: true, .. } => (Kind::NoAnswer, None, None),
+            SdoFailure::Violation(..) | SdoFailure::NotANumber => (Kind::Unexpected, None, None),
+            SdoFailure::Fit(_) => {
+                let hint = format!("its bytes: cangauge sdo read {} {} --type hex", error.node, error.object);
+                (Kind::Unexpected, None, Some(hint))
+            }
+            SdoFailure::Cancelled => (Kind::Interrupted, None, None),
+        };
+        let object = Some(error.object);
+        Failure { object, abort, hint, ..Failure::of_node(kind, error.node, &error) }
+    }
+}
+
+impl From<BusError> for Failure {
+    fn from(error: BusError) -> Failure {
+        let kind = match &error {
+            BusError::Io { what, .. } if what.contains("trace") => Kind::Io,
+            _ => Kind::Bus,
+        };
+        let hint = match &error {
+            BusError::QueueFull => Some(
+                "nobody acknowledges: check the sensor's power, the bit rate, the wiring and the 120 ohm terminators"
+                    .to_owned(),
+            ),
+            BusError::Down(name) => {
+                Some(format!("bring it up: sudo ip link set {name} up type can bitrate 250000 (the sensors' bit rate)"))
+            }
+            BusError::NoInterface(_) | BusError::NotCan(_) => {
+                Some("see what is there: ip -br link show type can; without hardware: --bus sim".to_owned())
+            }
+            _ => None,
+        };
+        Failure { hint, ..Failure::new(kind, error.to_string()) }
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Failure {
+        match error {
+            Error::Bus(error) => error.into(),
+            Error::Sdo(error) => error.into(),
+            Error::Interrupted => Failure::new(Kind::Interrupted, "interrupted"),
+        }
+    }
+}
+
+/// What several nodes end with together: nothing if all succeeded, the common kind if all failed alike,
+/// `partial` if some succeeded, else `unexpected` (several that failed each in its own way).
+pub fn together(asked: usize, failures: Vec<Failure>) -> Result<(), Vec<Failure>> {
+    if failures.is_empty() { Ok(()) } else { Err(combine(asked, failures)) }
+}
+
+fn combine(asked: usize, mut failures: Vec<Failure>) -> Vec<Failure> {
+    let kinds: Vec<Kind> = failures.iter().map(|failure| failure.kind).collect();
+    let common = if failures.len() < asked {
+        Kind::Partial
+    } else if kinds.windows(2).all(|pair| pair[0] == pair[1]) {
+        kinds[0]
+    } else {
+        Kind::Unexpected
+    };
+    for failure in &mut failures {
+        failure.kind = common;
+    }
+    failures
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn failure(kind: Kind) -> Failure {
+        Failure::new(kind, "")
+    }
+
+    #[test]
+    fn several_nodes_together() {
+        let kinds = |asked, kinds: &[Kind]| {
+            together(asked, kinds.iter().map(|&kind| failure(kind)).collect()).map_err(|failures| failures[0].kind)
+        };
+        assert_eq!(kinds(2, &[]), Ok(()));
+        assert_eq!(kinds(2, &[Kind::NoAnswer]), Err(Kind::Partial));
+        assert_eq!(kinds(2, &[Kind::NoAnswer, Kind::NoAnswer]), Err(Kind::NoAnswer));
+        assert_eq!(kinds(2, &[Kind::NoAnswer, Kind::Refused]), Err(Kind::Unexpected));
+        assert_eq!(kinds(1, &[Kind::Refused]), Err(Kind::Refused));
+    }
+}

@@ -1,0 +1,228 @@
+//! Recording without sending: what the TPDOs mean is learned from the SDO traffic of others, else taken
+//! from a description that the user names. It is never guessed.
+
+use crate::bus::Received;
+use crate::canopen::frame::Frame;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::object::ObjectId;
+use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
+use crate::canopen::sdo::{Progress, Upload};
+use crate::canopen::value::DataType;
+use crate::device::catalog::{Model, recognise};
+use crate::device::unit::Unit;
+use crate::measure::decode::{Decoder, Wanted};
+use crate::measure::instrument::{Identity, Instrument, PROCESS_VALUES, Signal, Tpdo};
+use crate::measure::survey::Overrides;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// What was seen of the nodes' object dictionaries.
+pub(super) struct Learner {
+    nodes: BTreeSet<NodeId>,
+    overrides: Overrides,
+    wanted: Vec<Wanted>,
+    known: BTreeMap<(NodeId, ObjectId), Vec<u8>>,
+    uploads: BTreeMap<NodeId, (ObjectId, Upload)>,
+    downloads: BTreeMap<NodeId, (ObjectId, Vec<u8>)>,
+    planned: BTreeSet<CanId>,
+    /// Nodes whose TPDOs came without being understood.
+    pub(super) not_understood: BTreeSet<NodeId>,
+}
+
+impl Learner {
+    pub(super) fn new(nodes: &[NodeId], overrides: &Overrides, wanted: &[Wanted]) -> Learner {
+        Learner {
+            nodes: nodes.iter().copied().collect(),
+            overrides: overrides.clone(),
+            wanted: wanted.to_vec(),
+            known: BTreeMap::new(),
+            uploads: BTreeMap::new(),
+            downloads: BTreeMap::new(),
+            planned: BTreeSet::new(),
+            not_understood: BTreeSet::new(),
+        }
+    }
+
+    /// Plans from the descriptions that the user named.
+    pub(super) fn begin(&mut self, decoder: &mut Decoder) {
+        let nodes: Vec<NodeId> = self.overrides.keys().copied().filter(|node| self.nodes.contains(node)).collect();
+        nodes.into_iter().for_each(|node| self.plan(node, decoder));
+    }
+
+    /// Takes a frame; what it teaches goes into the plans of `decoder`.
+    pub(super) fn take(&mut self, received: &Received, decoder: &mut Decoder) {
+        let frame = &received.frame;
+        if let Some(node) = frame.id().sdo_request_node() {
+            self.request(node, frame);
+        } else if let Some(node) = frame.id().sdo_response_node() {
+            if self.response(node, frame) {
+                self.plan(node, decoder);
+            }
+        } else if let Some(node) = predefined_tpdo(frame)
+            && self.nodes.contains(&node)
+            && !self.planned.contains(&frame.id())
+        {
+            self.not_understood.insert(node);
+        }
+    }
+
+    fn request(&mut self, node: NodeId, frame: &Frame) {
+        let [command, a, b, c, data @ ..] = frame.data() else { return };
+        let object = ObjectId::from_multiplexer([*a, *b, *c]);
+        match command {
+            0x40 => {
+                self.uploads.insert(node, (object, Upload::new(node, object, false)));
+            }
+            0x22 | 0x23 | 0x27 | 0x2b | 0x2f => {
+                let unused = if command & 1 == 0 { 0 } else { usize::from(command >> 2 & 3) };
+                let end = data.len().min(4 - unused);
+                self.downloads.insert(node, (object, data[..end].to_vec()));
+            }
+            0x80 => {
+                self.uploads.remove(&node);
+                self.downloads.remove(&node);
+            }
+            _ => {}
+        }
+    }
+
+    /// Whether something new is known.
+    fn response(&mut self, node: NodeId, frame: &Frame) -> bool {
+        if let (Some((object, _)), [0x60, a, b, c, ..]) = (self.downloads.get(&node), frame.data())
+            && *object == ObjectId::from_multiplexer([*a, *b, *c])
+            && let Some((object, bytes)) = self.downloads.remove(&node)
+        {
+            return self.learn(node, object, bytes);
+        }
+        // The other master sends the requests for segments; ours go nowhere.
+        let Some((object, upload)) = self.uploads.get_mut(&node) else { return false };
+        let object = *object;
+        match upload.on_frame(frame, &mut Vec::new()) {
+            Progress::Done(uploaded) => {
+                self.uploads.remove(&node);
+                self.learn(node, object, uploaded.bytes)
+            }
+            Progress::Failed(_) => {
+                self.uploads.remove(&node);
+                false
+            }
+            Progress::NotOurs | Progress::Continue => false,
+        }
+    }
+
+    fn learn(&mut self, node: NodeId, object: ObjectId, bytes: Vec<u8>) -> bool {
+        self.nodes.contains(&node) && self.known.insert((node, object), bytes.clone()) != Some(bytes)
+    }
+
+    fn number(&self, node: NodeId, object: ObjectId) -> Option<u32> {
+        let learned = self.known.get(&(node, object)).cloned();
+        let model = self.overrides.get(&node);
+        let bytes = learned.or_else(|| model.and_then(|model| model.dictionary.get(object)?.default_bytes(node)))?;
+        let mut wide = [0; 4];
+        let len = bytes.len().min(4);
+        wide[..len].copy_from_slice(&bytes[..len]);
+        Some(u32::from_le_bytes(wide))
+    }
+
+    fn byte(&self, node: NodeId, object: ObjectId) -> Option<u8> {
+        Some(self.number(node, object)?.to_le_bytes()[0])
+    }
+
+    fn text(&self, node: NodeId, object: ObjectId) -> Option<String> {
+        let bytes = self.known.get(&(node, object))?;
+        DataType::VisibleString.decode(bytes).ok().map(|value| value.to_string())
+    }
+
+    fn plan(&mut self, node: NodeId, decoder: &mut Decoder) {
+        let instrument = self.instrument(node);
+        if !instrument.tpdos.is_empty() {
+            decoder.add(&instrument, &self.wanted);
+            self.planned = decoder.can_ids().collect();
+            self.not_understood.remove(&node);
+        }
+    }
+
+    /// The node as far as it is known: only TPDOs whose identifier and whole mapping are.
+    fn instrument(&self, node: NodeId) -> Instrument {
+        let mut instrument = Instrument::new(node);
+        instrument.identity = Identity {
+            device_type: self.number(node, ObjectId::new(0x1000, 0)),
+            vendor: self.number(node, ObjectId::new(0x1018, 1)),
+            product: self.number(node, ObjectId::new(0x1018, 2)),
+            name: self.text(node, ObjectId::new(0x1008, 0)),
+            ..Identity::default()
+        };
+        let mut traits = instrument.identity.traits();
+        let answers = self.known.iter().filter(|((of, _), _)| *of == node);
+        traits.answers = answers.map(|(&(_, object), bytes)| (object, bytes.clone())).collect();
+        let model: Option<Arc<Model>> = self.overrides.get(&node).cloned().or_else(|| recognise(&traits));
+        instrument.model = model;
+        instrument.tpdos = (1..=512).filter_map(TpdoNumber::new).filter_map(|number| self.tpdo(node, number)).collect();
+        instrument.signals = self.signals(&instrument);
+        instrument
+    }
+
+    fn tpdo(&self, node: NodeId, number: TpdoNumber) -> Option<Tpdo> {
+        let cob_id = CobId(self.number(node, number.communication(1))?);
+        let count = self.byte(node, number.mapping(0)).filter(|&count| count <= 64)?;
+        let mapping: Option<Vec<MappingEntry>> =
+            (1..=count).map(|sub| self.number(node, number.mapping(sub)).map(MappingEntry::from_word)).collect();
+        let transmission = self.byte(node, number.communication(2)).map(Transmission::from_code);
+        Some(Tpdo { number, cob_id, transmission, event_timer_ms: None, mapping: mapping? })
+    }
+
+    fn signals(&self, instrument: &Instrument) -> Vec<Signal> {
+        let node = instrument.node;
+        let told = |channel| {
+            let unit = self.number(node, ObjectId::new(0x6131, channel)).map(Unit);
+            (unit, self.byte(node, ObjectId::new(0x6132, channel)))
+        };
+        let described = instrument.model.as_ref().map_or(&[][..], |model| &model.description.signals);
+        if !described.is_empty() {
+            let signal = |entry: &crate::device::description::SignalEntry| {
+                let (unit, digits) = told(entry.channel);
+                Signal {
+                    name: entry.name.clone(),
+                    channel: entry.channel,
+                    value: (entry.value, instrument.data_type(entry.value, 32)),
+                    also: entry.also.clone(),
+                    status: entry.status,
+                    marker: entry.marker,
+                    unit,
+                    digits,
+                }
+            };
+            return described.iter().map(signal).collect();
+        }
+        let entries = instrument.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
+        let values = entries.filter(|entry| PROCESS_VALUES.iter().any(|&(index, _)| index == entry.object.index));
+        let mut signals: Vec<Signal> = values
+            .map(|entry| {
+                let channel = entry.object.sub;
+                let (unit, digits) = told(channel);
+                Signal {
+                    name: format!("ch{channel}"),
+                    channel,
+                    value: (entry.object, instrument.data_type(entry.object, entry.bits)),
+                    also: Vec::new(),
+                    status: Some(ObjectId::new(0x6150, channel)),
+                    marker: false,
+                    unit,
+                    digits,
+                }
+            })
+            .collect();
+        signals.dedup_by_key(|signal| signal.channel);
+        signals
+    }
+}
+
+/// The node whose predefined TPDO identifier this is: it only tells that something was not understood.
+fn predefined_tpdo(frame: &Frame) -> Option<NodeId> {
+    match frame.id() {
+        CanId::Standard(id) if matches!(id & 0x780, 0x180 | 0x280 | 0x380 | 0x480) && !frame.is_remote() => {
+            NodeId::new((id & 0x7f) as u8).ok()
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,117 @@
+//! Which nodes a recording started, and what it has to put back.
+
+use super::{Mode, Plan};
+use crate::bus::BusError;
+use crate::canopen::id::NodeId;
+use crate::canopen::nmt::{Life, NmtCommand, NmtState};
+use crate::master::{Error, Happening, Master};
+use crate::measure::instrument::Instrument;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// A heartbeat slower than this is not waited for: the node's state counts as unknown.
+const SLOWEST_HEARTBEAT: Duration = Duration::from_secs(2);
+
+/// The nodes started, and their states before.
+#[derive(Debug, Default)]
+pub(super) struct States {
+    started: BTreeMap<NodeId, Option<NmtState>>,
+}
+
+impl States {
+    /// Starts the nodes that are not known to be operational.
+    pub(super) fn start(
+        &mut self,
+        master: &mut Master<'_>,
+        instruments: &[Instrument],
+        plan: &Plan,
+    ) -> Result<(), Error> {
+        if !plan.nmt || matches!(plan.mode, Mode::Poll(_) | Mode::Passive) {
+            return Ok(());
+        }
+        let known = heartbeats(master, instruments)?;
+        for instrument in instruments {
+            let before = known.get(&instrument.node).copied();
+            if before != Some(NmtState::Operational) {
+                self.started.insert(instrument.node, before);
+                master.send(NmtCommand::Start.frame(Some(instrument.node)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a sign of life; `true` when the node has restarted. It is started again only if this recording
+    /// had started it.
+    pub(super) fn take(&mut self, node: NodeId, life: Life, master: &mut Master<'_>) -> bool {
+        if life != Life::BootUp {
+            return false;
+        }
+        if self.started.contains_key(&node) {
+            master.send(NmtCommand::Start.frame(Some(node)));
+        }
+        true
+    }
+
+    /// Returns every node whose state was known to that state.
+    pub(super) fn restore(&mut self, master: &mut Master<'_>) -> Result<(), Error> {
+        master.cancel();
+        for (&node, &before) in &self.started {
+            let command = match before {
+                Some(NmtState::PreOperational) => NmtCommand::EnterPreOperational,
+                Some(NmtState::Stopped) => NmtCommand::Stop,
+                _ => continue,
+            };
+            master.send(command.frame(Some(node)));
+        }
+        while master.is_sending() {
+            let until = master.now() + Duration::from_millis(10);
+            if let Happening::Link(false) = master.next(until)? {
+                return Err(Error::Bus(BusError::Down(master.bus().name().to_owned())));
+            }
+        }
+        Ok(())
+    }
+
+    /// What was switched and stays so, in words.
+    pub(super) fn remarks(&self) -> Vec<String> {
+        let unknown: Vec<String> =
+            self.started.iter().filter(|(_, before)| before.is_none()).map(|(node, _)| node.to_string()).collect();
+        match unknown.as_slice() {
+            [] => Vec::new(),
+            [one] => vec![format!("node {one} was started; its state before is not known, so it stays operational")],
+            _ => vec![format!(
+                "nodes {} were started; their states before are not known, so they stay operational",
+                unknown.join(", ")
+            )],
+        }
+    }
+}
+
+/// The states that heartbeats tell, waited for as long as the slowest of them needs.
+fn heartbeats(master: &mut Master<'_>, instruments: &[Instrument]) -> Result<BTreeMap<NodeId, NmtState>, Error> {
+    let period = |instrument: &Instrument| {
+        let period = Duration::from_millis(u64::from(instrument.heartbeat_ms?));
+        (!period.is_zero() && period <= SLOWEST_HEARTBEAT).then_some(period)
+    };
+    let expected: BTreeMap<NodeId, Duration> =
+        instruments.iter().filter_map(|instrument| Some((instrument.node, period(instrument)?))).collect();
+    let mut known = BTreeMap::new();
+    let Some(longest) = expected.values().max() else { return Ok(known) };
+    let until = master.now() + *longest * 3 / 2;
+    while known.len() < expected.len() {
+        match master.next(until)? {
+            Happening::Frame(received) => {
+                if let Some((node, Life::State(state))) = Life::parse(&received.frame)
+                    && expected.contains_key(&node)
+                {
+                    known.insert(node, state);
+                }
+            }
+            Happening::Deadline => break,
+            Happening::Interrupted => return Err(Error::Interrupted),
+            Happening::Link(false) => return Err(Error::Bus(BusError::Down(master.bus().name().to_owned()))),
+            Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {}
+        }
+    }
+    Ok(known)
+}

@@ -1,0 +1,9 @@
+//! The procedures that users think in. They return reports and print nothing.
+
+pub mod failure;
+pub mod log;
+pub mod nmt;
+pub mod read;
+pub mod scan;
+
+pub use failure::{Failure, Kind};

@@ -1,0 +1,189 @@
+//! Reads measured values by SDO, once.
+
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::{DataType, Value};
+use crate::device::unit::Unit;
+use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
+use crate::measure::decode::{Reading, Wanted, source};
+use crate::measure::instrument::{Instrument, Signal};
+use crate::measure::sample::{Sample, Source};
+use crate::measure::survey::{Overrides, instruments};
+use crate::tasks::{Failure, Kind};
+
+/// One thing to be read of a node: how, and what it is.
+#[derive(Clone, Debug)]
+pub struct Target {
+    /// What the sample is of.
+    pub source: Source,
+    /// The unit, for conversion.
+    pub unit: Option<Unit>,
+    /// The object read.
+    pub object: ObjectId,
+    /// 6150h, read along.
+    pub status: Option<ObjectId>,
+    /// How the bytes become a sample.
+    pub reading: Reading,
+}
+
+/// The targets of an instrument: what was asked for, or every signal.
+///
+/// # Errors
+/// A signal that the device does not have, with the ones it has.
+pub fn targets(instrument: &Instrument, wanted: &[Wanted], number: &mut usize) -> Result<Vec<Target>, Failure> {
+    let all: Vec<Wanted> = instrument.signals.iter().map(|signal| Wanted::Signal(signal.name.clone())).collect();
+    let wanted = if wanted.is_empty() { &all } else { wanted };
+    if wanted.is_empty() {
+        return Err(Failure::of_node(Kind::Unexpected, instrument.node, "it has no measured value of CiA 404")
+            .hint(format!("read an object as it is: cangauge sdo read {} 0x1000", instrument.node)));
+    }
+    let mut take = || {
+        *number += 1;
+        *number - 1
+    };
+    wanted
+        .iter()
+        .map(|item| {
+            Ok(match item {
+                Wanted::Signal(name) => {
+                    let signal = find(instrument, name)?;
+                    let (object, data_type) = signal.value;
+                    Target {
+                        source: source(instrument.node, name, Some(signal)),
+                        unit: signal.unit,
+                        object,
+                        status: signal.status,
+                        reading: Reading::of_signal(signal, data_type, take()),
+                    }
+                }
+                Wanted::Status(name) => {
+                    let object = find(instrument, name)?.status.ok_or_else(|| {
+                        Failure::of_node(Kind::Unexpected, instrument.node, format!("{name} has no status object"))
+                    })?;
+                    plain(instrument, object, &format!("{name}.status"), take())
+                }
+                Wanted::Object(object) => plain(instrument, *object, &object.to_string(), take()),
+            })
+        })
+        .collect()
+}
+
+fn plain(instrument: &Instrument, object: ObjectId, name: &str, number: usize) -> Target {
+    let entry = instrument.model.as_ref().and_then(|model| model.dictionary.get(object));
+    let data_type = entry.map(|entry| entry.data_type).unwrap_or_else(|| match object.index {
+        0x6150 => DataType::Unsigned(1),
+        _ => instrument.data_type(object, 32),
+    });
+    Target {
+        source: source(instrument.node, name, None),
+        unit: None,
+        object,
+        status: None,
+        reading: Reading::plain(data_type, number),
+    }
+}
+
+fn find<'a>(instrument: &'a Instrument, name: &str) -> Result<&'a Signal, Failure> {
+    instrument.signals.iter().find(|signal| signal.name == name).ok_or_else(|| {
+        let names: Vec<&str> = instrument.signals.iter().map(|signal| signal.name.as_str()).collect();
+        let message = format!("it has no signal \"{name}\"");
+        let failure = Failure::of_node(Kind::Usage, instrument.node, message);
+        if names.is_empty() { failure } else { failure.hint(format!("it has: {}", names.join(", "))) }
+    })
+}
+
+/// A sample out of the answers to a target's reads.
+///
+/// # Errors
+/// The value's own failure. A status that the device refuses is a device without status.
+pub fn sample(
+    target: &Target,
+    value: Result<Answer, SdoError>,
+    status: Option<Result<Answer, SdoError>>,
+) -> Result<Sample, SdoError> {
+    let node = target.source.node;
+    let answer = value?;
+    let (number, _) = answer.value(node, target.object, Some(target.reading.data_type()))?;
+    let bits = match status {
+        None | Some(Err(SdoError { failure: SdoFailure::Refused(_), .. })) => None,
+        Some(Err(error)) => return Err(error),
+        Some(Ok(answer)) => {
+            let object = target.status.unwrap_or(target.object);
+            answer.value(node, object, Some(DataType::Unsigned(1)))?.0.as_u64()
+        }
+    };
+    let bytes = wire_bytes(&number, target.reading.data_type());
+    target.reading.sample(answer.at, &bytes, bits).ok_or(SdoError {
+        node,
+        object: target.object,
+        operation: crate::master::Operation::Read,
+        failure: SdoFailure::NotANumber,
+    })
+}
+
+/// The value's bytes in the width of its type: an answer may have had more or fewer.
+fn wire_bytes(value: &Value, data_type: DataType) -> Vec<u8> {
+    let width = data_type.width().unwrap_or(8).min(8);
+    match value {
+        Value::Bool(bit) => vec![u8::from(*bit)],
+        Value::Unsigned(number) => number.to_le_bytes()[..width].to_vec(),
+        Value::Integer(number) => number.to_le_bytes()[..width].to_vec(),
+        Value::Real32(number) => number.to_le_bytes().to_vec(),
+        Value::Real64(number) => number.to_le_bytes().to_vec(),
+        Value::Text(_) | Value::Bytes(_) | Value::TimeOfDay(_) | Value::TimeDifference(_) => Vec::new(),
+    }
+}
+
+/// The requests for a target: its value, and its status.
+pub fn requests(target: &Target) -> Vec<Request> {
+    let objects = [Some(target.object), target.status];
+    objects.into_iter().flatten().map(|object| Request::read(target.source.node, object)).collect()
+}
+
+/// Reads measured values of several nodes, side by side. One result a node: its targets with their
+/// samples, or why there is none.
+///
+/// # Errors
+/// What stops everything.
+pub fn read(
+    master: &mut Master<'_>,
+    nodes: &[NodeId],
+    wanted: &[Wanted],
+    overrides: &Overrides,
+) -> Result<Vec<Result<Vec<(Target, Sample)>, Failure>>, Error> {
+    let mut results = Vec::new();
+    for &node in nodes {
+        results.push(match instruments(master, &[node], overrides) {
+            Ok(surveyed) => match surveyed.first() {
+                Some(instrument) => read_one(master, instrument, wanted)?,
+                None => Ok(Vec::new()),
+            },
+            Err(Error::Sdo(error)) => Err(error.into()),
+            Err(error) => return Err(error),
+        });
+    }
+    Ok(results)
+}
+
+fn read_one(
+    master: &mut Master<'_>,
+    instrument: &Instrument,
+    wanted: &[Wanted],
+) -> Result<Result<Vec<(Target, Sample)>, Failure>, Error> {
+    let targets = match targets(instrument, wanted, &mut 0) {
+        Ok(targets) => targets,
+        Err(failure) => return Ok(Err(failure)),
+    };
+    let asked = targets.iter().flat_map(requests).collect();
+    let mut answers = master.transfer(asked, &mut |_| {})?.into_iter();
+    let mut samples = Vec::new();
+    for target in targets {
+        let Some(value) = answers.next() else { break };
+        let status = if target.status.is_some() { answers.next() } else { None };
+        match sample(&target, value, status) {
+            Ok(sample) => samples.push((target, sample)),
+            Err(error) => return Ok(Err(error.into())),
+        }
+    }
+    Ok(Ok(samples))
+}

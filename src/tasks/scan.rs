@@ -1,0 +1,207 @@
+//! Finds who is on the bus.
+
+use crate::bus::{Filters, Received};
+use crate::canopen::emcy::Emergency;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::nmt::{Life, NmtState};
+use crate::canopen::object::ObjectId;
+use crate::master::{Error, Happening, Master, Request, SdoFailure, Ticket};
+use crate::measure::instrument::Instrument;
+use crate::measure::survey::{Overrides, recognised};
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+/// A node that was found.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Its node-ID.
+    pub node: NodeId,
+    /// Its state, where a heartbeat told it.
+    pub state: Option<NmtState>,
+    /// What it says of itself, as far as it was asked, and its description.
+    pub instrument: Instrument,
+    /// Why its identity could not be read.
+    pub failure: Option<crate::tasks::Failure>,
+}
+
+const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
+
+/// How long after the first round of requests the silent nodes are asked once more.
+const SECOND_ROUND: Duration = Duration::from_millis(50);
+
+/// Asks every node for its device type, all side by side, and reads the identity of those that answer.
+///
+/// A heartbeat or boot-up shows a node too, one that cannot answer (stopped) included. The silent ones are
+/// asked `rounds` times in all; the wait after the last request is `wait`.
+///
+/// # Errors
+/// What stops everything. Nobody there is an empty list.
+pub fn scan(
+    master: &mut Master<'_>,
+    nodes: &[NodeId],
+    wait: Duration,
+    rounds: u32,
+    overrides: &Overrides,
+) -> Result<Vec<Found>, Error> {
+    let mut seen = Seen::default();
+    let mut open: BTreeMap<Ticket, NodeId> = BTreeMap::new();
+    for round in 0..rounds.max(1) {
+        let last = round + 1 == rounds.max(1);
+        for &node in nodes.iter().filter(|node| !seen.answered.contains(node)) {
+            let request = Request::read(node, DEVICE_TYPE).once().within(wait);
+            open.insert(master.start(request), node);
+        }
+        let mut until = master.now() + SECOND_ROUND;
+        loop {
+            let far = until + wait * 10 + Duration::from_secs(10);
+            match master.next(if last { far } else { until })? {
+                Happening::Sdo(ticket, result) => {
+                    let answered = match &result {
+                        Ok(_) => true,
+                        Err(error) => !matches!(error.failure, SdoFailure::NoAnswer { .. } | SdoFailure::Cancelled),
+                    };
+                    if let Some(node) = open.remove(&ticket)
+                        && answered
+                    {
+                        seen.answered.insert(node);
+                    }
+                }
+                Happening::Frame(received) => seen.take(&received),
+                Happening::Deadline => {
+                    // The first round's requests may still be going out on a slow bus.
+                    if master.is_sending() {
+                        until = until + SECOND_ROUND;
+                        continue;
+                    }
+                    break;
+                }
+                Happening::Interrupted => return Err(Error::Interrupted),
+                Happening::Link(false) => {
+                    return Err(Error::Bus(crate::bus::BusError::Down(master.bus().name().to_owned())));
+                }
+                Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {}
+            }
+            if last && open.is_empty() {
+                break;
+            }
+        }
+        if last {
+            break;
+        }
+        master.forget(open.keys().copied());
+        open.clear();
+    }
+    let wanted: BTreeSet<NodeId> = nodes.iter().copied().collect();
+    describe(master, &seen, &wanted, overrides)
+}
+
+fn describe(
+    master: &mut Master<'_>,
+    seen: &Seen,
+    wanted: &BTreeSet<NodeId>,
+    overrides: &Overrides,
+) -> Result<Vec<Found>, Error> {
+    let present: BTreeSet<NodeId> = seen.answered.iter().chain(seen.states.keys()).copied().collect();
+    let mut found = Vec::new();
+    let answering: Vec<NodeId> = seen.answered.iter().copied().filter(|node| wanted.contains(node)).collect();
+    let mut instruments: BTreeMap<NodeId, Result<Instrument, crate::tasks::Failure>> = BTreeMap::new();
+    match recognised(master, &answering, overrides) {
+        Ok(all) => instruments.extend(all.into_iter().map(|instrument| (instrument.node, Ok(instrument)))),
+        Err(Error::Sdo(_)) => {
+            // One of them falls silent in the middle: each for itself, so that the others are described.
+            for &node in &answering {
+                let alone = match recognised(master, &[node], overrides) {
+                    Ok(mut all) => all.pop().ok_or_else(|| unreadable(node)),
+                    Err(Error::Sdo(error)) => Err(error.into()),
+                    Err(error) => return Err(error),
+                };
+                instruments.insert(node, alone);
+            }
+        }
+        Err(error) => return Err(error),
+    }
+    for node in present.into_iter().filter(|node| wanted.contains(node)) {
+        let (instrument, failure) = match instruments.remove(&node) {
+            Some(Ok(instrument)) => (instrument, None),
+            Some(Err(failure)) => (Instrument::new(node), Some(failure)),
+            None => (Instrument::new(node), None),
+        };
+        found.push(Found { node, state: seen.states.get(&node).copied().flatten(), instrument, failure });
+    }
+    Ok(found)
+}
+
+fn unreadable(node: NodeId) -> crate::tasks::Failure {
+    crate::tasks::Failure::of_node(crate::tasks::Kind::Unexpected, node, "its identity could not be read")
+}
+
+/// Listens for `length` without sending anything.
+///
+/// # Errors
+/// What stops everything.
+pub fn listen(master: &mut Master<'_>, nodes: &[NodeId], length: Duration) -> Result<Vec<Found>, Error> {
+    master.listen(&Filters::All)?;
+    let wanted: BTreeSet<NodeId> = nodes.iter().copied().collect();
+    let mut seen = Seen::default();
+    let until = master.now() + length;
+    loop {
+        match master.next(until)? {
+            Happening::Frame(received) => seen.take_any(&received),
+            Happening::Deadline => break,
+            Happening::Interrupted => break,
+            Happening::Link(false) => {
+                return Err(Error::Bus(crate::bus::BusError::Down(master.bus().name().to_owned())));
+            }
+            Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {}
+        }
+    }
+    let present: BTreeSet<NodeId> = seen.answered.iter().chain(seen.states.keys()).copied().collect();
+    Ok(present
+        .into_iter()
+        .filter(|node| wanted.contains(node))
+        .map(|node| Found {
+            node,
+            state: seen.states.get(&node).copied().flatten(),
+            instrument: Instrument::new(node),
+            failure: None,
+        })
+        .collect())
+}
+
+#[derive(Default)]
+struct Seen {
+    answered: BTreeSet<NodeId>,
+    /// Who showed itself by heartbeat or boot-up, and in which state.
+    states: BTreeMap<NodeId, Option<NmtState>>,
+}
+
+impl Seen {
+    fn take(&mut self, received: &Received) {
+        match Life::parse(&received.frame) {
+            Some((node, Life::State(state))) => {
+                self.states.insert(node, Some(state));
+            }
+            Some((node, Life::BootUp)) => {
+                self.states.entry(node).or_insert(None);
+            }
+            None => {}
+        }
+    }
+
+    /// Everything that shows a node, by the predefined connection set: who only listens has nothing better.
+    fn take_any(&mut self, received: &Received) {
+        self.take(received);
+        let frame = &received.frame;
+        let id = frame.id();
+        let emergency = id.emergency_node().filter(|_| Emergency::parse(frame).is_some());
+        let tpdo = match id {
+            CanId::Standard(number) if matches!(number & 0x780, 0x180 | 0x280 | 0x380 | 0x480) => {
+                NodeId::new((number & 0x7f) as u8).ok()
+            }
+            _ => None,
+        };
+        if let (Some(node), false) = (id.sdo_response_node().or(emergency).or(tpdo), frame.is_remote()) {
+            self.states.entry(node).or_insert(None);
+        }
+    }
+}

@@ -1,0 +1,216 @@
+"""Measuring devices on a CAN bus, made with python-canopen: the foreign devices of cangauge's tests.
+
+    device.py [--record FILE] [--period MS] [--sync N] [--heartbeat MS] IFACE NODE:KIND...
+
+KIND is real32 (pressure in bar as REAL32 with a status byte) or integer (pressure in psi as
+INTEGER32 with three digits). Each sends TPDO 1 while OPERATIONAL, every --period ms (50), or with
+--sync N on every N-th SYNC. Prints "ready" once all have booted, and ends on SIGTERM.
+
+The n-th value that a node sends is known beforehand: n counts from 0 since the start of this
+program and wraps at 4096; real32 sends n * 0.25 - 100 bar, integer sends n * 7 - 5000 (thousandths
+of psi). --record writes "NODE,N,VALUE" for every TPDO, the value as it stands in the PDO, just
+before it is sent.
+"""
+
+import argparse
+import signal
+import sys
+import threading
+import time
+
+import canopen
+from canopen import objectdictionary as od
+
+from dictionary import channels, record, variable
+
+BAR, PSI = 0x004E0000, 0x00AB0000
+WRAP = 4096
+
+
+class Kind:
+    """What distinguishes the kinds of devices."""
+
+    def __init__(self, name, index, bits, product, unit, digits, value):
+        self.name, self.index, self.bits, self.product = name, index, bits, product
+        self.unit, self.digits, self.value = unit, digits, value
+
+    def physical(self, number):
+        """The value in the unit of the device."""
+        value = self.value(number)
+        return value if self.index == 0x6130 else value / 10**self.digits
+
+
+KINDS = {
+    "real32": Kind("python-canopen pressure transmitter", 0x6130, 32, 1, BAR, 2, lambda n: n * 0.25 - 100),
+    "integer": Kind("python-canopen pressure switch", 0x9130, 32, 2, PSI, 3, lambda n: n * 7 - 5000),
+}
+
+
+def dictionary(kind, node, arguments):
+    """The object dictionary of a device."""
+    sync = 1 <= arguments.sync <= 240
+    mapping = [kind.index << 16 | 1 << 8 | kind.bits] + ([0x61500108] if kind.index == 0x6130 else [])
+    result = od.ObjectDictionary()
+    for entry in [
+        # Profile 404, additional information: analogue inputs.
+        variable("Device type", 0x1000, 0, od.UNSIGNED32, 0x00020194, "ro"),
+        variable("Error register", 0x1001, 0, od.UNSIGNED8, 0, "ro"),
+        variable("COB-ID SYNC", 0x1005, 0, od.UNSIGNED32, 0x80),
+        # More than four bytes: segmented.
+        variable("Device name", 0x1008, 0, od.VISIBLE_STRING, kind.name, "const"),
+        variable("Hardware version", 0x1009, 0, od.VISIBLE_STRING, "A", "const"),
+        variable("Software version", 0x100A, 0, od.VISIBLE_STRING, canopen.__version__, "const"),
+        variable("Producer heartbeat time", 0x1017, 0, od.UNSIGNED16, arguments.heartbeat),
+        channels("Identity", 0x1018, od.UNSIGNED32, [0x1234, kind.product, 0x00020004, 1000 + node]),
+        record("TPDO 1 parameters", 0x1800, [
+            (0, od.UNSIGNED8, 5, "const"),
+            (1, od.UNSIGNED32, 0x40000180 + node, "rw"),
+            (2, od.UNSIGNED8, arguments.sync if sync else 254, "rw"),
+            (3, od.UNSIGNED16, 0, "rw"),
+            (5, od.UNSIGNED16, 0 if sync else arguments.period, "rw"),
+        ]),
+        record("TPDO 1 mapping", 0x1A00, [(0, od.UNSIGNED8, len(mapping), "rw")]
+               + [(n, od.UNSIGNED32, entry, "rw") for n, entry in enumerate(mapping + [0, 0], start=1)]),
+        channels("AI sensor type", 0x6110, od.UNSIGNED16, [90]),
+        channels("AI input PV REAL32", 0x6130, od.REAL32, [kind.physical(0)]),
+        channels("AI physical unit", 0x6131, od.UNSIGNED32, [kind.unit]),
+        channels("AI decimal digits", 0x6132, od.UNSIGNED8, [kind.digits], "rw"),
+        channels("AI status", 0x6150, od.UNSIGNED8, [0]),
+        channels("AI input PV INTEGER32", 0x9130, od.INTEGER32, [round(kind.physical(0) * 10**kind.digits)]),
+    ]:
+        result.add_object(entry)
+    return result
+
+
+class Device:
+    """One node: what python-canopen's LocalNode leaves to its user."""
+
+    def __init__(self, network, node, kind, arguments, log):
+        self.kind, self.log = kind, log
+        self.node = canopen.LocalNode(node, dictionary(kind, node, arguments))
+        self.lock = threading.RLock()
+        self.number = 0
+        self.syncs = 0
+        self.configured = False
+        network.add_node(self.node)
+        self.node.add_read_callback(self.on_read)
+        self.node.add_write_callback(self.on_write)
+        network.subscribe(0x000, self.on_nmt)
+        network.subscribe(0x080, self.on_sync)
+
+    def boot(self):
+        """Sends the boot-up message and becomes pre-operational; the heartbeat starts."""
+        self.node.nmt.state = "INITIALISING"
+        self.node.nmt.state = "PRE-OPERATIONAL"
+
+    def on_nmt(self, _can_id, data, _timestamp):
+        # LocalNode notes the reset and does nothing about it.
+        if len(data) >= 2 and data[0] in (129, 130) and data[1] in (0, self.node.id):
+            with self.lock:
+                self.node.data_store.clear()
+                self.configured = False
+                self.syncs = 0
+            self.boot()
+
+    def on_read(self, index, subindex, **_):
+        with self.lock:
+            if subindex == 1 and index == 0x6130:
+                return self.kind.physical(self.number)
+            if subindex == 1 and index == 0x9130:
+                return round(self.kind.physical(self.number) * 10**self.kind.digits)
+        return None
+
+    def on_write(self, index, **_):
+        if 0x1800 <= index < 0x1B00:
+            self.configured = False
+
+    def tpdo(self):
+        """TPDO 1 with its present parameters."""
+        tpdo = self.node.tpdo[1]
+        if not self.configured:
+            self.configured = True
+            # Reading subscribes to the COB-ID, which is a device's own here.
+            tpdo.read()
+            self.node.network.unsubscribe(tpdo.cob_id)
+        return tpdo
+
+    def transmit(self, tpdo):
+        """Sends TPDO 1 with the next value."""
+        for entry in tpdo.map:
+            if entry.index == self.kind.index:
+                entry.raw = self.kind.value(self.number)
+            else:
+                entry.raw = self.node.sdo[entry.index][entry.subindex].raw
+        if self.log:
+            print(self.node.id, self.number, self.kind.value(self.number), sep=",", file=self.log, flush=True)
+        tpdo.transmit()
+        self.number = (self.number + 1) % WRAP
+
+    def on_sync(self, _can_id, _data, _timestamp):
+        with self.lock:
+            tpdo = self.tpdo()
+            if self.node.nmt.state == "OPERATIONAL" and tpdo.enabled and 1 <= tpdo.trans_type <= 240:
+                self.syncs += 1
+                if self.syncs % tpdo.trans_type == 0:
+                    self.transmit(tpdo)
+
+    def tick(self):
+        """Sends when the event timer says so; the time until it should be asked again."""
+        with self.lock:
+            tpdo = self.tpdo()
+            if self.node.nmt.state != "OPERATIONAL" or not tpdo.enabled or tpdo.trans_type < 254 or not tpdo.event_timer:
+                return 0.01
+            self.transmit(tpdo)
+            return tpdo.event_timer / 1000
+
+
+def run_timer(device, stop):
+    """The event timer of a device, without drift."""
+    due = time.monotonic()
+    while not stop.wait(max(0, due - time.monotonic())):
+        due = max(due, time.monotonic() - 1) + device.tick()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--record", metavar="FILE")
+    parser.add_argument("--period", metavar="MS", type=int, default=50)
+    parser.add_argument("--sync", metavar="N", type=int, default=0)
+    parser.add_argument("--heartbeat", metavar="MS", type=int, default=0)
+    parser.add_argument("interface", metavar="IFACE")
+    parser.add_argument("nodes", metavar="NODE:KIND", nargs="+")
+    arguments = parser.parse_args()
+
+    # Waited for below; blocked here so that every thread started from here on inherits that.
+    ends = {signal.SIGTERM, signal.SIGINT}
+    signal.pthread_sigmask(signal.SIG_BLOCK, ends)
+    log = open(arguments.record, "w", encoding="ascii") if arguments.record else None
+    network = canopen.Network()
+    network.connect(interface="socketcan", channel=arguments.interface)
+    stop = threading.Event()
+    try:
+        devices = []
+        for text in arguments.nodes:
+            node, kind = text.split(":")
+            devices.append(Device(network, int(node, 0), KINDS[kind], arguments, log))
+        timers = [threading.Thread(target=run_timer, args=(device, stop)) for device in devices]
+        for device in devices:
+            device.boot()
+        for timer in timers:
+            timer.start()
+        print("ready", flush=True)
+        signal.sigwait(ends)
+        stop.set()
+        for timer in timers:
+            timer.join()
+        for device in devices:
+            device.node.nmt.stop_heartbeat()
+    finally:
+        stop.set()
+        network.disconnect()
+        if log:
+            log.close()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,136 @@
+//! Interfaces that are missing, down, come back; signals; deadlines.
+
+use crate::{Can, ahead, assert_nothing_more, frame, next, next_frame, run};
+use cangauge::bus::socketcan::SocketCan;
+use cangauge::bus::{Bus, BusError, Event, Mono};
+use std::time::Duration;
+
+fn refused(name: &str) -> BusError {
+    match SocketCan::open(name) {
+        Err(error) => error,
+        Ok(_) => panic!("{name} could be opened"),
+    }
+}
+
+#[test]
+#[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
+fn why_an_interface_cannot_be_opened() {
+    let can = Can::get();
+    for name in ["nosuchcan", "", "a-name-longer-than-any-interface", "a/b"] {
+        assert!(matches!(refused(name), BusError::NoInterface(of) if of == name), "{name}");
+    }
+    assert!(matches!(refused("lo"), BusError::NotCan(of) if of == "lo"));
+    can.switch("down");
+    assert!(matches!(refused(&can.name), BusError::Down(of) if of == can.name));
+    can.switch("up");
+    can.open();
+}
+
+#[test]
+#[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
+fn the_link_goes_down_and_comes_back() {
+    let can = Can::get();
+    let (mut bus, mut other) = (can.open(), can.open());
+    can.switch("down");
+    assert_eq!(next(&mut bus), Event::Link(false));
+    assert_nothing_more(&mut bus);
+    assert!(matches!(bus.send(&frame("000#8000")), Err(BusError::Down(of)) if of == can.name));
+    // The one who sends first learns of it by sending, and is told all the same.
+    assert!(matches!(other.send(&frame("000#8000")), Err(BusError::Down(_))));
+    assert_eq!(next(&mut other), Event::Link(false));
+    can.switch("up");
+    assert_eq!(next(&mut bus), Event::Link(true));
+    other.send(&frame("181#01")).unwrap();
+    assert_eq!(next_frame(&mut bus), "181#01");
+    assert_nothing_more(&mut bus);
+    bus.send(&frame("182#02")).unwrap();
+    assert_eq!(next(&mut other), Event::Link(true));
+    assert_eq!(next_frame(&mut other), "182#02");
+}
+
+#[test]
+#[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
+fn down_and_up_between_two_looks() {
+    let can = Can::get();
+    let (mut bus, mut other) = (can.open(), can.open());
+    can.switch("down");
+    can.switch("up");
+    assert!(matches!(other.send(&frame("181#01")), Err(BusError::Down(_))), "the news comes with the first call");
+    other.send(&frame("181#01")).unwrap();
+    assert_eq!(next(&mut bus), Event::Link(false));
+    assert_eq!(next(&mut bus), Event::Link(true));
+    assert_eq!(next_frame(&mut bus), "181#01");
+}
+
+#[test]
+#[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
+fn an_interface_that_is_removed() {
+    let _can = Can::get();
+    run("ip", &["link", "add", "dev", "gone0", "type", "vcan"]);
+    run("ip", &["link", "set", "gone0", "up"]);
+    let mut bus = SocketCan::open("gone0").unwrap();
+    run("ip", &["link", "del", "gone0"]);
+    let mut events = Vec::new();
+    let deadline = ahead(&bus, 20_000);
+    let error = loop {
+        match bus.receive(deadline) {
+            Ok(Event::Timeout) => panic!("no error within 20 s after {events:?}"),
+            Ok(event) => events.push(event),
+            Err(error) => break error,
+        }
+    };
+    assert!(matches!(&error, BusError::NoInterface(of) if of == "gone0"), "{error:?}");
+    assert!(events.iter().all(|event| *event == Event::Link(false)), "{events:?}");
+    assert!(matches!(bus.send(&frame("080#")), Err(BusError::NoInterface(_))));
+}
+
+#[test]
+#[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
+fn never_before_the_deadline() {
+    let can = Can::get();
+    let mut bus = can.open();
+    for micros in [0, 1, 300, 900, 1000, 1700, 10_300, 50_000] {
+        let deadline = bus.now().mono + Duration::from_micros(micros);
+        assert_eq!(bus.receive(deadline).unwrap(), Event::Timeout);
+        let late = bus.now().mono.since(deadline);
+        assert!(bus.now().mono >= deadline);
+        // Says only that the wait is not counted in whole seconds: machines are slow at times.
+        assert!(late < Duration::from_secs(2), "{micros} µs became {late:?} more");
+    }
+    assert_eq!(bus.receive(Mono::START).unwrap(), Event::Timeout);
+}
+
+#[test]
+#[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
+fn what_is_there_comes_with_a_deadline_in_the_past() {
+    let can = Can::get();
+    let (mut sender, mut bus) = (can.open(), can.open());
+    assert_nothing_more(&mut bus);
+    sender.send(&frame("181#01")).unwrap();
+    assert!(matches!(bus.receive(Mono::START).unwrap(), Event::Frame(_)));
+    assert_eq!(bus.receive(Mono::START).unwrap(), Event::Timeout);
+}
+
+#[test]
+#[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
+fn a_signal_ends_a_wait_once() {
+    let can = Can::get();
+    let (mut bus, mut other) = (can.open(), can.open());
+    let raise = || signal_hook::low_level::raise(signal_hook::consts::SIGINT);
+    let raiser = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(50));
+        raise()
+    });
+    assert_eq!(next(&mut bus), Event::Interrupted);
+    raiser.join().unwrap().unwrap();
+    assert_nothing_more(&mut bus);
+    // The bus stays in use for tidying up.
+    bus.send(&frame("000#8000")).unwrap();
+    raise().unwrap();
+    assert_eq!(next(&mut bus), Event::Interrupted);
+    assert_nothing_more(&mut bus);
+    // Another bus of the same process is told too, of both.
+    assert_eq!(next(&mut other), Event::Interrupted);
+    assert_eq!(next(&mut other), Event::Interrupted);
+    assert_eq!(next_frame(&mut other), "000#8000");
+}

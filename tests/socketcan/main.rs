@@ -1,0 +1,85 @@
+//! The SocketCAN transport on a real kernel.
+//!
+//! These tests need a virtual CAN interface of their own, which they take down and flood, and root.
+//! `tests/socketcan/vcan` provides both on any Linux machine:
+//!
+//! ```text
+//! tests/socketcan/run
+//! ```
+#![cfg(target_os = "linux")]
+
+mod frames;
+mod link;
+mod load;
+
+use cangauge::bus::socketcan::SocketCan;
+use cangauge::bus::{Bus, Event, Mono};
+use cangauge::canopen::frame::Frame;
+use std::process::Command;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// The interface of these tests, for one test at a time.
+struct Can {
+    name: String,
+    _alone: MutexGuard<'static, ()>,
+}
+
+impl Can {
+    fn get() -> Can {
+        static ALONE: Mutex<()> = Mutex::new(());
+        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let name = std::env::var("CANGAUGE_TEST_CAN")
+            .expect("CANGAUGE_TEST_CAN names the CAN interface to test with; tests/socketcan/run sets it");
+        // A test that failed may have left it down.
+        run("ip", &["link", "set", &name, "up"]);
+        Can { name, _alone: alone }
+    }
+
+    fn open(&self) -> SocketCan {
+        SocketCan::open(&self.name).unwrap()
+    }
+
+    fn switch(&self, direction: &str) {
+        run("ip", &["link", "set", &self.name, direction]);
+    }
+
+    /// Sends with can-utils what our own side cannot.
+    fn cansend(&self, frame: &str) {
+        run("cansend", &[&self.name, frame]);
+    }
+}
+
+fn run(program: &str, arguments: &[&str]) {
+    let status = Command::new(program).args(arguments).status().unwrap();
+    assert!(status.success(), "{program} {arguments:?}: {status}");
+}
+
+fn frame(text: &str) -> Frame {
+    text.parse().unwrap()
+}
+
+/// A deadline this many milliseconds ahead.
+fn ahead(bus: &dyn Bus, millis: u64) -> Mono {
+    bus.now().mono + Duration::from_millis(millis)
+}
+
+/// The next event within a time in which it has to come, however slow the machine.
+fn next(bus: &mut dyn Bus) -> Event {
+    let deadline = ahead(bus, 20_000);
+    bus.receive(deadline).unwrap()
+}
+
+/// The text of the frame that has to come next.
+fn next_frame(bus: &mut dyn Bus) -> String {
+    match next(bus) {
+        Event::Frame(received) => received.frame.to_string(),
+        event => panic!("{event:?} instead of a frame"),
+    }
+}
+
+/// That nothing comes for a moment. What was sent on a virtual bus before is there already.
+fn assert_nothing_more(bus: &mut dyn Bus) {
+    let deadline = ahead(bus, 30);
+    assert_eq!(bus.receive(deadline).unwrap(), Event::Timeout);
+}
