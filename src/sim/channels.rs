@@ -67,6 +67,8 @@ struct Channel {
 pub(super) struct Reading {
     pub(super) signal: String,
     pub(super) unit: Unit,
+    /// Where the device tells the status of the value.
+    pub(super) status: Option<ObjectId>,
     /// Digits behind the point of an integer, none of a real number.
     pub(super) digits: Option<u32>,
     pub(super) overload: Option<Direction>,
@@ -118,6 +120,7 @@ impl Channels {
         Some(Reading {
             signal: channel.signal.name.clone(),
             unit: channel.unit(objects),
+            status: channel.signal.status,
             digits: integer.then(|| channel.digits(objects)),
             overload: channel.quantity.overload(time),
             marker: channel.signal.marker,

@@ -9,8 +9,12 @@
 //! [`MemoryBus`](crate::bus::memory::MemoryBus) or, through [`host`], on a real bus.
 
 mod abort;
+mod bench;
 mod channels;
+mod device;
 mod emergency;
+pub mod host;
+mod memory;
 mod model;
 mod number;
 mod objects;
@@ -19,5 +23,7 @@ mod sdo_server;
 mod tpdo;
 
 pub use abort::Abort;
+pub use bench::{Bench, BenchError};
+pub use device::{Device, Setup};
 pub use model::{Direction, Overload};
 pub use record::{HEADER, Recorder};

@@ -180,8 +180,15 @@ impl Objects {
 
     /// Keeps a value beyond a reset, as if it had been written and saved.
     pub(super) fn preset(&mut self, object: ObjectId, bytes: Vec<u8>) {
-        self.saved.insert(object, bytes.clone());
-        self.put(object, bytes);
+        if self.has(object) {
+            self.saved.insert(object, bytes.clone());
+            self.values.insert(object, bytes);
+        }
+    }
+
+    /// What is saved of an entry, if it differs from what was delivered.
+    pub(super) fn saved(&self, object: ObjectId) -> Option<&[u8]> {
+        self.saved.get(&object).map(Vec::as_slice)
     }
 
     /// Whether the entry exists and can be written.
@@ -204,12 +211,18 @@ impl Objects {
         }
     }
 
-    /// Whether `bytes` may be written to the entry: access, length, signature, limits.
-    pub(super) fn check_write(&self, object: ObjectId, bytes: &[u8]) -> Result<&Spec, Abort> {
+    /// Whether the entry can be written with that many bytes.
+    pub(super) fn check_length(&self, object: ObjectId, bytes: &[u8]) -> Result<&Spec, Abort> {
         let spec = self.check_writable(object)?;
         if spec.data_type.width().is_some_and(|width| width != bytes.len()) {
             return Err(Abort::LENGTH);
         }
+        Ok(spec)
+    }
+
+    /// Whether `bytes` may be written to the entry: access, length, signature, limits.
+    pub(super) fn check_write(&self, object: ObjectId, bytes: &[u8]) -> Result<&Spec, Abort> {
+        let spec = self.check_length(object, bytes)?;
         if let Some(signature) = spec.signature {
             return if signature.fits(bytes) { Ok(spec) } else { Err(Abort::NOT_STORED) };
         }

@@ -122,7 +122,7 @@ mod tests {
     use crate::device::unit::Unit;
 
     fn reading(digits: Option<u32>, overload: Option<Direction>, marker: bool) -> Reading {
-        Reading { signal: "pressure".to_owned(), unit: Unit(0xab_0000), digits, overload, marker }
+        Reading { signal: "pressure".to_owned(), unit: Unit(0xab_0000), status: None, digits, overload, marker }
     }
 
     fn text(reading: &Reading, bytes: &[u8], told: bool) -> String {

@@ -102,16 +102,25 @@ impl Tpdo {
         (1..=count).map(|sub| mapped(objects.number(ObjectId::new(map, sub))).0).collect()
     }
 
+    /// Whether an index holds parameters of this TPDO.
+    pub(super) fn is_configured_by(&self, index: u16) -> bool {
+        index == 0x1800 + self.number || index == 0x1a00 + self.number
+    }
+
     /// The node has become OPERATIONAL, or a parameter was written: begins anew. Nothing is sent by that.
     pub(super) fn start(&mut self, objects: &Objects, channels: &Channels, now: Mono) {
         *self = Tpdo::new(self.number);
         self.timer = self.event_timer(objects).map(|period| now + period);
-        if !self.is_event_driven(objects) || self.cob_id(objects).is_none() {
-            return;
-        }
-        let time = now.since_start();
-        for object in self.mapping(objects) {
-            self.watches.extend(Watch::new(objects, channels, object, time));
+        self.watch(objects, channels, now);
+    }
+
+    /// Works out which values can cause an event from now on.
+    pub(super) fn watch(&mut self, objects: &Objects, channels: &Channels, now: Mono) {
+        self.watches.clear();
+        if self.is_event_driven(objects) && self.cob_id(objects).is_some() {
+            for object in self.mapping(objects) {
+                self.watches.extend(Watch::new(objects, channels, object, now.since_start()));
+            }
         }
         self.plan_look(objects, channels, now);
     }

@@ -1,0 +1,453 @@
+//! A simulated device: NMT, heartbeat, guarding, and what makes it send.
+
+use super::channels::{Channels, status};
+use super::emergency::Emergencies;
+use super::memory::Memory;
+use super::model::Overload;
+use super::objects::{Area, Objects, Signature};
+use super::record::{Line, Recorder, line};
+use super::sdo_server::SdoServer;
+use super::tpdo::{Cause, Tpdo};
+use crate::bus::memory::{Outbox, Station};
+use crate::bus::time::Mono;
+use crate::canopen::frame::Frame;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::nmt::{NmtCommand, NmtState};
+use crate::canopen::object::ObjectId;
+use crate::device::catalog::Model;
+use crate::device::description::{Scalar, SimChannel};
+use crate::device::quirk::Quirk;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How long a device is away after a reset of the node.
+const RESTART: Duration = Duration::from_millis(100);
+/// How long it is away after a reset of the communication.
+const RECONNECT: Duration = Duration::from_millis(10);
+
+const COB_ID_SYNC: ObjectId = ObjectId::new(0x1005, 0);
+const GUARD_TIME: ObjectId = ObjectId::new(0x100c, 0);
+const HEARTBEAT_TIME: ObjectId = ObjectId::new(0x1017, 0);
+const SERIAL_NUMBER: ObjectId = ObjectId::new(0x1018, 4);
+const NMT_STARTUP: ObjectId = ObjectId::new(0x1f80, 0);
+/// CAN overrun and SYNC length: the code that CiA 301 has for a SYNC with unexpected bytes.
+const SYNC_LENGTH: u16 = 0x8240;
+
+/// What a device is told when it is put together.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// Its kind.
+    pub model: Arc<Model>,
+    /// Its node-ID.
+    pub node: NodeId,
+    /// Its serial number.
+    pub serial: u32,
+    /// Whether it becomes OPERATIONAL by itself.
+    pub start: bool,
+    /// Objects that were set and saved before.
+    pub set: Vec<(ObjectId, Scalar)>,
+    /// Its measuring channels.
+    pub channels: Vec<SimChannel>,
+    /// Overloads by channel.
+    pub overloads: Vec<(u8, Overload)>,
+    /// What makes the noise different from that of another run.
+    pub seed: u64,
+}
+
+impl Setup {
+    /// A device as its description has it.
+    pub fn new(model: Arc<Model>, node: NodeId) -> Setup {
+        let sim = &model.description.sim;
+        let (serial, channels) = (sim.serial, sim.channels.clone());
+        Setup { model, node, serial, start: false, set: Vec::new(), channels, overloads: Vec::new(), seed: 0 }
+    }
+}
+
+/// What a device is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Off,
+    /// Away until then.
+    Starting(Mono),
+    Running(NmtState),
+}
+
+/// A simulated device.
+pub struct Device {
+    setup: Setup,
+    memory: Memory,
+    sdo: SdoServer,
+    tpdos: Vec<Tpdo>,
+    phase: Phase,
+    heartbeat: Option<Mono>,
+    /// Bit 7 of the next guarding answer.
+    toggle: bool,
+    /// When an overload may begin or end.
+    overload_look: Option<Mono>,
+    recorder: Option<Recorder>,
+    /// TPDOs on their way to the wire, with what the record says of them.
+    under_way: VecDeque<(Frame, Vec<Line>)>,
+}
+
+impl Device {
+    /// A device without power.
+    ///
+    /// # Errors
+    /// In words, when an object that is to be set does not exist or cannot hold the value.
+    pub fn new(setup: Setup) -> Result<Device, String> {
+        let model = &setup.model;
+        let description = &model.description;
+        let mut objects = Objects::new(model, setup.node);
+        objects.preset(SERIAL_NUMBER, setup.serial.to_le_bytes().to_vec());
+        for (object, value) in &setup.set {
+            let bytes = objects
+                .spec(*object)
+                .ok_or_else(|| format!("{} has no object {object}", description.name))?
+                .encode(value, setup.node)
+                .map_err(|error| format!("{object}: {error}"))?;
+            objects.preset(*object, bytes);
+        }
+        let channels = Channels::new(model, &objects, &setup.channels, &setup.overloads, setup.seed, setup.serial);
+        let tpdos = Tpdo::all(&objects);
+        let answers_60 = description.quirks.contains(&Quirk::UploadAnswered60);
+        let sdo = SdoServer::new(description.sdo.clone(), answers_60);
+        let emergencies = Emergencies::new(&description.emergencies);
+        let memory = Memory { node: setup.node, objects, channels, emergencies, remap: description.pdo.remap };
+        Ok(Device {
+            setup,
+            memory,
+            sdo,
+            tpdos,
+            phase: Phase::Off,
+            heartbeat: None,
+            toggle: false,
+            overload_look: None,
+            recorder: None,
+            under_way: VecDeque::new(),
+        })
+    }
+
+    /// The same device, which records what it sends.
+    pub fn recording(mut self, recorder: Recorder) -> Device {
+        self.recorder = Some(recorder);
+        self
+    }
+
+    /// Its present node-ID.
+    pub fn node(&self) -> NodeId {
+        self.memory.node
+    }
+
+    /// Its NMT state; `None` without power and while it starts.
+    pub fn state(&self) -> Option<NmtState> {
+        match self.phase {
+            Phase::Running(state) => Some(state),
+            Phase::Off | Phase::Starting(_) => None,
+        }
+    }
+
+    /// The bytes of an object at `now`, whatever its access; `None` if there is no such object.
+    pub fn value(&mut self, object: ObjectId, now: Mono) -> Option<Vec<u8>> {
+        self.memory.value(object, now.since_start())
+    }
+
+    fn is_operational(&self) -> bool {
+        self.phase == Phase::Running(NmtState::Operational)
+    }
+
+    /// Initialisation is over: boot-up, then PRE-OPERATIONAL or at once OPERATIONAL.
+    fn boot(&mut self, now: Mono, out: &mut Outbox) {
+        out.send(Frame::byte(CanId::heartbeat(self.memory.node), 0x00));
+        self.toggle = false;
+        self.restart_heartbeat(now + self.heartbeat_period().unwrap_or_default());
+        // MH-4, 4.1.16: 8 starts by itself. CiA 302-2: bit 3 set with bit 2 clear.
+        let startup = self.memory.objects.number(NMT_STARTUP);
+        let starts = self.setup.start || startup & 0b1100 == 0b1000;
+        self.enter(if starts { NmtState::Operational } else { NmtState::PreOperational }, now);
+        self.memory.emergencies.publish(&mut self.memory.objects);
+        self.look_for_overload(now);
+        self.send_emergencies(now, out);
+    }
+
+    fn enter(&mut self, state: NmtState, now: Mono) {
+        let before = std::mem::replace(&mut self.phase, Phase::Running(state));
+        match state {
+            NmtState::Operational if before != self.phase => self.start_tpdos(now),
+            NmtState::Operational => {}
+            _ => self.tpdos.iter_mut().for_each(Tpdo::stop),
+        }
+        if state == NmtState::Stopped {
+            self.sdo.forget();
+            self.memory.emergencies.drop_waiting();
+        }
+    }
+
+    fn start_tpdos(&mut self, now: Mono) {
+        for tpdo in &mut self.tpdos {
+            tpdo.start(&self.memory.objects, &self.memory.channels, now);
+        }
+    }
+
+    /// A reset: nothing that waits is sent any more, and the device is away for a while.
+    fn reset(&mut self, area: Area, now: Mono, out: &mut Outbox) {
+        // What is on the wire already gets there, and into the record.
+        let mut dropped: Vec<Frame> = std::iter::from_fn(|| out.pop()).collect();
+        while let Some(frame) = dropped.pop() {
+            if self.under_way.back().is_some_and(|(waiting, _)| *waiting == frame) {
+                self.under_way.pop_back();
+            }
+        }
+        self.sdo.forget();
+        self.tpdos.iter_mut().for_each(Tpdo::stop);
+        self.heartbeat = None;
+        self.overload_look = None;
+        if area == Area::All {
+            self.memory.emergencies.forget();
+            self.memory.node = self.saved_node();
+        }
+        self.memory.emergencies.drop_waiting();
+        self.memory.objects.reset(area, self.memory.node);
+        self.phase = Phase::Starting(now + if area == Area::All { RESTART } else { RECONNECT });
+    }
+
+    /// A node-ID that was written with its signature and saved is taken at the next reset.
+    fn saved_node(&self) -> NodeId {
+        let objects = &self.memory.objects;
+        let object = objects.specs().find(|(_, spec)| spec.signature == Some(Signature::Set) && spec.name == "node-id");
+        let saved = object.and_then(|(object, _)| objects.saved(object)?.first().copied());
+        saved.and_then(|id| NodeId::new(id).ok()).unwrap_or(self.memory.node)
+    }
+
+    fn heartbeat_period(&self) -> Option<Duration> {
+        let milliseconds = self.memory.objects.number(HEARTBEAT_TIME);
+        (milliseconds > 0).then(|| Duration::from_millis(milliseconds.into()))
+    }
+
+    fn restart_heartbeat(&mut self, first: Mono) {
+        self.heartbeat = self.heartbeat_period().map(|_| first);
+    }
+
+    fn obey(&mut self, command: NmtCommand, now: Mono, out: &mut Outbox) {
+        match command {
+            NmtCommand::ResetNode => self.reset(Area::All, now, out),
+            NmtCommand::ResetCommunication => self.reset(Area::Communication, now, out),
+            NmtCommand::Start | NmtCommand::Stop | NmtCommand::EnterPreOperational => {
+                self.enter(command.target(), now);
+            }
+        }
+    }
+
+    /// The answer to node guarding, where the device has it and no heartbeat takes its place.
+    fn guard(&mut self, state: NmtState, out: &mut Outbox) {
+        if !self.memory.objects.has(GUARD_TIME) || self.heartbeat_period().is_some() {
+            return;
+        }
+        let toggle = if self.toggle { 0x80 } else { 0x00 };
+        out.send(Frame::byte(CanId::heartbeat(self.memory.node), state_code(state) | toggle));
+        self.toggle = !self.toggle;
+    }
+
+    fn serve(&mut self, request: [u8; 8], now: Mono, out: &mut Outbox) {
+        let pre_operational = self.phase == Phase::Running(NmtState::PreOperational);
+        let mut access = self.memory.at(now.since_start(), pre_operational);
+        let answer = self.sdo.request(now, request, &mut access);
+        let written = access.written;
+        if let Some(answer) = answer {
+            out.send(Frame::full(CanId::sdo_response(self.memory.node), answer));
+        }
+        match written {
+            // "The heartbeat protocol begins immediately" (CiA 301, 7.5.2.14).
+            Some(HEARTBEAT_TIME) => self.restart_heartbeat(now),
+            Some(object) if self.is_operational() => self.apply(object, now),
+            _ => {}
+        }
+    }
+
+    /// A parameter was written while PDOs are running.
+    fn apply(&mut self, object: ObjectId, now: Mono) {
+        let all = !(0x1800..0x1c00).contains(&object.index);
+        for tpdo in &mut self.tpdos {
+            if tpdo.is_configured_by(object.index) {
+                tpdo.start(&self.memory.objects, &self.memory.channels, now);
+            } else if all {
+                // A limit, a unit, an offset: what can cause an event is worked out anew.
+                tpdo.watch(&self.memory.objects, &self.memory.channels, now);
+            }
+        }
+    }
+
+    fn is_sync(&self, frame: &Frame) -> bool {
+        let objects = &self.memory.objects;
+        let id = if objects.has(COB_ID_SYNC) { objects.number(COB_ID_SYNC) & 0x7ff } else { CanId::SYNC.number() };
+        !frame.is_remote() && matches!(frame.id(), CanId::Standard(found) if u32::from(found) == id)
+    }
+
+    fn sync(&mut self, frame: &Frame, now: Mono, out: &mut Outbox) {
+        let Memory { objects, emergencies, .. } = &mut self.memory;
+        if emergencies.knows(SYNC_LENGTH) {
+            if frame.is_empty() {
+                emergencies.clear(objects, SYNC_LENGTH, 0);
+            } else {
+                emergencies.raise(objects, SYNC_LENGTH, 0, 0);
+            }
+        }
+        self.send_emergencies(now, out);
+        if self.is_operational() {
+            for index in 0..self.tpdos.len() {
+                if let Some(cause) = self.tpdos[index].sync(&self.memory.objects) {
+                    self.transmit(index, cause, now, out);
+                }
+            }
+        }
+    }
+
+    fn transmit(&mut self, index: usize, cause: Cause, now: Mono, out: &mut Outbox) {
+        let tpdo = &mut self.tpdos[index];
+        let Some(id) = tpdo.cob_id(&self.memory.objects) else { return };
+        let mapping = tpdo.mapping(&self.memory.objects);
+        if mapping.is_empty() && !self.memory.sends_empty() {
+            return;
+        }
+        let time = now.since_start();
+        let values: Vec<(ObjectId, Vec<u8>)> =
+            mapping.iter().filter_map(|object| Some((*object, self.memory.value(*object, time)?))).collect();
+        let data: Vec<u8> = values.iter().flat_map(|(_, bytes)| bytes.iter().copied()).collect();
+        let Ok(frame) = Frame::new(id, &data) else { return };
+        if !tpdo.note(cause, &data, &self.memory.objects, &self.memory.channels, now) {
+            return;
+        }
+        out.send(frame);
+        if self.recorder.is_some() {
+            self.under_way.push_back((frame, self.lines(&values, time)));
+        }
+    }
+
+    /// What the record says of a TPDO.
+    fn lines(&self, values: &[(ObjectId, Vec<u8>)], time: Duration) -> Vec<Line> {
+        let Memory { objects, channels, node, .. } = &self.memory;
+        let mapped: Vec<ObjectId> = values.iter().map(|(object, _)| *object).collect();
+        let described = |(object, bytes): &(ObjectId, Vec<u8>)| {
+            let reading = channels.reading(objects, *object, time)?;
+            let told = reading.status.is_some_and(|status| mapped.contains(&status));
+            Some(line(*node, &reading, bytes, told))
+        };
+        values.iter().filter_map(described).collect()
+    }
+
+    fn look_for_overload(&mut self, now: Mono) {
+        let time = now.since_start();
+        self.overload_look = self.memory.channels.next_overload_change(time).map(Mono::at);
+        let Some(code) = self.setup.model.description.sim.overload_emcy else { return };
+        let Memory { objects, channels, emergencies, .. } = &mut self.memory;
+        for (channel, overload) in channels.overloads(time) {
+            match overload {
+                Some(_) => emergencies.raise(objects, code, channel, status(overload)),
+                None => emergencies.clear(objects, code, channel),
+            }
+        }
+    }
+
+    fn send_emergencies(&mut self, now: Mono, out: &mut Outbox) {
+        if matches!(self.phase, Phase::Running(NmtState::Stopped)) {
+            self.memory.emergencies.drop_waiting();
+        }
+        while let Some(frame) = self.memory.emergencies.next_frame(&self.memory.objects, self.memory.node, now) {
+            out.send(frame);
+        }
+    }
+}
+
+/// The state as a heartbeat tells it (CiA 301, 7.2.8.3.2.2).
+fn state_code(state: NmtState) -> u8 {
+    match state {
+        NmtState::Stopped => 0x04,
+        NmtState::Operational => 0x05,
+        NmtState::PreOperational => 0x7f,
+        NmtState::Other(code) => code,
+    }
+}
+
+impl Station for Device {
+    fn power_on(&mut self, now: Mono, out: &mut Outbox) {
+        self.memory.node = self.saved_node();
+        self.memory.objects.reset(Area::All, self.memory.node);
+        self.boot(now, out);
+    }
+
+    fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
+        let Phase::Running(state) = self.phase else { return };
+        if let Some((command, node)) = NmtCommand::parse(frame) {
+            if node.is_none_or(|node| node == self.memory.node) {
+                self.obey(command, now, out);
+            }
+        } else if frame.is_remote() {
+            if frame.id() == CanId::heartbeat(self.memory.node) {
+                self.guard(state, out);
+            }
+        } else if self.is_sync(frame) {
+            if state != NmtState::Stopped {
+                self.sync(frame, now, out);
+            }
+        } else if frame.id() == CanId::sdo_request(self.memory.node)
+            && state != NmtState::Stopped
+            && let Some(request) = frame.all_eight()
+        {
+            self.serve(request, now, out);
+        }
+    }
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        if let Phase::Starting(until) = self.phase {
+            if until <= now {
+                self.boot(now, out);
+            }
+            return;
+        }
+        let Phase::Running(state) = self.phase else { return };
+        if let Some(due) = self.heartbeat.filter(|due| *due <= now) {
+            out.send(Frame::byte(CanId::heartbeat(self.memory.node), state_code(state)));
+            self.heartbeat = self.heartbeat_period().map(|period| due + period);
+        }
+        if self.sdo.deadline().is_some_and(|deadline| deadline <= now)
+            && let Some(abort) = self.sdo.give_up()
+        {
+            out.send(Frame::full(CanId::sdo_response(self.memory.node), abort));
+        }
+        if self.overload_look.is_some_and(|due| due <= now) {
+            self.look_for_overload(now);
+        }
+        self.send_emergencies(now, out);
+        if self.is_operational() {
+            for index in 0..self.tpdos.len() {
+                if let Some(cause) = self.tpdos[index].wake(&self.memory.objects, &self.memory.channels, now) {
+                    self.transmit(index, cause, now, out);
+                }
+            }
+        }
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        match self.phase {
+            Phase::Off => None,
+            Phase::Starting(until) => Some(until),
+            Phase::Running(_) => {
+                let own =
+                    [self.heartbeat, self.sdo.deadline(), self.overload_look, self.memory.emergencies.next_wake()];
+                own.into_iter().flatten().chain(self.tpdos.iter().filter_map(Tpdo::next_wake)).min()
+            }
+        }
+    }
+
+    fn sent(&mut self, now: Mono, frame: &Frame) {
+        let Some(recorder) = &self.recorder else { return };
+        if self.under_way.front().is_some_and(|(sent, _)| sent == frame)
+            && let Some((_, lines)) = self.under_way.pop_front()
+        {
+            lines.iter().for_each(|line| recorder.write(now, line));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

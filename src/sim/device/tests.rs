@@ -1,0 +1,732 @@
+use super::*;
+use crate::bus::memory::{Clock, MemoryBus};
+use crate::bus::{Bus, Event};
+use crate::device::catalog;
+use crate::sim::Direction;
+use std::sync::Mutex;
+
+fn node(id: u8) -> NodeId {
+    NodeId::new(id).expect("a node-ID")
+}
+
+fn id(text: &str) -> ObjectId {
+    text.parse().expect("an object")
+}
+
+fn ms(milliseconds: u64) -> Mono {
+    Mono::at(Duration::from_millis(milliseconds))
+}
+
+/// A built-in kind whose channels stand still at `base`.
+fn still(kind: &str, node_id: u8, base: f64) -> Setup {
+    let mut setup = Setup::new(catalog::by_name(kind).expect("built in"), node(node_id));
+    for channel in &mut setup.channels {
+        (channel.base, channel.amplitude, channel.noise) = (base, 0.0, 0.0);
+    }
+    setup
+}
+
+fn bus(setups: impl IntoIterator<Item = Setup>) -> MemoryBus {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    setups.into_iter().for_each(|setup| bus.attach(Device::new(setup).expect("a device")));
+    bus
+}
+
+/// Every frame up to `until`.
+fn hear(bus: &mut MemoryBus, until: Mono) -> Vec<String> {
+    timed(bus, until).into_iter().map(|(_, frame)| frame).collect()
+}
+
+/// Every frame up to `until`, with the whole millisecond in which it was complete.
+fn timed(bus: &mut MemoryBus, until: Mono) -> Vec<(u128, String)> {
+    let mut heard = Vec::new();
+    loop {
+        match bus.receive(until).expect("a memory bus never fails") {
+            Event::Frame(received) => {
+                heard.push((received.at.mono.since_start().as_millis(), received.frame.to_string()));
+            }
+            Event::Timeout => return heard,
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+/// Sends, and hears what comes within 5 ms.
+fn ask(bus: &mut MemoryBus, frame: &str) -> Vec<String> {
+    bus.send(&frame.parse().expect("a frame")).expect("room");
+    let until = bus.now().mono + Duration::from_millis(5);
+    hear(bus, until)
+}
+
+/// Plays frames and the answers to them, all that come within 5 ms; `-` is silence.
+fn play(bus: &mut MemoryBus, lines: &[(&str, &str)]) {
+    for (sent, expected) in lines {
+        let heard = ask(bus, sent).join(" ");
+        assert_eq!(if heard.is_empty() { "-" } else { &heard }, *expected, "after {sent}");
+    }
+}
+
+fn device(bus: &mut MemoryBus) -> &mut Device {
+    bus.stations_mut().next().expect("a device")
+}
+
+fn state(bus: &mut MemoryBus) -> Option<NmtState> {
+    device(bus).state()
+}
+
+#[test]
+fn each_boots_to_pre_operational_and_says_nothing_more() {
+    for kind in ["mh4", "d20", "dps", "mc1609"] {
+        let mut bus = bus([Setup::new(catalog::by_name(kind).expect("built in"), node(1))]);
+        assert_eq!(hear(&mut bus, ms(60_000)), ["701#00"], "{kind}");
+        assert_eq!(state(&mut bus), Some(NmtState::PreOperational), "{kind}");
+    }
+}
+
+#[test]
+fn the_nmt_states_and_what_is_possible_in_each() {
+    let mut bus = bus([still("mh4", 5, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            // The boot-up was under way already.
+            ("000#0106", "705#00"),
+            ("080#", "-"),
+            ("605#4000100000000000", "585#4300100094018200"),
+            ("000#0105", "-"),
+            ("080#", "185#0000A04000"),
+            ("605#4000100000000000", "585#4300100094018200"),
+            ("000#0205", "-"),
+            ("080#", "-"),
+            ("605#4000100000000000", "-"),
+            ("000#0105", "-"),
+            ("080#", "185#0000A04000"),
+            ("000#8000", "-"),
+            ("080#", "-"),
+            ("000#0100", "-"),
+            ("080#", "185#0000A04000"),
+            // No command, another node, too short.
+            ("000#0305", "-"),
+            ("000#0206", "-"),
+            ("000#02", "-"),
+            ("080#", "185#0000A04000"),
+        ],
+    );
+}
+
+#[test]
+fn resets_come_back_with_a_boot_up() {
+    let mut bus = bus([still("mh4", 5, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            ("605#2B171000F4010000", "705#00 585#6017100000000000 705#7F"),
+            ("605#233161010000AB00", "585#6031610100000000"),
+            ("000#8105", "-"),
+            // Away: neither SDO nor NMT.
+            ("605#4017100000000000", "-"),
+            ("000#0105", "-"),
+        ],
+    );
+    assert_eq!(hear(&mut bus, ms(500)), ["705#00"]);
+    play(
+        &mut bus,
+        &[
+            ("605#4017100000000000", "585#4B17100000000000"),
+            ("605#4031610100000000", "585#4331610100004E00"),
+            ("605#2B171000D0070000", "585#6017100000000000 705#7F"),
+            ("605#233161010000AB00", "585#6031610100000000"),
+            // Only the communication begins anew.
+            ("000#8205", "-"),
+        ],
+    );
+    let until = bus.now().mono + Duration::from_millis(20);
+    assert_eq!(hear(&mut bus, until), ["705#00"]);
+    play(
+        &mut bus,
+        &[("605#4017100000000000", "585#4B17100000000000"), ("605#4031610100000000", "585#433161010000AB00")],
+    );
+}
+
+#[test]
+fn heartbeat_without_drift() {
+    let mut bus = bus([still("dps", 127, 5.0)]);
+    play(&mut bus, &[("67F#2217100064000000", "77F#00 5FF#6017100000000000 77F#7F")]);
+    let beats: Vec<u128> = timed(&mut bus, ms(1010)).into_iter().map(|(at, _)| at).collect();
+    assert_eq!(beats, [100, 200, 300, 400, 500, 600, 700, 800, 900, 1000]);
+    // 05 when started, 04 when stopped, nothing when switched off.
+    bus.send(&"000#027F".parse().expect("a frame")).expect("room");
+    assert_eq!(hear(&mut bus, ms(1110)), ["77F#04"]);
+    bus.send(&"000#807F".parse().expect("a frame")).expect("room");
+    play(&mut bus, &[("67F#2217100000000000", "5FF#6017100000000000")]);
+    assert_eq!(hear(&mut bus, ms(5000)), Vec::<String>::new());
+}
+
+#[test]
+fn guarding_answers_with_a_toggle_where_there_is_guarding() {
+    let mut d20 = bus([still("d20", 2, 5.0)]);
+    play(
+        &mut d20,
+        &[
+            ("702#R1", "702#00 702#7F"),
+            ("702#R1", "702#FF"),
+            ("000#0102", "-"),
+            ("702#R1", "702#05"),
+            ("702#R1", "702#85"),
+            ("703#R1", "-"),
+            // Heartbeat and guarding exclude each other.
+            ("602#220C100032000000", "582#600C100000000000"),
+            ("602#2217100064000000", "582#8017100020000008"),
+            ("602#220C100000000000", "582#600C100000000000"),
+            ("602#22171000D0070000", "582#6017100000000000 702#05"),
+            ("602#220C100032000000", "582#800C100020000008"),
+            ("602#220D100001000000", "582#800D100020000008"),
+            ("702#R1", "-"),
+        ],
+    );
+    let mut mh4 = bus([still("mh4", 5, 5.0)]);
+    play(&mut mh4, &[("705#R1", "705#00"), ("705#R1", "-")]);
+}
+
+#[test]
+fn mh4_is_silent_until_somebody_sends_sync() {
+    let mut bus = bus([Setup::new(catalog::by_name("mh4").expect("built in"), node(5))]);
+    assert_eq!(ask(&mut bus, "000#0105"), ["705#00"]);
+    assert_eq!(hear(&mut bus, ms(60_000)), Vec::<String>::new());
+    let answer = ask(&mut bus, "080#");
+    assert_eq!(answer.len(), 1);
+    assert!(answer[0].starts_with("185#") && answer[0].ends_with("00") && answer[0].len() == 14, "{answer:?}");
+}
+
+#[test]
+fn dps_sends_psi_every_100_ms() {
+    let mut bus = bus([still("dps", 127, 17.898)]);
+    assert_eq!(ask(&mut bus, "000#017F"), ["77F#00"]);
+    let heard = timed(&mut bus, ms(1005));
+    assert_eq!(heard.iter().map(|(at, _)| *at).collect::<Vec<_>>(), (1..=10).map(|n| n * 100).collect::<Vec<u128>>());
+    // 17898 = 45EAh.
+    assert!(heard.iter().all(|(_, frame)| frame == "1FF#EA450000"), "{heard:?}");
+    // Table 29: 1800h:5 to 1000 ms.
+    play(&mut bus, &[("67F#22001805E8030000", "5FF#6000180500000000")]);
+    let heard = timed(&mut bus, ms(4100));
+    assert_eq!(heard.len(), 3);
+    assert_eq!(heard[1].0 - heard[0].0, 1000);
+}
+
+#[test]
+fn dps_remaps_as_its_table_26_prints() {
+    let mut bus = bus([still("dps", 127, 50.0)]);
+    play(
+        &mut bus,
+        &[
+            ("67F#22001801FF0100C0", "77F#00 5FF#6000180100000000"),
+            ("67F#22001A0000000000", "5FF#60001A0000000000"),
+            ("67F#22001A0110010071", "5FF#60001A0100000000"),
+            ("67F#2F001A0001000000", "5FF#60001A0000000000"),
+            ("67F#22001801FF010040", "5FF#6000180100000000"),
+            ("67F#2200180200000000", "5FF#6000180200000000"),
+            ("000#017F", "-"),
+            // Table 27: on SYNC, if changed. 50 of 100 psi are 2047.5 of 4095 counts.
+            ("080#", "1FF#0008"),
+            ("080#", "-"),
+            // Table 28: every third.
+            ("67F#2200180203000000", "5FF#6000180200000000"),
+            ("080#", "-"),
+            ("080#", "-"),
+            ("080#", "1FF#0008"),
+            ("080#", "-"),
+        ],
+    );
+}
+
+#[test]
+fn d20_remaps_by_the_count_alone() {
+    let mut bus = bus([still("d20", 2, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            ("000#0102", "702#00"),
+            ("080#", "182#88130000"),
+            ("602#22001A0000000000", "582#80001A0022000008"),
+            ("000#8002", "-"),
+            ("602#22001A0120013061", "582#80001A0100000106"),
+            ("602#22001A0000000000", "582#60001A0000000000"),
+            ("000#0102", "-"),
+            // "PDO does not supply any data; DLC = 0".
+            ("080#", "182#"),
+            ("000#8002", "-"),
+            ("602#22001A0120013161", "582#80001A0141000406"),
+            ("602#22001A0120013061", "582#60001A0100000000"),
+            ("602#22001A0001000000", "582#60001A0000000000"),
+            ("000#0102", "-"),
+            ("080#", "182#0000A040"),
+        ],
+    );
+}
+
+#[test]
+fn mh4_remaps_only_while_the_pdo_is_off() {
+    let mut bus = bus([still("mh4", 1, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            // 3.4.2, and each step out of order before it.
+            ("601#2F001A0000000000", "701#00 581#80001A0000000106"),
+            ("601#2300180182010040", "581#8000180130000906"),
+            ("601#23001801810100C0", "581#6000180100000000"),
+            ("601#23001A0120013061", "581#80001A0100000106"),
+            ("601#2F001A0000000000", "581#60001A0000000000"),
+            ("601#23001A0120001061", "581#80001A0141000406"),
+            ("601#23001A0110013061", "581#80001A0141000406"),
+            ("601#23001A0120013061", "581#60001A0100000000"),
+            ("601#23001A0220013091", "581#60001A0200000000"),
+            ("601#23001A0320023061", "581#60001A0300000000"),
+            ("601#2F001A0003000000", "581#80001A0042000406"),
+            ("601#2F001A0002000000", "581#60001A0000000000"),
+            ("601#2300180180010040", "581#8000180130000906"),
+            ("601#2300180185010040", "581#6000180100000000"),
+            ("000#0101", "-"),
+            ("080#", "185#0000A04088130000"),
+        ],
+    );
+}
+
+#[test]
+fn every_nth_sync_and_if_changed() {
+    let mut moving = Setup::new(catalog::by_name("mh4").expect("built in"), node(5));
+    moving.channels[0].noise = 0.0;
+    moving.channels[0].period_s = 1.0;
+    let mut bus = bus([moving]);
+    play(
+        &mut bus,
+        &[("605#2F00180204000000", "705#00 585#6000180200000000"), ("605#2F00180105000000", "585#8000180110000706")],
+    );
+    assert_eq!(ask(&mut bus, "000#0105"), Vec::<String>::new());
+    let answers: Vec<usize> = (0..9).map(|_| ask(&mut bus, "080#").len()).collect();
+    assert_eq!(answers, [0, 0, 0, 1, 0, 0, 0, 1, 0]);
+    // Started anew, the count begins anew.
+    ask(&mut bus, "000#8005");
+    ask(&mut bus, "000#0105");
+    let answers: Vec<usize> = (0..4).map(|_| ask(&mut bus, "080#").len()).collect();
+    assert_eq!(answers, [0, 0, 0, 1]);
+    play(&mut bus, &[("605#2F00180200000000", "585#6000180200000000")]);
+    // A moving value has changed with every SYNC; two SYNCs within one sample of 640 us have not.
+    assert_eq!(ask(&mut bus, "080#").len(), 1);
+    assert_eq!(ask(&mut bus, "080#").len(), 1);
+    for _ in 0..3 {
+        bus.send(&"080#".parse().expect("a frame")).expect("room");
+    }
+    let until = bus.now().mono + Duration::from_millis(5);
+    let changed = hear(&mut bus, until).len();
+    assert!(changed < 3, "{changed}");
+    // Types that CiA reserves, and types that this device does not offer.
+    for kind in ["F1", "FB", "FC", "FD"] {
+        assert_eq!(ask(&mut bus, &format!("605#2F001802{kind}000000")), ["585#8000180230000906"]);
+    }
+}
+
+#[test]
+fn event_timer_of_types_254_and_255() {
+    for kind in ["FE", "FF"] {
+        let mut bus = bus([still("mh4", 5, 5.0)]);
+        ask(&mut bus, &format!("605#2F001802{kind}000000"));
+        play(&mut bus, &[("605#2B00180564000000", "585#6000180500000000"), ("000#0105", "-")]);
+        let heard = timed(&mut bus, ms(1020));
+        assert_eq!(heard.len(), 10, "{kind} {heard:?}");
+        assert!(heard.windows(2).all(|pair| pair[1].0 - pair[0].0 == 100), "{heard:?}");
+        assert!(heard.iter().all(|(_, frame)| frame == "185#0000A04000"));
+        assert_eq!(ask(&mut bus, "080#").len(), 0, "not on SYNC");
+    }
+}
+
+#[test]
+fn a_change_by_delta_sends() {
+    // 5 ± 1.05 within a second, delta 0.5.
+    let mut setup = still("mh4", 5, 5.0);
+    setup.channels[0].amplitude = 1.05;
+    setup.channels[0].period_s = 1.0;
+    setup.set = vec![(id("1800:2"), Scalar::Integer(255)), (id("6133:1"), Scalar::Real(0.5))];
+    setup.start = true;
+    let mut bus = bus([setup]);
+    let heard: Vec<f32> = hear(&mut bus, ms(1000)).iter().skip(1).map(|frame| pressure(frame)).collect();
+    assert_eq!(heard.len(), 7, "{heard:?}");
+    for (value, expected) in heard.iter().zip([5.5, 6.0, 5.5, 5.0, 4.5, 4.0, 4.5]) {
+        assert!((value - expected).abs() < 0.02, "{heard:?}");
+    }
+}
+
+/// The REAL32 in the first four bytes.
+fn pressure(frame: &str) -> f32 {
+    let frame: Frame = frame.parse().expect("a frame");
+    f32::from_le_bytes(frame.data()[..4].try_into().expect("four bytes"))
+}
+
+#[test]
+fn passing_a_limit_outwards_sends_once() {
+    let mut setup = still("mh4", 5, 5.0);
+    setup.channels[0].amplitude = 1.0;
+    setup.channels[0].period_s = 1.0;
+    setup.set = vec![
+        (id("1800:2"), Scalar::Integer(254)),
+        (id("6134:1"), Scalar::Real(4.2)),
+        (id("6135:1"), Scalar::Real(5.8)),
+        (id("6136:1"), Scalar::Real(0.1)),
+    ];
+    setup.start = true;
+    let mut bus = bus([setup]);
+    let heard: Vec<f32> = hear(&mut bus, ms(2000)).iter().skip(1).map(|frame| pressure(frame)).collect();
+    assert_eq!(heard.len(), 4, "{heard:?}");
+    for (value, limit) in heard.iter().zip([5.8, 4.2, 5.8, 4.2]) {
+        assert!((value - limit).abs() < 0.01, "{heard:?}");
+    }
+}
+
+#[test]
+fn an_invalid_pdo_is_not_sent_and_a_moved_one_is_where_it_was_moved() {
+    let mut bus = bus([still("mh4", 5, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            ("000#0105", "705#00"),
+            ("605#23001801850100C0", "585#6000180100000000"),
+            ("080#", "-"),
+            ("605#23001801AA010040", "585#6000180100000000"),
+            ("080#", "1AA#0000A04000"),
+            // Restricted, 29 bits, a mapping written by mistake.
+            ("605#23001801AA0100C0", "585#6000180100000000"),
+            ("605#2300180181050040", "585#8000180130000906"),
+            ("605#2300180185010060", "585#8000180130000906"),
+            ("605#2300180120013061", "585#8000180130000906"),
+            ("605#4000180100000000", "585#43001801AA0100C0"),
+        ],
+    );
+}
+
+#[test]
+fn sync_on_another_identifier() {
+    let mut bus = bus([still("mh4", 5, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            ("605#2305100081000000", "705#00 585#6005100000000000"),
+            ("000#0105", "-"),
+            ("080#", "-"),
+            ("081#", "185#0000A04000"),
+            ("081#R", "-"),
+            ("00000081#", "-"),
+        ],
+    );
+}
+
+#[test]
+fn a_sync_with_bytes_is_an_emergency_on_mh4() {
+    let mut bus = bus([still("mh4", 5, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            ("000#0105", "705#00"),
+            ("080#01", "085#4082110000000000 185#0000A04000"),
+            ("080#02", "185#0000A04000"),
+            ("080#", "085#0000000000000000 185#0000A04000"),
+        ],
+    );
+    let mut d20 = self::bus([still("d20", 2, 5.0)]);
+    play(&mut d20, &[("000#0102", "702#00"), ("080#01", "182#88130000")]);
+}
+
+#[test]
+fn overload_tells_itself_in_status_value_and_emergency() {
+    let overload = |from, until, direction| {
+        (1, Overload { from: Duration::from_millis(from), until: Duration::from_millis(until), direction })
+    };
+    let mut setup = still("mh4", 5, 5.0);
+    setup.overloads = vec![overload(1000, 2000, Direction::High), overload(3000, 4000, Direction::Low)];
+    let mut bus = bus([setup]);
+    let heard = timed(&mut bus, ms(5000));
+    let expected = [
+        (0, "705#00"),
+        (1000, "085#01F0810103000000"),
+        (2000, "085#0000000000000000"),
+        (3000, "085#01F0810105000000"),
+        (4000, "085#0000000000000000"),
+    ];
+    assert_eq!(heard.len(), expected.len(), "{heard:?}");
+    for ((at, frame), (expected_at, expected)) in heard.iter().zip(expected) {
+        assert_eq!(frame, expected);
+        assert!((expected_at..=expected_at + 1).contains(at), "{at} {frame}");
+    }
+    play(
+        &mut bus,
+        &[
+            ("605#4001100000000000", "585#4F01100000000000"),
+            ("605#4003100000000000", "585#4F03100002000000"),
+            ("605#4003100100000000", "585#4303100101F00501"),
+            ("605#4003100200000000", "585#4303100201F00301"),
+            ("605#2F03100001000000", "585#8003100030000906"),
+            ("605#2F03100000000000", "585#6003100000000000"),
+            ("605#4003100100000000", "585#4303100100000000"),
+        ],
+    );
+}
+
+#[test]
+fn an_overload_while_running() {
+    let mut setup = still("mh4", 5, 5.0);
+    let half = Duration::from_millis(500);
+    setup.overloads = vec![(1, Overload { from: half, until: Duration::MAX, direction: Direction::High })];
+    setup.start = true;
+    let mut bus = bus([setup]);
+    play(&mut bus, &[("080#", "705#00 185#0000A04000")]);
+    assert_eq!(hear(&mut bus, ms(600)), ["085#01F0810103000000"]);
+    play(
+        &mut bus,
+        &[
+            ("080#", "185#0000C07F03"),
+            ("605#4050610100000000", "585#4F50610103000000"),
+            ("605#4030710100000000", "585#4B30710100800000"),
+            ("605#4001100000000000", "585#4F01100081000000"),
+            // Stopped: no emergencies; after a reset the error is told again.
+            ("000#8105", "-"),
+        ],
+    );
+    assert_eq!(hear(&mut bus, ms(1000)), ["705#00", "085#01F0810103000000"]);
+}
+
+#[test]
+fn dps_has_its_emergency_and_no_status() {
+    let mut setup = still("dps", 127, 50.0);
+    setup.overloads =
+        vec![(1, Overload { from: Duration::from_millis(500), until: Duration::MAX, direction: Direction::Low })];
+    let mut bus = bus([setup]);
+    assert_eq!(hear(&mut bus, ms(600)), ["77F#00", "0FF#0132050000000000"]);
+    play(
+        &mut bus,
+        // -5 psi: the number goes on.
+        &[("67F#4030610100000000", "5FF#4230610178ECFFFF"), ("67F#4050610100000000", "5FF#8050610100000206")],
+    );
+}
+
+#[test]
+fn mc1609_sends_16_temperatures_in_four_tpdos() {
+    let mut setup = still("mc1609", 3, 0.0);
+    for channel in &mut setup.channels {
+        channel.base = f64::from(channel.channel) * 10.0;
+    }
+    let mut bus = bus([setup]);
+    assert_eq!(ask(&mut bus, "000#0103"), ["703#00"]);
+    let once = ["183#6400C8002C019001", "283#F4015802BC022003", "383#8403E8034C04B004", "483#14057805DC054006"];
+    assert_eq!(hear(&mut bus, ms(150)), once);
+    assert_eq!(hear(&mut bus, ms(250)), once);
+    for pdo in 0..4 {
+        assert_eq!(ask(&mut bus, &format!("603#2F0{pdo}180201000000")), [format!("583#600{pdo}180200000000")]);
+    }
+    assert_eq!(hear(&mut bus, ms(1000)), Vec::<String>::new());
+    assert_eq!(ask(&mut bus, "080#"), once);
+    // 255 with an event time of at least 100 ms; 254 is not offered.
+    play(
+        &mut bus,
+        &[
+            ("603#2F001802FE000000", "583#8000180230000906"),
+            ("603#2F001802FF000000", "583#6000180200000000"),
+            ("603#2B00180563000000", "583#8000180532000906"),
+        ],
+    );
+}
+
+#[test]
+fn strings_come_in_segments_or_at_once() {
+    let mut setups = vec![still("mh4", 1, 5.0), still("d20", 2, 5.0), still("dps", 127, 5.0)];
+    setups.iter_mut().for_each(|setup| setup.serial = 0x01020304);
+    let mut bus = bus(setups);
+    hear(&mut bus, ms(5));
+    play(
+        &mut bus,
+        &[
+            ("601#4008100000000000", "581#4108100008000000"),
+            ("601#6000000000000000", "581#004D482D342D4341"),
+            ("601#7000000000000000", "581#1D4E000000000000"),
+            // "4208100044325839" of the D-20-9 manual.
+            ("602#4008100000000000", "582#4208100044325839"),
+            ("67F#4008100000000000", "5FF#4208100044505300"),
+            ("601#4018100400000000", "581#4318100404030201"),
+            ("602#4018100400000000", "582#4218100404030201"),
+        ],
+    );
+    // A client that does not fetch its segments is given up after a second.
+    play(&mut bus, &[("601#4008100000000000", "581#4108100008000000")]);
+    assert_eq!(hear(&mut bus, ms(5000)), ["581#8008100000000405"]);
+}
+
+#[test]
+fn storing_restoring_and_what_a_reset_does_to_each() {
+    let mut bus = bus([still("mh4", 5, 5.0)]);
+    let reset = |bus: &mut MemoryBus| {
+        ask(bus, "000#8105");
+        let until = bus.now().mono + Duration::from_millis(150);
+        hear(bus, until)
+    };
+    play(
+        &mut bus,
+        &[
+            ("605#233161010000AB00", "705#00 585#6031610100000000"),
+            ("605#2B17100060EA0000", "585#6017100000000000 705#7F"),
+            ("605#2310100365766173", "585#8010100320000008"),
+            ("605#2310100373617665", "585#6010100300000000"),
+        ],
+    );
+    assert_eq!(reset(&mut bus), ["705#00"]);
+    play(
+        &mut bus,
+        &[
+            ("605#4031610100000000", "585#433161010000AB00"),
+            ("605#4017100000000000", "585#4B17100000000000"),
+            // Restored after the reset, not before.
+            ("605#231110016C6F6164", "585#6011100100000000"),
+            ("605#4031610100000000", "585#433161010000AB00"),
+        ],
+    );
+    assert_eq!(reset(&mut bus), ["705#00"]);
+    play(&mut bus, &[("605#4031610100000000", "585#4331610100004E00")]);
+}
+
+#[test]
+fn a_node_id_with_its_signature_is_taken_at_the_reset_after_saving() {
+    let mut bus = bus([still("mh4", 5, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            ("605#2320230003000000", "705#00 585#8020230020000008"),
+            ("605#2320230003736574", "585#6020230000000000"),
+            ("605#2310100173617665", "585#6010100100000000"),
+            ("000#8105", "-"),
+        ],
+    );
+    assert_eq!(hear(&mut bus, ms(300)), ["703#00"]);
+    assert_eq!(device(&mut bus).node(), node(3));
+    play(
+        &mut bus,
+        &[
+            ("605#4000100000000000", "-"),
+            ("603#4000100000000000", "583#4300100094018200"),
+            ("603#4000180100000000", "583#4300180183010040"),
+        ],
+    );
+}
+
+#[test]
+fn autozero_and_the_extremes() {
+    let mut bus = bus([still("mh4", 5, 0.25)]);
+    play(
+        &mut bus,
+        &[
+            ("605#4020200100000000", "705#00 585#432020010000803E"),
+            ("605#236561017A65726F", "585#8065610100000206"),
+            ("605#232561017A65726F", "585#6025610100000000"),
+            ("605#4025610100000000", "585#8025610101000106"),
+            ("605#4027610100000000", "585#43276101000080BE"),
+            ("605#4030610100000000", "585#4330610100000000"),
+            ("605#232220017A65726F", "585#6022200100000000"),
+            ("605#4020200100000000", "585#4320200100000000"),
+        ],
+    );
+}
+
+#[test]
+fn devices_that_start_by_themselves() {
+    let mut setup = still("mh4", 5, 5.0);
+    setup.set = vec![(id("1F80"), Scalar::Integer(8))];
+    let mut autonomous = bus([setup]);
+    play(&mut autonomous, &[("080#", "705#00 185#0000A04000")]);
+    let mut setup = still("dps", 127, 5.0);
+    setup.start = true;
+    let mut started = bus([setup]);
+    assert_eq!(hear(&mut started, ms(250)), ["77F#00", "1FF#88130000", "1FF#88130000"]);
+}
+
+#[test]
+fn what_cannot_be_set_is_told_in_words() {
+    let mut setup = still("mh4", 5, 5.0);
+    setup.set = vec![(id("5000"), Scalar::Integer(1))];
+    assert_eq!(Device::new(setup).err().as_deref(), Some("mh4 has no object 0x5000:0"));
+    let mut setup = still("mh4", 5, 5.0);
+    setup.set = vec![(id("1017"), Scalar::Integer(70_000))];
+    assert_eq!(Device::new(setup).err().as_deref(), Some("0x1017:0: 70000 does not fit u16 (0 to 65535)"));
+}
+
+#[test]
+fn the_same_seed_gives_the_same_frames_and_another_gives_others() {
+    let run = |seed| {
+        let mut setups = Vec::new();
+        for (kind, id) in [("mh4", 1), ("d20", 2), ("mc1609", 3), ("dps", 127)] {
+            let mut setup = Setup::new(catalog::by_name(kind).expect("built in"), node(id));
+            (setup.seed, setup.start) = (seed, true);
+            setups.push(setup);
+        }
+        let mut bus = bus(setups);
+        let mut heard = Vec::new();
+        for round in 1..=50 {
+            bus.send(&"080#".parse().expect("a frame")).expect("room");
+            heard.extend(timed(&mut bus, ms(round * 10)));
+        }
+        heard
+    };
+    let first = run(1);
+    // 4 boot-ups, 2 TPDOs on each of 50 SYNCs, 4 rounds of 4 + 1 on the timers; those of 500 ms are still under way.
+    assert_eq!(first.len(), 4 + 100 + 20);
+    assert_eq!(first, run(1));
+    assert_ne!(first, run(2));
+}
+
+/// A file in memory that the test keeps a hold of.
+#[derive(Clone, Default)]
+struct Shared(Arc<Mutex<Vec<u8>>>);
+
+impl std::io::Write for Shared {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.lock().expect("not poisoned").extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn the_record_has_every_value_at_the_moment_its_frame_is_complete() {
+    let file = Shared::default();
+    let recorder = Recorder::new(Box::new(file.clone())).expect("memory");
+    let mut setup = still("mh4", 5, 5.0);
+    setup.overloads =
+        vec![(1, Overload { from: Duration::from_millis(49), until: Duration::MAX, direction: Direction::High })];
+    setup.start = true;
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(Device::new(setup).expect("a device").recording(recorder.clone()));
+    let mut dps = still("dps", 127, 17.898);
+    dps.start = true;
+    bus.attach(Device::new(dps).expect("a device").recording(recorder.clone()));
+    let mut frames = Vec::new();
+    for at in [10, 60, 110] {
+        bus.receive(ms(at - 10)).expect("no error");
+        bus.send(&"080#".parse().expect("a frame")).expect("room");
+        while let Ok(Event::Frame(received)) = bus.receive(ms(at)) {
+            if !received.frame.data().is_empty() && received.frame.len() >= 4 && received.frame.len() < 8 {
+                frames.push((received.at.mono.since_start().as_micros(), received.frame));
+            }
+        }
+    }
+    recorder.flush().expect("memory");
+    let text = String::from_utf8(file.0.lock().expect("not poisoned").clone()).expect("text");
+    let lines: Vec<&str> = text.lines().collect();
+    let at: Vec<u128> = frames.iter().map(|(at, _)| *at).collect();
+    assert_eq!(
+        lines,
+        [
+            crate::sim::HEADER.to_owned(),
+            format!("{},5,pressure,5,bar,ok,0x0000A040", at[0]),
+            format!("{},5,pressure,,bar,overload-high,0x0000C07F", at[1]),
+            format!("{},127,pressure,17.898,psi,,0xEA450000", at[2]),
+            format!("{},5,pressure,,bar,overload-high,0x0000C07F", at[3]),
+        ]
+    );
+}

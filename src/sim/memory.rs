@@ -1,0 +1,116 @@
+//! What the SDO server of a simulated device sees: objects that hold something, objects that show a
+//! measurement, and objects that do something when they are written.
+
+use super::abort::Abort;
+use super::channels::Channels;
+use super::emergency::Emergencies;
+use super::objects::{Group, Objects, Signature};
+use super::sdo_server::Dictionary;
+use super::tpdo;
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::device::description::Remap;
+use crate::device::unit::Unit;
+use std::time::Duration;
+
+/// Objects, measuring channels and errors of one device.
+#[derive(Clone, Debug)]
+pub(super) struct Memory {
+    pub(super) node: NodeId,
+    pub(super) objects: Objects,
+    pub(super) channels: Channels,
+    pub(super) emergencies: Emergencies,
+    pub(super) remap: Remap,
+}
+
+impl Memory {
+    /// The bytes of an object at `time`, whatever its access.
+    pub(super) fn value(&mut self, object: ObjectId, time: Duration) -> Option<Vec<u8>> {
+        match self.channels.read(&self.objects, object, time) {
+            Some(shown) => Some(shown),
+            None => self.objects.bytes(object).map(<[u8]>::to_vec),
+        }
+    }
+
+    /// Whether a TPDO without mapped objects goes out, with no bytes, instead of not at all.
+    pub(super) fn sends_empty(&self) -> bool {
+        self.remap == Remap::CountOnly
+    }
+
+    /// The memory during one request.
+    pub(super) fn at(&mut self, time: Duration, pre_operational: bool) -> Access<'_> {
+        Access { memory: self, time, pre_operational, written: None }
+    }
+
+    /// A write that has passed every check.
+    fn act(&mut self, object: ObjectId, bytes: &[u8], time: Duration) -> Result<(), Abort> {
+        match self.objects.spec(object).and_then(|spec| spec.signature) {
+            Some(Signature::Save) => {
+                let group = Group::of_sub(object.sub).ok_or(Abort::NOT_STORED)?;
+                self.objects.save(group, self.node);
+            }
+            Some(Signature::Load) => self.objects.restore(Group::of_sub(object.sub).ok_or(Abort::NOT_STORED)?),
+            Some(Signature::Zero) if object.index & 0x0fff == 0x125 => {
+                if !self.channels.autozero(&mut self.objects, object.sub, time) {
+                    return Err(Abort::NOT_STORED);
+                }
+            }
+            Some(Signature::Zero) => self.channels.forget_extremes(object.sub),
+            // The signature goes, the number stays.
+            Some(Signature::Set) => {
+                self.objects.put(object, vec![bytes.first().copied().unwrap_or(0), 0, 0, 0]);
+            }
+            None if object == ObjectId::new(0x1003, 0) => {
+                if bytes != [0] {
+                    return Err(Abort::VALUE);
+                }
+                self.emergencies.clear_history(&mut self.objects);
+            }
+            None if self.channels.is_unit(object) => {
+                let code = bytes.iter().rev().fold(0u32, |code, byte| code << 8 | u32::from(*byte));
+                if !self.channels.change_unit(&mut self.objects, object, Unit(code)) {
+                    return Err(Abort::VALUE);
+                }
+            }
+            None => self.objects.put(object, bytes.to_vec()),
+        }
+        Ok(())
+    }
+}
+
+/// The memory at one moment.
+pub(super) struct Access<'a> {
+    memory: &'a mut Memory,
+    time: Duration,
+    pre_operational: bool,
+    /// The object that was written.
+    pub(super) written: Option<ObjectId>,
+}
+
+impl Dictionary for Access<'_> {
+    fn upload(&mut self, object: ObjectId) -> Result<Vec<u8>, Abort> {
+        self.memory.objects.check_readable(object)?;
+        self.memory.value(object, self.time).ok_or(Abort::GENERAL)
+    }
+
+    fn width(&self, object: ObjectId) -> Result<Option<usize>, Abort> {
+        Ok(self.memory.objects.check_writable(object)?.data_type.width())
+    }
+
+    fn download(&mut self, object: ObjectId, bytes: &[u8]) -> Result<(), Abort> {
+        let objects = &self.memory.objects;
+        let pdo = || tpdo::check(objects, self.memory.remap, self.pre_operational, object, bytes);
+        // What cannot be mapped is told as that, before the limits of the entry are.
+        if (0x1a00..0x1c00).contains(&object.index) && object.sub > 0 {
+            objects.check_length(object, bytes)?;
+            pdo()?;
+            objects.check_write(object, bytes)?;
+        } else {
+            objects.check_write(object, bytes)?;
+            pdo()?;
+        }
+        self.memory.act(object, bytes, self.time)?;
+        self.written = Some(object);
+        Ok(())
+    }
+}
