@@ -16,9 +16,11 @@
 //!   They return reports and print nothing.
 //! - [`output`] → tasks (reports), measure, device, canopen (values). Rows and text; knows no bus and no
 //!   command line.
+//! - [`cli`] → everything; holds no protocol bytes and no sockets. One file a subcommand.
 
 pub mod bus;
 pub mod canopen;
+pub mod cli;
 pub mod device;
 pub mod master;
 pub mod measure;

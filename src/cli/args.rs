@@ -44,8 +44,9 @@ impl FromStr for Nodes {
         for part in text.split(',') {
             let (first, last) = part.split_once('-').unwrap_or((part, part));
             let node = |text: &str| {
-                text.parse::<NodeId>()
-                    .map_err(|_| format!("\"{text}\" is not a node-ID: they go from 1 to 127 (5, 0x7f, 1-16, 1,5, all)"))
+                text.parse::<NodeId>().map_err(|_| {
+                    format!("\"{text}\" is not a node-ID: they go from 1 to 127 (5, 0x7f, 1-16, 1,5, all)")
+                })
             };
             let (first, last) = (node(first)?, node(last)?);
             if first > last {
@@ -72,7 +73,10 @@ impl FromStr for SignalArg {
         }
         // `ch1` reads as a name, `6130:1` as an object; hexadecimal words without a digit in front are names.
         if text.starts_with(|first: char| first.is_ascii_digit()) {
-            return text.parse::<ObjectId>().map(|object| SignalArg(Wanted::Object(object))).map_err(|error| error.to_string());
+            return text
+                .parse::<ObjectId>()
+                .map(|object| SignalArg(Wanted::Object(object)))
+                .map_err(|error| error.to_string());
         }
         if is_name(text) {
             return Ok(SignalArg(Wanted::Signal(text.to_owned())));
@@ -137,14 +141,20 @@ impl FromStr for BusSpec {
             Some(("sim", rest)) => Ok(BusSpec::Sim(Some(rest.to_owned()))),
             Some(("socketcan", name)) => interface(name),
             None => interface(text),
-            Some(_) => Err(format!("\"{text}\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml)")),
+            Some(_) => {
+                Err(format!("\"{text}\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml)"))
+            }
         }
     }
 }
 
 fn interface(name: &str) -> Result<BusSpec, String> {
     let fits = (1..16).contains(&name.len()) && !name.contains(['/', ' ', '\0']);
-    if fits { Ok(BusSpec::SocketCan(name.to_owned())) } else { Err(format!("\"{name}\" is not a name of an interface")) }
+    if fits {
+        Ok(BusSpec::SocketCan(name.to_owned()))
+    } else {
+        Err(format!("\"{name}\" is not a name of an interface"))
+    }
 }
 
 /// A description named by the user: `mh4`, `FILE.toml`, `5=mh4`.

@@ -101,7 +101,9 @@ impl Log {
 
     fn record(&self, global: &Global, file: Option<&File>) -> anyhow::Result<Option<Outcome>> {
         let show = match global.progress {
-            When::Auto => !global.quiet && io::stderr().is_terminal() && (file.is_some() || !io::stdout().is_terminal()),
+            When::Auto => {
+                !global.quiet && io::stderr().is_terminal() && (file.is_some() || !io::stdout().is_terminal())
+            }
             When::Always => true,
             When::Never => false,
         };
@@ -199,7 +201,8 @@ impl Log {
 
 /// A file in which not one row came to stand was not there before and shall not be there now.
 fn remove_if_empty(path: &Path, file: Option<&File>) {
-    let length = file.and_then(|file| file.metadata().ok()).filter(|metadata| metadata.is_file()).map(|metadata| metadata.len());
+    let length =
+        file.and_then(|file| file.metadata().ok()).filter(|metadata| metadata.is_file()).map(|metadata| metadata.len());
     let header = crate::output::rows::HEADER.len() as u64 + 1;
     if length.is_some_and(|length| length <= header) {
         // What cannot be removed stays, with its header: nothing is lost by it.
@@ -241,13 +244,15 @@ impl Observer for Screen {
     fn note(&mut self, note: &Note, _at: Stamp) {
         match note {
             Note::Remark(text) => self.console.warn(text),
-            Note::Emergency(node, emergency) => self.console.warn(&format!("node {node}: {}", emergency_text(emergency))),
+            Note::Emergency(node, emergency) => {
+                self.console.warn(&format!("node {node}: {}", emergency_text(emergency)))
+            }
             Note::Restarted(node) => self.console.warn(&format!("node {node} restarted")),
             Note::Silent(node, since) => self.console.warn(&format!("node {node}: silent for {}", spoken(*since))),
             Note::Back(node) => self.console.note(&format!("node {node} is back")),
-            Note::WrongLength(node) => self.console.warn(&format!(
-                "node {node}: a TPDO has not the length of its mapping: no row is made of it"
-            )),
+            Note::WrongLength(node) => self
+                .console
+                .warn(&format!("node {node}: a TPDO has not the length of its mapping: no row is made of it")),
             Note::Fault(fault) => self.console.detail(&fault.to_string()),
             Note::Dropped(count) => self.console.warn(&format!("the kernel dropped {count} frames")),
             Note::Link(true) => self.console.note("the interface is up again"),

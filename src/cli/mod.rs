@@ -156,10 +156,7 @@ impl Global {
     }
 
     /// Runs `work` with a master on the bus.
-    pub(crate) fn with_master<T>(
-        &self,
-        work: impl FnOnce(&mut Master<'_>) -> anyhow::Result<T>,
-    ) -> anyhow::Result<T> {
+    pub(crate) fn with_master<T>(&self, work: impl FnOnce(&mut Master<'_>) -> anyhow::Result<T>) -> anyhow::Result<T> {
         let mut bus = open::open(self)?;
         let mut master = Master::new(&mut *bus, self.timing(Timing::default().timeout));
         let result = work(&mut master);

@@ -18,7 +18,9 @@ use std::io::{self, Write};
 /// After a command the state is confirmed: by heartbeat or boot-up, by node guarding where that is
 /// harmless, or by SDO, which proves only stopped. What nothing confirms is said ("none").
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  cangauge -b sim nmt start 1\n  cangauge -b sim nmt reset 127\n  cangauge -b sim nmt state 1-3")]
+#[command(
+    after_help = "Examples:\n  cangauge -b sim nmt start 1\n  cangauge -b sim nmt reset 127\n  cangauge -b sim nmt state 1-3"
+)]
 pub struct Nmt {
     #[command(subcommand)]
     action: Action,
@@ -112,7 +114,10 @@ impl Targets {
                 let why = if kind.is_reset() && report.present { "sent, and no boot-up came".to_owned() } else { why };
                 let failure = Failure::of_node(Kind::NoAnswer, report.node, why);
                 if self.confirm {
-                    return Some(failure.hint(format!("set a heartbeat: cangauge sdo write {} producer-heartbeat-time 1000", report.node)));
+                    return Some(failure.hint(format!(
+                        "set a heartbeat: cangauge sdo write {} producer-heartbeat-time 1000",
+                        report.node
+                    )));
                 }
                 global.console().note(&failure.message);
                 None

@@ -5,12 +5,14 @@ use super::args::{BusSpec, Nodes};
 use super::exit::{FileError, IntoFailure};
 use super::read::everybody;
 use crate::bus::Bus;
+use crate::bus::interrupt::Interrupts;
+use crate::bus::memory::MemoryBus;
 use crate::bus::trace::Traced;
 use crate::canopen::id::NodeId;
 use crate::device::catalog::{self, Model};
 use crate::master::Master;
 use crate::measure::survey::Overrides;
-use crate::sim;
+use crate::sim::{Bench, BenchError};
 use crate::tasks::{Failure, Kind};
 use std::fs::File;
 use std::io::{self, Write};
@@ -44,10 +46,22 @@ pub(super) fn open(global: &Global) -> anyhow::Result<Box<dyn Bus>> {
     })
 }
 
-fn simulated(bench: Option<&str>) -> anyhow::Result<crate::bus::memory::MemoryBus> {
-    let usage = |message: String| Failure::new(Kind::Usage, message);
-    let bench = sim::Bench::parse(bench.unwrap_or_default()).map_err(|error| usage(error.to_string()))?;
-    Ok(sim::open(&bench).map_err(|source| FileError { what: "open the simulated bus".to_owned(), source })?)
+fn simulated(spec: Option<&str>) -> anyhow::Result<MemoryBus> {
+    let interrupts = Interrupts::new().map_err(|source| FileError { what: "watch for Ctrl-C".to_owned(), source })?;
+    Ok(bench(spec.unwrap_or_default())?.open().map_err(bench_error)?.with_sleeper(Box::new(interrupts)))
+}
+
+/// Reads a bench.
+pub(super) fn bench(spec: &str) -> anyhow::Result<Bench> {
+    Bench::parse(spec).map_err(bench_error)
+}
+
+/// What is wrong with a bench, in the contract's kinds.
+pub(super) fn bench_error(error: BenchError) -> anyhow::Error {
+    match error {
+        BenchError::Usage(message) => Failure::new(Kind::Usage, message).into(),
+        BenchError::Io { path, source } => FileError { what: path.display().to_string(), source }.into(),
+    }
 }
 
 #[cfg(target_os = "linux")]
@@ -84,7 +98,8 @@ fn only_interface() -> Result<BusSpec, Failure> {
         (false, true) => format!("which bus? No CAN interface is up: {}", list.join(", ")),
         (false, false) => format!("which bus? There are several CAN interfaces: {}", list.join(", ")),
     };
-    let example = up.first().or(all.iter().map(|(name, _)| name).collect::<Vec<_>>().first()).map(|name| name.to_string());
+    let example =
+        up.first().or(all.iter().map(|(name, _)| name).collect::<Vec<_>>().first()).map(|name| name.to_string());
     let hint = match example {
         Some(name) => format!("name one: --bus {name}, or without hardware: --bus sim"),
         None => "without hardware: --bus sim".to_owned(),
@@ -117,7 +132,9 @@ fn model(what: &str) -> anyhow::Result<Arc<Model>> {
     let names: Vec<&str> = catalog::built_in().iter().map(|model| model.description.name.as_str()).collect();
     if !what.contains(['.', '/']) {
         let message = format!("there is no built-in device \"{what}\"");
-        return Err(Failure::new(Kind::Usage, message).hint(format!("there are: {}; or name a file", names.join(", "))).into());
+        return Err(Failure::new(Kind::Usage, message)
+            .hint(format!("there are: {}; or name a file", names.join(", ")))
+            .into());
     }
     let text = std::fs::read_to_string(what).map_err(|source| FileError { what: format!("read {what}"), source })?;
     let model = Model::from_toml(&text).map_err(|error| Failure::new(Kind::Usage, format!("{what}: {error}")))?;

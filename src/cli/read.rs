@@ -20,7 +20,9 @@ use std::io::{self, Write};
 /// One signal of one node prints the bare number, so that P=$(cangauge read 5 pressure) works. Without
 /// SIGNAL every signal of the device is read.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  cangauge -b sim read 1\n  cangauge -b sim read 127 pressure --in bar\n  cangauge -b sim read 1,127 --format json")]
+#[command(
+    after_help = "Examples:\n  cangauge -b sim read 1\n  cangauge -b sim read 127 pressure --in bar\n  cangauge -b sim read 1,127 --format json"
+)]
 pub struct Read {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
@@ -32,7 +34,8 @@ pub struct Read {
 }
 
 fn parse_unit(text: &str) -> Result<Unit, String> {
-    Unit::from_symbol(text).ok_or_else(|| format!("\"{text}\" is not a known unit (bar, mbar, kPa, MPa, psi, degC, degF, K, 0x…)"))
+    Unit::from_symbol(text)
+        .ok_or_else(|| format!("\"{text}\" is not a known unit (bar, mbar, kPa, MPa, psi, degC, degF, K, 0x…)"))
 }
 
 /// A value ready to be shown.
@@ -56,7 +59,9 @@ impl Read {
         })?;
         let (mut shown, mut failures) = (Vec::new(), Vec::new());
         for result in results {
-            match result.and_then(|samples| samples.into_iter().map(|(target, sample)| self.show(target, &sample)).collect::<Result<Vec<_>, _>>()) {
+            match result.and_then(|samples| {
+                samples.into_iter().map(|(target, sample)| self.show(target, &sample)).collect::<Result<Vec<_>, _>>()
+            }) {
                 Ok(values) => shown.extend(values),
                 Err(failure) => failures.push(failure),
             }
@@ -151,8 +156,10 @@ fn print(shown: &[Shown], format: Format, bare: bool) -> io::Result<Option<Failu
 pub(super) fn everybody(master: &mut Master<'_>, global: &Global) -> anyhow::Result<Vec<NodeId>> {
     let all: Vec<NodeId> = NodeId::all().collect();
     let timing = global.timing(std::time::Duration::from_millis(200));
-    let found = crate::tasks::scan::scan(master, &all, timing.timeout, 1 + timing.retries, &Default::default()).or_fail()?;
-    let nodes: Vec<NodeId> = found.into_iter().filter(|found| found.failure.is_none()).map(|found| found.node).collect();
+    let found =
+        crate::tasks::scan::scan(master, &all, timing.timeout, 1 + timing.retries, &Default::default()).or_fail()?;
+    let nodes: Vec<NodeId> =
+        found.into_iter().filter(|found| found.failure.is_none()).map(|found| found.node).collect();
     if nodes.is_empty() {
         return Err(Failure::new(Kind::NoAnswer, "nobody answered").hint("cangauge scan tells more").into());
     }

@@ -72,8 +72,9 @@ fn nobody(passive: bool) -> Failure {
         return Failure::new(Kind::NoAnswer, "nobody showed itself")
             .hint("without heartbeats and TPDOs a node is silent; ask: cangauge scan");
     }
-    Failure::new(Kind::NoAnswer, "nobody answered")
-        .hint("check the sensor's power, the bit rate, the wiring and the 120 ohm terminators; without hardware: --bus sim")
+    Failure::new(Kind::NoAnswer, "nobody answered").hint(
+        "check the sensor's power, the bit rate, the wiring and the 120 ohm terminators; without hardware: --bus sim",
+    )
 }
 
 fn print(found: &[Found], format: Format) -> io::Result<()> {

@@ -11,7 +11,6 @@ use crate::output::{json, text};
 use crate::tasks::sdo::{Knowledge, ReadValue, encode, read, write};
 use crate::tasks::{Failure, Kind};
 use clap::{Args, Subcommand};
-use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -20,7 +19,9 @@ use std::path::{Path, PathBuf};
 /// OBJECT is 0x6130:1, 6130:1, 6130h:1 or 6130.1 (the index is always hexadecimal, the sub-index
 /// decimal), or a name: vendor-id, producer-heartbeat-time, ai-input-pv:1.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  cangauge -b sim sdo read 1 0x1018:1\n  cangauge -b sim sdo read 1 vendor-id serial-number\n  cangauge -b sim sdo write 1 producer-heartbeat-time 1000 --verify")]
+#[command(
+    after_help = "Examples:\n  cangauge -b sim sdo read 1 0x1018:1\n  cangauge -b sim sdo read 1 vendor-id serial-number\n  cangauge -b sim sdo write 1 producer-heartbeat-time 1000 --verify"
+)]
 pub struct Sdo {
     #[command(subcommand)]
     action: Action,
@@ -87,10 +88,7 @@ fn resolve(knowledge: &mut Knowledge, master: &mut Master<'_>, object: &ObjectAr
 }
 
 fn hex(bytes: &[u8]) -> String {
-    let mut text = "0x".to_owned();
-    // Writing to a String cannot fail.
-    bytes.iter().for_each(|byte| drop(write!(text, "{byte:02X}")));
-    text
+    bytes.iter().fold("0x".to_owned(), |text, byte| text + &format!("{byte:02X}"))
 }
 
 impl ReadArgs {

@@ -2,8 +2,8 @@
 
 use super::exit::IntoFailure;
 use super::{Global, open};
+use crate::bus::memory::Station;
 use crate::sim;
-use crate::tasks::{Failure, Kind};
 use clap::Args;
 
 /// Simulate devices on a bus until Ctrl-C
@@ -20,11 +20,12 @@ pub struct Sim {
 
 impl Sim {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let usage = |message: String| Failure::new(Kind::Usage, message);
-        let bench = sim::Bench::parse(&self.devices.join(",")).map_err(|error| usage(error.to_string()))?;
+        let bench = open::bench(&self.devices.join(","))?;
         let mut bus = open::open(global)?;
-        let mut stations = bench.stations().map_err(|error| usage(error.to_string()))?;
+        let devices = bench.into_devices().map_err(open::bench_error)?;
+        let stations = devices.into_iter().map(|device| Box::new(device) as Box<dyn Station>).collect();
         global.console().note("simulating; Ctrl-C ends");
-        Ok(sim::host::run(&mut *bus, &mut stations, None).or_fail()?)
+        sim::host::run(&mut *bus, stations, None).or_fail()?;
+        Ok(())
     }
 }

@@ -140,6 +140,9 @@ pub fn requests(target: &Target) -> Vec<Request> {
     objects.into_iter().flatten().map(|object| Request::read(target.source.node, object)).collect()
 }
 
+/// What was read of one node.
+pub type Readings = Vec<(Target, Sample)>;
+
 /// Reads measured values of several nodes, side by side. One result a node: its targets with their
 /// samples, or why there is none.
 ///
@@ -150,7 +153,7 @@ pub fn read(
     nodes: &[NodeId],
     wanted: &[Wanted],
     overrides: &Overrides,
-) -> Result<Vec<Result<Vec<(Target, Sample)>, Failure>>, Error> {
+) -> Result<Vec<Result<Readings, Failure>>, Error> {
     let mut results = Vec::new();
     for &node in nodes {
         results.push(match instruments(master, &[node], overrides) {
@@ -169,7 +172,7 @@ fn read_one(
     master: &mut Master<'_>,
     instrument: &Instrument,
     wanted: &[Wanted],
-) -> Result<Result<Vec<(Target, Sample)>, Failure>, Error> {
+) -> Result<Result<Readings, Failure>, Error> {
     let targets = match targets(instrument, wanted, &mut 0) {
         Ok(targets) => targets,
         Err(failure) => return Ok(Err(failure)),

@@ -171,7 +171,11 @@ pub fn encode(
     }
     let answer = master.transfer_one(Request::read(knowledge.node, object))?;
     let width = match &answer {
-        Ok(answer) => answer.uploaded.as_ref().filter(|uploaded| uploaded.indicated).map(|uploaded: &Uploaded| uploaded.bytes.len()),
+        Ok(answer) => answer
+            .uploaded
+            .as_ref()
+            .filter(|uploaded| uploaded.indicated)
+            .map(|uploaded: &Uploaded| uploaded.bytes.len()),
         Err(SdoError { failure: SdoFailure::Refused(_), .. }) => None,
         Err(error) => return Err(error.clone().into()),
     };
@@ -182,8 +186,10 @@ pub fn encode(
             let data_type = if text.starts_with('-') { DataType::Integer(width) } else { DataType::Unsigned(width) };
             Ok((data_type.encode_text(text).map_err(|error| usage(error.to_string()))?, data_type))
         }
-        _ => Err(usage("its type is not known".to_owned())
-            .hint(format!("say it: cangauge sdo write {} {object} {text} --type u32 (or i16, r32, vs …)", knowledge.node))),
+        _ => Err(usage("its type is not known".to_owned()).hint(format!(
+            "say it: cangauge sdo write {} {object} {text} --type u32 (or i16, r32, vs …)",
+            knowledge.node
+        ))),
     }
 }
 
@@ -192,12 +198,7 @@ pub fn encode(
 ///
 /// # Errors
 /// The device's refusal, silence or breach of the protocol.
-pub fn write(
-    master: &mut Master<'_>,
-    knowledge: &Knowledge,
-    object: ObjectId,
-    data: &[u8],
-) -> Result<(), Failure> {
+pub fn write(master: &mut Master<'_>, knowledge: &Knowledge, object: ObjectId, data: &[u8]) -> Result<(), Failure> {
     let omits = matches!(&knowledge.model, Some(Some(model)) if model.description.sdo.size == SizeIndication::Omitted);
     let sizes = if omits {
         [DownloadSize::Omitted, DownloadSize::Indicated]

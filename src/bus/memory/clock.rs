@@ -1,5 +1,6 @@
 //! The two clocks of the bus inside the process, and the wait that a person can interrupt.
 
+use crate::bus::interrupt::Interrupts;
 use crate::bus::time::{Mono, Wall};
 use std::time::{Duration, Instant};
 
@@ -33,6 +34,13 @@ impl Sleeper for Uninterrupted {
             std::thread::sleep(length);
         }
         false
+    }
+}
+
+/// Ctrl-C and SIGTERM.
+impl Sleeper for Interrupts {
+    fn sleep(&mut self, length: Duration) -> bool {
+        if length.is_zero() { self.take() } else { self.wait_until(Instant::now() + length) }
     }
 }
 
