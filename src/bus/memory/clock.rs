@@ -1,5 +1,6 @@
 //! The two clocks of the bus inside the process, and the wait that a person can interrupt.
 
+use crate::bus::interrupt::Interrupts;
 use crate::bus::time::{Mono, Wall};
 use std::time::{Duration, Instant};
 
@@ -21,6 +22,13 @@ pub trait Sleeper: Send {
     /// Waits for `length`. Returns `true` at once, and once, when the user has asked to stop; with a length
     /// of zero it only looks.
     fn sleep(&mut self, length: Duration) -> bool;
+}
+
+/// Ctrl-C and SIGTERM.
+impl Sleeper for Interrupts {
+    fn sleep(&mut self, length: Duration) -> bool {
+        if length.is_zero() { self.take() } else { self.wait_until(Instant::now() + length) }
+    }
 }
 
 /// Waits that nobody interrupts.
