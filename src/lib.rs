@@ -16,3 +16,12 @@
 //!   They return reports and print nothing.
 //! - [`output`] → tasks (reports), measure, device, canopen (values). Rows and text; knows no bus and no
 //!   command line.
+
+pub mod bus;
+pub mod canopen;
+pub mod device;
+pub mod master;
+pub mod measure;
+pub mod output;
+pub mod sim;
+pub mod tasks;

@@ -1,3 +1,13 @@
 //! The program: parse, run, exit code.
 
-fn main() {}
+use cangauge::cli::{Cli, exit, run};
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match run(&cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => ExitCode::from(exit::report(&cli, &error)),
+    }
+}

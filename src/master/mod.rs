@@ -163,6 +163,17 @@ impl<'bus> Master<'bus> {
         let _ = self.outgoing.flush(self.bus, now, self.timing.timeout, &mut |_, _| {});
     }
 
+    /// Sends what still waits, within a second at most: an abort, a state put back.
+    pub fn settle(&mut self) {
+        let until = self.now() + Duration::from_secs(1);
+        while self.is_sending() && self.now() < until {
+            let step = self.now() + Duration::from_millis(1);
+            if self.next(step).is_err() {
+                return;
+            }
+        }
+    }
+
     /// The next thing that happens, at the latest [`Happening::Deadline`] once `until` is reached.
     ///
     /// Time is told by what is received, so that traffic never extends a deadline and a slow program never

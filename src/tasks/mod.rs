@@ -5,5 +5,6 @@ pub mod log;
 pub mod nmt;
 pub mod read;
 pub mod scan;
+pub mod sdo;
 
 pub use failure::{Failure, Kind};

@@ -1,0 +1,221 @@
+//! What people type: nodes, signals, objects, durations. Everything is checked here, before a bus is
+//! opened.
+
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::measure::decode::Wanted;
+use std::collections::BTreeSet;
+use std::fmt;
+use std::str::FromStr;
+
+/// A duration: `500ms`, `10s`, `1h30m`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Duration(pub std::time::Duration);
+
+impl FromStr for Duration {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Duration, String> {
+        match humantime::parse_duration(text) {
+            Ok(duration) if duration.is_zero() => Err("a duration must be longer than 0".to_owned()),
+            Ok(duration) => Ok(Duration(duration)),
+            Err(_) => Err(format!("\"{text}\" is not a duration (500ms, 10s, 1h30m)")),
+        }
+    }
+}
+
+/// Which nodes: `5`, `0x7f`, `1-16`, `1,5,0x10-0x1f`, `all`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Nodes {
+    /// Everybody.
+    All,
+    /// These, in ascending order.
+    These(Vec<NodeId>),
+}
+
+impl FromStr for Nodes {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Nodes, String> {
+        if text == "all" {
+            return Ok(Nodes::All);
+        }
+        let mut nodes = BTreeSet::new();
+        for part in text.split(',') {
+            let (first, last) = part.split_once('-').unwrap_or((part, part));
+            let node = |text: &str| {
+                text.parse::<NodeId>()
+                    .map_err(|_| format!("\"{text}\" is not a node-ID: they go from 1 to 127 (5, 0x7f, 1-16, 1,5, all)"))
+            };
+            let (first, last) = (node(first)?, node(last)?);
+            if first > last {
+                return Err(format!("\"{part}\" counts backwards: {last}-{first}"));
+            }
+            nodes.extend(NodeId::all().filter(|node| (first..=last).contains(node)));
+        }
+        Ok(Nodes::These(nodes.into_iter().collect()))
+    }
+}
+
+/// A signal or an object: `pressure`, `pressure.status`, `0x6130:1`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SignalArg(pub Wanted);
+
+impl FromStr for SignalArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<SignalArg, String> {
+        if let Some(name) = text.strip_suffix(".status")
+            && is_name(name)
+        {
+            return Ok(SignalArg(Wanted::Status(name.to_owned())));
+        }
+        // `ch1` reads as a name, `6130:1` as an object; hexadecimal words without a digit in front are names.
+        if text.starts_with(|first: char| first.is_ascii_digit()) {
+            return text.parse::<ObjectId>().map(|object| SignalArg(Wanted::Object(object))).map_err(|error| error.to_string());
+        }
+        if is_name(text) {
+            return Ok(SignalArg(Wanted::Signal(text.to_owned())));
+        }
+        Err(format!("\"{text}\" is neither a signal (pressure, temperature, ch1) nor an object (0x6130:1)"))
+    }
+}
+
+fn is_name(text: &str) -> bool {
+    text.starts_with(|first: char| first.is_ascii_alphabetic())
+        && text.chars().all(|character| character.is_ascii_alphanumeric() || character == '-' || character == '_')
+}
+
+/// An object by address or by name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ObjectArg {
+    /// `0x6130:1`.
+    Address(ObjectId),
+    /// `producer-heartbeat-time`, `ai-input-pv:1`.
+    Name(String),
+}
+
+impl FromStr for ObjectArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<ObjectArg, String> {
+        if let Ok(object) = text.parse() {
+            return Ok(ObjectArg::Address(object));
+        }
+        let (name, sub) = text.split_once(':').unwrap_or((text, "0"));
+        if name.contains('-') && is_name(name) && sub.parse::<u8>().is_ok() {
+            return Ok(ObjectArg::Name(text.to_ascii_lowercase()));
+        }
+        Err(format!("\"{text}\" is neither an object (0x1018:1) nor a name (vendor-id, ai-input-pv:1)"))
+    }
+}
+
+impl fmt::Display for ObjectArg {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ObjectArg::Address(object) => object.fmt(f),
+            ObjectArg::Name(name) => f.write_str(name),
+        }
+    }
+}
+
+/// Which bus.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum BusSpec {
+    /// A SocketCAN interface.
+    SocketCan(String),
+    /// The simulated bus: what stands behind `sim:`, or nothing.
+    Sim(Option<String>),
+}
+
+impl FromStr for BusSpec {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<BusSpec, String> {
+        match text.split_once(':') {
+            None if text == "sim" => Ok(BusSpec::Sim(None)),
+            Some(("sim", rest)) => Ok(BusSpec::Sim(Some(rest.to_owned()))),
+            Some(("socketcan", name)) => interface(name),
+            None => interface(text),
+            Some(_) => Err(format!("\"{text}\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml)")),
+        }
+    }
+}
+
+fn interface(name: &str) -> Result<BusSpec, String> {
+    let fits = (1..16).contains(&name.len()) && !name.contains(['/', ' ', '\0']);
+    if fits { Ok(BusSpec::SocketCan(name.to_owned())) } else { Err(format!("\"{name}\" is not a name of an interface")) }
+}
+
+/// A description named by the user: `mh4`, `FILE.toml`, `5=mh4`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Override {
+    /// For this node only.
+    pub node: Option<NodeId>,
+    /// A built-in name or a file.
+    pub what: String,
+}
+
+impl FromStr for Override {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Override, String> {
+        match text.split_once('=') {
+            Some((node, what)) => {
+                let node = node.parse().map_err(|error| format!("{error}"))?;
+                Ok(Override { node: Some(node), what: what.to_owned() })
+            }
+            None => Ok(Override { node: None, what: text.to_owned() }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nodes(text: &str) -> Result<Vec<u8>, String> {
+        match text.parse()? {
+            Nodes::All => Ok(Vec::new()),
+            Nodes::These(nodes) => Ok(nodes.into_iter().map(NodeId::get).collect()),
+        }
+    }
+
+    #[test]
+    fn nodes_are_never_clamped() {
+        assert_eq!(nodes("5"), Ok(vec![5]));
+        assert_eq!(nodes("0x7f"), Ok(vec![127]));
+        assert_eq!(nodes("1,5,0x10-0x12,5"), Ok(vec![1, 5, 16, 17, 18]));
+        assert_eq!(nodes("all"), Ok(vec![]));
+        for wrong in ["0", "200", "128", "1-200", "5-1", "", "1,", "-3", "1-", "a", "All"] {
+            assert!(nodes(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn signals_objects_and_names() {
+        let signal = |text: &str| text.parse::<SignalArg>().map(|signal| signal.0);
+        assert_eq!(signal("pressure"), Ok(Wanted::Signal("pressure".into())));
+        assert_eq!(signal("pressure.status"), Ok(Wanted::Status("pressure".into())));
+        assert_eq!(signal("ch16"), Ok(Wanted::Signal("ch16".into())));
+        assert_eq!(signal("6130:1"), Ok(Wanted::Object(ObjectId::new(0x6130, 1))));
+        assert!(signal("6130:300").is_err() && signal("").is_err() && signal("pressure.x").is_err());
+
+        let object = |text: &str| text.parse::<ObjectArg>();
+        assert_eq!(object("1018:1"), Ok(ObjectArg::Address(ObjectId::new(0x1018, 1))));
+        assert_eq!(object("Vendor-ID"), Ok(ObjectArg::Name("vendor-id".into())));
+        assert_eq!(object("ai-input-pv:1"), Ok(ObjectArg::Name("ai-input-pv:1".into())));
+        assert!(object("vendor id").is_err() && object("ai-input-pv:300").is_err() && object("12345").is_err());
+    }
+
+    #[test]
+    fn buses() {
+        assert_eq!("can0".parse(), Ok(BusSpec::SocketCan("can0".into())));
+        assert_eq!("socketcan:vcan1".parse(), Ok(BusSpec::SocketCan("vcan1".into())));
+        assert_eq!("sim".parse(), Ok(BusSpec::Sim(None)));
+        assert_eq!("sim:mh4@5,dps@127".parse(), Ok(BusSpec::Sim(Some("mh4@5,dps@127".into()))));
+        for wrong in ["", "foo:bar", "a/b", "a-name-that-is-too-long"] {
+            assert!(wrong.parse::<BusSpec>().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! `cangauge completions`.
+
+use super::Cli;
+use super::exit::stdout;
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+use std::io::{self, Write};
+
+/// Print the completions for a shell
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  cangauge completions bash > ~/.local/share/bash-completion/completions/cangauge")]
+pub struct Completions {
+    /// bash, zsh, fish, elvish or powershell
+    shell: Shell,
+}
+
+impl Completions {
+    pub(super) fn run(&self) -> anyhow::Result<()> {
+        // Into memory first: the generator panics on a closed pipe.
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut Cli::command(), "cangauge", &mut script);
+        io::stdout().write_all(&script).map_err(stdout)
+    }
+}

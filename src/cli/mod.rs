@@ -1,0 +1,186 @@
+//! The command line: one file a subcommand, with its arguments, its help, the task it runs and the output
+//! it gets.
+
+pub mod args;
+mod completions;
+pub mod exit;
+mod log;
+mod nmt;
+mod open;
+mod read;
+mod scan;
+mod sdo;
+mod sim;
+
+use crate::master::{Master, Timing};
+use crate::output::console::Console;
+use anstream::ColorChoice;
+use args::{BusSpec, Duration, Override};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+const EXAMPLES: &str = "\
+Examples, on the simulated bus; leave `-b sim` out where one CAN interface is up:
+  cangauge -b sim scan                                   who is there
+  cangauge -b sim read 1                                 its measured values now
+  cangauge -b sim log 1 --sync 100ms --count 20          its measurements as CSV
+  cangauge -b sim log 1-3,127 --sync 10ms --duration 1h -o run.csv
+  cangauge -b sim sdo read 1 0x1018:1                    one object, bare
+  cangauge -b sim nmt reset 1                            restart it, wait for the boot-up
+
+Exit codes: 0 done; 1 the answer is no; 2 usage, nothing was sent; 3 no answer; 4 refused by the device;
+5 bus; 6 unexpected; 7 partial; 8 file; 130 interrupted.";
+
+/// Find, configure and log CANopen measuring devices (CiA 404): pressure and temperature transmitters,
+/// thermocouple modules
+#[derive(Debug, Parser)]
+#[command(name = "cangauge", version, after_help = EXAMPLES, max_term_width = 100)]
+#[command(propagate_version = true, subcommand_required = true, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(flatten)]
+    pub(crate) global: Global,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// Options of every command.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Global options")]
+pub struct Global {
+    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN
+    /// interface that is up
+    #[arg(short, long, global = true, env = "CANGAUGE_BUS", value_name = "BUS")]
+    pub(crate) bus: Option<BusSpec>,
+
+    /// Longest wait for one answer [default: 500ms; scan: 200ms]
+    #[arg(short, long, global = true, value_name = "DUR")]
+    pub(crate) timeout: Option<Duration>,
+
+    /// How often a request that got no answer is repeated [default: 1]
+    #[arg(long, global = true, value_name = "N")]
+    pub(crate) retries: Option<u32>,
+
+    /// Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in
+    /// TOML; NODE=NAME for one node of several
+    #[arg(long, global = true, value_name = "[NODE=]NAME|FILE")]
+    pub(crate) device: Vec<Override>,
+
+    /// Form of the output; for log, text means csv
+    #[arg(short, long, global = true, value_name = "FORM", default_value = "text")]
+    pub(crate) format: Format,
+
+    /// Write every frame sent and received to FILE, as candump -L does; - for stderr
+    #[arg(long, global = true, value_name = "FILE")]
+    pub(crate) trace: Option<PathBuf>,
+
+    /// Say less on stderr
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub(crate) quiet: bool,
+
+    /// Say more on stderr
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub(crate) verbose: u8,
+
+    /// Show live values and progress on stderr
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
+    pub(crate) progress: When,
+
+    /// Colour on stderr
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
+    pub(crate) color: When,
+}
+
+/// Form of the output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people
+    Text,
+    /// One object per line
+    Json,
+    /// Comma-separated values
+    Csv,
+}
+
+/// When to do something for a terminal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum When {
+    /// On a terminal
+    Auto,
+    /// In any case
+    Always,
+    /// In no case
+    Never,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// List every node that answers
+    Scan(scan::Scan),
+    /// Read measured values now
+    Read(read::Read),
+    /// Send NMT commands and tell states
+    Nmt(nmt::Nmt),
+    /// Read and write objects
+    Sdo(sdo::Sdo),
+    /// Record measurements
+    Log(log::Log),
+    /// Simulate devices on a bus
+    Sim(sim::Sim),
+    /// Print the completions for a shell
+    Completions(completions::Completions),
+}
+
+impl Global {
+    /// stderr as these options want it.
+    pub(crate) fn console(&self) -> Console {
+        Console {
+            quiet: self.quiet,
+            verbose: self.verbose,
+            json: self.format == Format::Json,
+            color: match self.color {
+                When::Auto => ColorChoice::Auto,
+                When::Always => ColorChoice::Always,
+                When::Never => ColorChoice::Never,
+            },
+            progress: None,
+        }
+    }
+
+    /// The time-outs; `timeout` where the command has another default.
+    pub(crate) fn timing(&self, timeout: std::time::Duration) -> Timing {
+        Timing {
+            timeout: self.timeout.map_or(timeout, |timeout| timeout.0),
+            retries: self.retries.unwrap_or(Timing::default().retries),
+        }
+    }
+
+    /// Runs `work` with a master on the bus.
+    pub(crate) fn with_master<T>(
+        &self,
+        work: impl FnOnce(&mut Master<'_>) -> anyhow::Result<T>,
+    ) -> anyhow::Result<T> {
+        let mut bus = open::open(self)?;
+        let mut master = Master::new(&mut *bus, self.timing(Timing::default().timeout));
+        let result = work(&mut master);
+        // What a command leaves behind at its end still goes out: an abort, a node's state.
+        master.settle();
+        result
+    }
+}
+
+/// Runs a command line.
+///
+/// # Errors
+/// Why it was not done; [`exit::report`] turns it into words and an exit code.
+pub fn run(cli: &Cli) -> anyhow::Result<()> {
+    match &cli.command {
+        Command::Scan(command) => command.run(&cli.global),
+        Command::Read(command) => command.run(&cli.global),
+        Command::Nmt(command) => command.run(&cli.global),
+        Command::Sdo(command) => command.run(&cli.global),
+        Command::Log(command) => command.run(&cli.global),
+        Command::Sim(command) => command.run(&cli.global),
+        Command::Completions(command) => command.run(),
+    }
+}

@@ -1,0 +1,160 @@
+//! `cangauge read`.
+
+use super::args::{Nodes, SignalArg};
+use super::exit::{IntoFailure, Several, stdout};
+use super::{Format, Global, open};
+use crate::canopen::id::NodeId;
+use crate::device::unit::Unit;
+use crate::master::Master;
+use crate::measure::decode::Wanted;
+use crate::measure::sample::{Number, Sample, Status};
+use crate::output::{json, table, text};
+use crate::tasks::failure::together;
+use crate::tasks::read::{Target, read};
+use crate::tasks::{Failure, Kind};
+use clap::Args;
+use std::io::{self, Write};
+
+/// Read measured values now, scaled, with unit and status
+///
+/// One signal of one node prints the bare number, so that P=$(cangauge read 5 pressure) works. Without
+/// SIGNAL every signal of the device is read.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  cangauge -b sim read 1\n  cangauge -b sim read 127 pressure --in bar\n  cangauge -b sim read 1,127 --format json")]
+pub struct Read {
+    /// Which nodes: 5, 0x7f, 1-16, 1,5, all
+    nodes: Nodes,
+    /// pressure, temperature, ch1 to ch16, pressure.status, or an object as it is: 0x6130:1
+    signals: Vec<SignalArg>,
+    /// Convert to this unit: bar, mbar, kPa, MPa, psi, degC, degF, K
+    #[arg(long = "in", value_name = "UNIT", value_parser = parse_unit)]
+    unit: Option<Unit>,
+}
+
+fn parse_unit(text: &str) -> Result<Unit, String> {
+    Unit::from_symbol(text).ok_or_else(|| format!("\"{text}\" is not a known unit (bar, mbar, kPa, MPa, psi, degC, degF, K, 0x…)"))
+}
+
+/// A value ready to be shown.
+struct Shown {
+    target: Target,
+    value: Option<Number>,
+    /// The text of the value: as sent, or converted with the precision of what was sent.
+    text: String,
+    unit: String,
+    status: Option<Status>,
+}
+
+impl Read {
+    pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let wanted: Vec<Wanted> = self.signals.iter().map(|signal| signal.0.clone()).collect();
+        let (asked, results) = global.with_master(|master| {
+            let nodes = open::nodes(master, global, &self.nodes)?;
+            let overrides = open::overrides(global, &nodes)?;
+            let results = read(master, &nodes, &wanted, &overrides).or_fail()?;
+            Ok((nodes.len(), results))
+        })?;
+        let (mut shown, mut failures) = (Vec::new(), Vec::new());
+        for result in results {
+            match result.and_then(|samples| samples.into_iter().map(|(target, sample)| self.show(target, &sample)).collect::<Result<Vec<_>, _>>()) {
+                Ok(values) => shown.extend(values),
+                Err(failure) => failures.push(failure),
+            }
+        }
+        let bare = asked == 1 && wanted.len() == 1;
+        let invalid = print(&shown, global.format, bare).map_err(stdout)?;
+        if let Some(failure) = invalid {
+            failures.push(failure);
+        }
+        together(asked, failures).map_err(|failures| Several(failures).into())
+    }
+
+    fn show(&self, target: Target, sample: &Sample) -> Result<Shown, Failure> {
+        let as_sent = sample.value.map(|value| value.to_string()).unwrap_or_default();
+        let (value, text, unit) = match (self.unit, target.unit) {
+            (None, _) => (sample.value, as_sent, target.source.unit.to_string()),
+            (Some(to), from) => {
+                let from = from.ok_or_else(|| {
+                    let message = format!("{} has no unit to convert from", target.source.signal);
+                    Failure::of_node(Kind::Usage, target.source.node, message)
+                })?;
+                let converted = match sample.value {
+                    None => None,
+                    Some(value) => Some(from.convert(value.as_f64(), to).ok_or_else(|| {
+                        let message = format!("{} is in {from}, which is no {to}", target.source.signal);
+                        Failure::of_node(Kind::Usage, target.source.node, message)
+                    })?),
+                };
+                let shown = converted.map(|value| text::significant(value, precision(sample.value)));
+                (converted.map(Number::Real64), shown.unwrap_or_default(), to.to_string())
+            }
+        };
+        Ok(Shown { target, value, text, unit, status: sample.status })
+    }
+}
+
+/// How many significant digits a value was sent with: a converted one has no more.
+fn precision(value: Option<Number>) -> usize {
+    match value {
+        Some(Number::Decimal { mantissa, .. }) => mantissa.unsigned_abs().to_string().len().max(4),
+        Some(Number::Real32(_)) | None => 7,
+        Some(Number::Real64(_)) => 15,
+    }
+}
+
+/// Prints; a bare value that is invalid is a failure, since an empty line is no number.
+fn print(shown: &[Shown], format: Format, bare: bool) -> io::Result<Option<Failure>> {
+    let mut out = io::stdout().lock();
+    match format {
+        Format::Json => {
+            for item in shown {
+                json::reading(&mut out, &item.target.source, item.value, &item.unit, item.status)?;
+            }
+        }
+        Format::Csv => {
+            let mut csv = csv::Writer::from_writer(&mut out);
+            csv.write_record(["node", "signal", "value", "unit", "status"])?;
+            for item in shown {
+                let status = item.status.map_or("", Status::as_str);
+                let source = &item.target.source;
+                csv.write_record([&source.node.to_string(), &*source.signal, &item.text, &item.unit, status])?;
+            }
+            csv.flush()?;
+        }
+        Format::Text if bare => {
+            if let [item] = shown {
+                if item.value.is_none() {
+                    let status = item.status.map_or("invalid", Status::as_str);
+                    let source = &item.target.source;
+                    let message = format!("{} has no valid value: {status}", source.signal);
+                    return Ok(Some(Failure::of_node(Kind::Unexpected, source.node, message)));
+                }
+                writeln!(out, "{}", item.text)?;
+            }
+        }
+        Format::Text => {
+            let cell = |item: &Shown| {
+                let value = if item.text.is_empty() { "-".to_owned() } else { format!("{} {}", item.text, item.unit) };
+                let status = item.status.map_or("(tells no status)", Status::as_str);
+                let source = &item.target.source;
+                vec![source.node.to_string(), source.signal.to_string(), value.trim_end().to_owned(), status.to_owned()]
+            };
+            let rows: Vec<_> = shown.iter().map(cell).collect();
+            table::write(&mut out, &[table::Align::Left; 4], &rows)?;
+        }
+    }
+    out.flush()?;
+    Ok(None)
+}
+
+/// Kept here so that every command resolves `all` alike.
+pub(super) fn everybody(master: &mut Master<'_>, global: &Global) -> anyhow::Result<Vec<NodeId>> {
+    let all: Vec<NodeId> = NodeId::all().collect();
+    let timing = global.timing(std::time::Duration::from_millis(200));
+    let found = crate::tasks::scan::scan(master, &all, timing.timeout, 1 + timing.retries, &Default::default()).or_fail()?;
+    let nodes: Vec<NodeId> = found.into_iter().filter(|found| found.failure.is_none()).map(|found| found.node).collect();
+    if nodes.is_empty() {
+        return Err(Failure::new(Kind::NoAnswer, "nobody answered").hint("cangauge scan tells more").into());
+    }
+    Ok(nodes)
+}

@@ -1,0 +1,246 @@
+//! `cangauge sdo`.
+
+use super::args::ObjectArg;
+use super::exit::{FileError, stdout};
+use super::{Format, Global, open};
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::{DataType, Value, parse_hex};
+use crate::master::Master;
+use crate::output::{json, text};
+use crate::tasks::sdo::{Knowledge, ReadValue, encode, read, write};
+use crate::tasks::{Failure, Kind};
+use clap::{Args, Subcommand};
+use std::fmt::Write as _;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Read and write objects of the object dictionary
+///
+/// OBJECT is 0x6130:1, 6130:1, 6130h:1 or 6130.1 (the index is always hexadecimal, the sub-index
+/// decimal), or a name: vendor-id, producer-heartbeat-time, ai-input-pv:1.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  cangauge -b sim sdo read 1 0x1018:1\n  cangauge -b sim sdo read 1 vendor-id serial-number\n  cangauge -b sim sdo write 1 producer-heartbeat-time 1000 --verify")]
+pub struct Sdo {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Read objects: the value as it is, never scaled; several print "OBJECT VALUE" lines
+    Read(ReadArgs),
+    /// Write an object, or several OBJECT=VALUE
+    Write(WriteArgs),
+}
+
+#[derive(Debug, Args)]
+struct ReadArgs {
+    /// Which node: 5, 0x7f
+    node: NodeId,
+    /// Which objects
+    #[arg(required = true)]
+    objects: Vec<ObjectArg>,
+    /// Take the bytes for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
+    #[arg(long = "type", value_name = "TYPE")]
+    data_type: Option<DataType>,
+    /// Print the bytes in wire order
+    #[arg(long)]
+    hex: bool,
+    /// Write the bytes to a file
+    #[arg(long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+struct WriteArgs {
+    /// Which node: 5, 0x7f
+    node: NodeId,
+    /// OBJECT VALUE, or several OBJECT=VALUE: decimal, 0x…, -5, 1.25e3, or text
+    #[arg(required = true, allow_hyphen_values = true, value_name = "OBJECT VALUE")]
+    items: Vec<String>,
+    /// Take the value for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
+    #[arg(long = "type", value_name = "TYPE")]
+    data_type: Option<DataType>,
+    /// Read back and compare
+    #[arg(long)]
+    verify: bool,
+    /// Take the bytes from a file
+    #[arg(long, value_name = "FILE")]
+    input: Option<PathBuf>,
+}
+
+impl Sdo {
+    pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
+        match &self.action {
+            Action::Read(args) => args.run(global),
+            Action::Write(args) => args.run(global),
+        }
+    }
+}
+
+fn resolve(knowledge: &mut Knowledge, master: &mut Master<'_>, object: &ObjectArg) -> Result<ObjectId, Failure> {
+    match object {
+        ObjectArg::Address(object) => Ok(*object),
+        ObjectArg::Name(name) => knowledge.resolve(master, name),
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    let mut text = "0x".to_owned();
+    // Writing to a String cannot fail.
+    bytes.iter().for_each(|byte| drop(write!(text, "{byte:02X}")));
+    text
+}
+
+impl ReadArgs {
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        if self.output.is_some() && self.objects.len() > 1 {
+            return Err(Failure::new(Kind::Usage, "--output takes one object").into());
+        }
+        let overrides = open::overrides(global, &[self.node])?;
+        let mut knowledge = Knowledge::new(self.node, &overrides);
+        global.with_master(|master| {
+            for object in &self.objects {
+                let at = resolve(&mut knowledge, master, object)?;
+                let value = read(master, &mut knowledge, at, self.data_type)?;
+                if let Some(note) = value.note {
+                    global.console().warn(&format!("node {}: {at}: {note}", self.node));
+                }
+                match &self.output {
+                    Some(path) => save(path, &value.raw)?,
+                    None => self.print(&value, object, global.format).map_err(stdout)?,
+                }
+            }
+            Ok(())
+        })
+    }
+
+    fn print(&self, value: &ReadValue, object: &ObjectArg, format: Format) -> io::Result<()> {
+        let mut out = io::stdout().lock();
+        let raw = hex(&value.raw);
+        let shown = match &value.value {
+            _ if self.hex => raw.clone(),
+            Value::Text(text) => text::safe(text),
+            Value::Bytes(_) => raw.clone(),
+            value => value.to_string(),
+        };
+        match format {
+            Format::Json => {
+                let line = json::ObjectValue {
+                    node: self.node.get(),
+                    object: value.object.to_string(),
+                    name: value.name.clone(),
+                    data_type: value.data_type.map(|data_type| data_type.to_string()),
+                    value: match &value.value {
+                        Value::Bytes(_) => raw.clone().into(),
+                        value => json::value(value),
+                    },
+                    raw: &raw,
+                };
+                json::object(&mut out, &line)
+            }
+            Format::Csv => {
+                let mut csv = csv::Writer::from_writer(&mut out);
+                csv.write_record([&self.node.to_string(), &value.object.to_string(), &shown, &raw])?;
+                csv.flush()
+            }
+            Format::Text if self.objects.len() == 1 => writeln!(out, "{shown}"),
+            Format::Text => writeln!(out, "{object} {shown}"),
+        }
+    }
+}
+
+fn save(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    let what = format!("write {}", path.display());
+    std::fs::write(path, bytes).map_err(|source| FileError { what, source }.into())
+}
+
+impl WriteArgs {
+    /// The objects and values: `OBJECT VALUE`, or `OBJECT=VALUE` each.
+    fn pairs(&self) -> Result<Vec<(ObjectArg, String)>, Failure> {
+        let usage = |message: String| Failure::new(Kind::Usage, message);
+        let parse = |text: &str| text.parse::<ObjectArg>().map_err(usage);
+        match (self.items.as_slice(), &self.input) {
+            ([object], Some(_)) => Ok(vec![(parse(object)?, String::new())]),
+            (_, Some(_)) => Err(usage("--input takes one object and no value".to_owned())),
+            ([object, value], None) if !object.contains('=') => Ok(vec![(parse(object)?, value.clone())]),
+            (items, None) => items
+                .iter()
+                .map(|item| {
+                    let (object, value) = item.split_once('=').ok_or_else(|| {
+                        usage(format!("\"{item}\" has no value: give OBJECT VALUE, or OBJECT=VALUE for each"))
+                    })?;
+                    Ok((parse(object)?, value.to_owned()))
+                })
+                .collect(),
+        }
+    }
+
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let pairs = self.pairs()?;
+        let overrides = open::overrides(global, &[self.node])?;
+        let mut knowledge = Knowledge::new(self.node, &overrides);
+        let file = match &self.input {
+            None => None,
+            Some(path) => {
+                let what = format!("read {}", path.display());
+                Some(std::fs::read(path).map_err(|source| FileError { what, source })?)
+            }
+        };
+        // What can be known to be wrong is known before the bus is opened.
+        for (object, value) in pairs.iter().filter(|_| file.is_none()) {
+            let entry = match object {
+                ObjectArg::Address(object) => knowledge.offline(*object),
+                ObjectArg::Name(name) => knowledge.offline_name(name),
+            };
+            if let Some(data_type) = self.data_type.or(entry.map(|entry| entry.data_type)) {
+                check(data_type, value).map_err(|error| Failure::new(Kind::Usage, format!("{object}: {error}")))?;
+            }
+        }
+        global.with_master(|master| {
+            let mut ready = Vec::new();
+            for (object, value) in &pairs {
+                let at = resolve(&mut knowledge, master, object)?;
+                ready.push(match &file {
+                    Some(bytes) => (at, bytes.clone(), DataType::Domain),
+                    None => {
+                        let (bytes, data_type) = encode(master, &mut knowledge, at, self.data_type, value)?;
+                        (at, bytes, data_type)
+                    }
+                });
+            }
+            for (at, bytes, data_type) in ready {
+                write(master, &knowledge, at, &bytes)?;
+                if self.verify {
+                    self.verify(master, &mut knowledge, at, &bytes, data_type)?;
+                }
+                global.console().detail(&format!("node {}: {at} written: {}", self.node, hex(&bytes)));
+            }
+            Ok(())
+        })
+    }
+
+    fn verify(
+        &self,
+        master: &mut Master<'_>,
+        knowledge: &mut Knowledge,
+        at: ObjectId,
+        bytes: &[u8],
+        data_type: DataType,
+    ) -> anyhow::Result<()> {
+        let found = read(master, knowledge, at, Some(data_type))?;
+        if found.raw != bytes {
+            let message = format!("{at} was acknowledged and reads {} instead of {}", hex(&found.raw), hex(bytes));
+            return Err(Failure::of_node(Kind::Unexpected, self.node, message).into());
+        }
+        Ok(())
+    }
+}
+
+fn check(data_type: DataType, text: &str) -> Result<(), String> {
+    if data_type == DataType::Domain && parse_hex(text).is_none() {
+        return Err(format!("\"{text}\" is not hexadecimal"));
+    }
+    data_type.encode_text(text).map(drop).map_err(|error| error.to_string())
+}
