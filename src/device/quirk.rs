@@ -12,4 +12,10 @@ pub enum Quirk {
     /// 60h. Trigger: an expedited upload. Not set by default: nothing shows that the sensors in the
     /// field do what the table prints, and 60h is the acknowledge of a write.
     UploadAnswered60,
+    /// Saving everything (1010h:1) puts the identifiers of 1014h and 180xh:1 back to their defaults;
+    /// saving the communication parameters (1010h:2) keeps them.
+    ///
+    /// Device: WIKA MH-4-CAN. Evidence: manual 14547342.01, object 1010h. Trigger: "save" written to
+    /// 1010h:1.
+    SaveAllResetsCobIds,
 }

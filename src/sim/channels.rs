@@ -127,6 +127,11 @@ impl Channels {
         })
     }
 
+    /// Whether an object shows the status of a channel.
+    pub(super) fn is_status(&self, object: ObjectId) -> bool {
+        self.shown.get(&object).is_some_and(|(_, shows)| *shows == Shows::Status)
+    }
+
     /// The measured value at `time` in the numbers of the object (an integer counts its digits), without
     /// marker and rounding.
     pub(super) fn number(&self, objects: &Objects, object: ObjectId, time: Duration) -> Option<f64> {

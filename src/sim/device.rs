@@ -5,7 +5,7 @@ use super::emergency::Emergencies;
 use super::memory::Memory;
 use super::model::Overload;
 use super::objects::{Area, Objects, Signature};
-use super::record::{Line, Recorder, line};
+use super::record::{Line, Recorder, line, plain};
 use super::sdo_server::SdoServer;
 use super::tpdo::{Cause, Tpdo};
 use crate::bus::memory::{Outbox, Station};
@@ -328,7 +328,12 @@ impl Device {
         let Memory { objects, channels, node, .. } = &self.memory;
         let mapped: Vec<ObjectId> = values.iter().map(|(object, _)| *object).collect();
         let described = |(object, bytes): &(ObjectId, Vec<u8>)| {
-            let reading = channels.reading(objects, *object, time)?;
+            if channels.is_status(*object) {
+                return None;
+            }
+            let Some(reading) = channels.reading(objects, *object, time) else {
+                return Some(plain(*node, *object, objects.spec(*object)?.data_type, bytes));
+            };
             let told = reading.status.is_some_and(|status| mapped.contains(&status));
             Some(line(*node, &reading, bytes, told))
         };

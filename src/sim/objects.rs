@@ -7,6 +7,7 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::device::catalog::Model;
 use crate::device::description::{Access, ObjectEntry, Scalar, parse_range};
+use crate::device::quirk::Quirk;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -116,6 +117,8 @@ pub(super) struct Objects {
     specs: Arc<BTreeMap<ObjectId, Spec>>,
     /// Without `stored` marks in the description everything writable is kept, by area.
     marked: bool,
+    /// The deviation [`Quirk::SaveAllResetsCobIds`].
+    resets_cob_ids: bool,
     values: BTreeMap<ObjectId, Vec<u8>>,
     saved: BTreeMap<ObjectId, Vec<u8>>,
 }
@@ -130,7 +133,13 @@ impl Objects {
             }
         }
         let marked = specs.values().any(|spec| spec.group.is_some());
-        let mut objects = Objects { specs: Arc::new(specs), marked, values: BTreeMap::new(), saved: BTreeMap::new() };
+        let mut objects = Objects {
+            specs: Arc::new(specs),
+            marked,
+            resets_cob_ids: model.description.quirks.contains(&Quirk::SaveAllResetsCobIds),
+            values: BTreeMap::new(),
+            saved: BTreeMap::new(),
+        };
         objects.reset(Area::All, node);
         objects
     }
@@ -249,7 +258,8 @@ impl Objects {
             if !self.is_kept(group, *object, spec) {
                 continue;
             }
-            match self.values.get(object) {
+            let reset = self.resets_cob_ids && group == Group::All && is_cob_id(*object);
+            match self.values.get(object).filter(|_| !reset) {
                 Some(value) if *value != spec.delivered(node) => self.saved.insert(*object, value.clone()),
                 _ => self.saved.remove(object),
             };
@@ -275,6 +285,11 @@ impl Objects {
         let holds_a_value = spec.signature.is_none_or(|signature| signature == Signature::Set);
         spec.access == Access::Rw && holds_a_value && group.reaches(by_area)
     }
+}
+
+/// The identifiers of emergencies and TPDOs.
+fn is_cob_id(object: ObjectId) -> bool {
+    object == ObjectId::new(0x1014, 0) || ((0x1800..0x1a00).contains(&object.index) && object.sub == 1)
 }
 
 impl Spec {

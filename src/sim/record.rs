@@ -6,6 +6,8 @@ use super::channels::Reading;
 use super::model::Direction;
 use crate::bus::time::Mono;
 use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
 use std::io::Write;
 use std::sync::{Arc, Mutex};
 
@@ -77,9 +79,23 @@ pub(super) fn line(node: NodeId, reading: &Reading, bytes: &[u8], told: bool) ->
             None => real(bytes),
         },
     };
-    let raw: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
     let unit = reading.unit;
-    Line(format!("{node},{},{value},{unit},{status},0x{raw}", reading.signal))
+    Line(format!("{node},{},{value},{unit},{status},{}", reading.signal, raw(bytes)))
+}
+
+/// The line of a mapped object that is no process value (a field value): under its address, as it stands.
+pub(super) fn plain(node: NodeId, object: ObjectId, data_type: DataType, bytes: &[u8]) -> Line {
+    let value = match data_type {
+        DataType::Real32 | DataType::Real64 => real(bytes),
+        DataType::Integer(_) => signed(bytes).to_string(),
+        _ => bytes.iter().rev().fold(0u64, |number, byte| number << 8 | u64::from(*byte)).to_string(),
+    };
+    Line(format!("{node},{object},{value},,,{}", raw(bytes)))
+}
+
+fn raw(bytes: &[u8]) -> String {
+    let digits: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+    format!("0x{digits}")
 }
 
 /// The two's complement number in `bytes`, the lowest byte first.
@@ -140,6 +156,13 @@ mod tests {
         let real = reading(None, None, true);
         assert_eq!(text(&real, &1.1f32.to_le_bytes(), true), "127,pressure,1.1,psi,ok,0xCDCC8C3F");
         assert_eq!(text(&real, &1e-6f32.to_le_bytes(), false), "127,pressure,1e-6,psi,ok,0xBD378635");
+    }
+
+    #[test]
+    fn field_values_stand_under_their_address() {
+        let line = |data_type, bytes: &[u8]| plain(NodeId::MAX, ObjectId::new(0x7100, 1), data_type, bytes).0;
+        assert_eq!(line(DataType::Integer(2), &[0xff, 0xff]), "127,0x7100:1,-1,,,0xFFFF");
+        assert_eq!(line(DataType::Unsigned(2), &[0xff, 0xff]), "127,0x7100:1,65535,,,0xFFFF");
     }
 
     #[test]

@@ -24,6 +24,13 @@ pub trait Sleeper: Send {
     fn sleep(&mut self, length: Duration) -> bool;
 }
 
+/// Ctrl-C and SIGTERM.
+impl Sleeper for Interrupts {
+    fn sleep(&mut self, length: Duration) -> bool {
+        if length.is_zero() { self.take() } else { self.wait_until(Instant::now() + length) }
+    }
+}
+
 /// Waits that nobody interrupts.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Uninterrupted;

@@ -590,6 +590,21 @@ fn storing_restoring_and_what_a_reset_does_to_each() {
 }
 
 #[test]
+fn saving_everything_loses_the_identifiers_of_an_mh4() {
+    for (sub, after) in [("01", "4300180185010040"), ("02", "43001801AA010040")] {
+        let mut bus = bus([still("mh4", 5, 5.0)]);
+        ask(&mut bus, "605#23001801850100C0");
+        ask(&mut bus, "605#23001801AA010040");
+        assert_eq!(ask(&mut bus, &format!("605#231010{sub}73617665")), [format!("585#601010{sub}00000000")]);
+        assert_eq!(ask(&mut bus, "605#4000180100000000"), ["585#43001801AA010040"], "until the reset it works");
+        ask(&mut bus, "000#8105");
+        let until = bus.now().mono + Duration::from_millis(150);
+        hear(&mut bus, until);
+        assert_eq!(ask(&mut bus, "605#4000180100000000"), [format!("585#{after}")]);
+    }
+}
+
+#[test]
 fn a_node_id_with_its_signature_is_taken_at_the_reset_after_saving() {
     let mut bus = bus([still("mh4", 5, 5.0)]);
     play(
