@@ -44,13 +44,6 @@ impl Sleeper for Uninterrupted {
     }
 }
 
-/// Ctrl-C and SIGTERM.
-impl Sleeper for Interrupts {
-    fn sleep(&mut self, length: Duration) -> bool {
-        if length.is_zero() { self.take() } else { self.wait_until(Instant::now() + length) }
-    }
-}
-
 /// The host's clock as the bus sees it: both time lines begin when the bus is opened, and run together
 /// from there, so that a frame has the same distance on both.
 #[derive(Clone, Copy, Debug)]

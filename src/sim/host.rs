@@ -1,0 +1,182 @@
+//! Simulated devices on a bus with other participants: a real interface, or a socket.
+
+use crate::bus::memory::{Outbox, Station};
+use crate::bus::time::Mono;
+use crate::bus::{Bus, BusError, Event};
+use crate::canopen::frame::Frame;
+use crate::canopen::wire_length::priority;
+use std::time::Duration;
+
+/// How long to wait when the bus takes no more frames.
+const FULL: Duration = Duration::from_millis(1);
+
+/// The longest wait in one go; only the number matters that it is finite.
+const IDLE: Duration = Duration::from_secs(3600);
+
+/// Runs stations on `bus` until the user asks to stop, or until `until`.
+///
+/// They hear each other, too, as they would on a wire: a bus does not give back what was sent on it.
+///
+/// # Errors
+/// When the bus fails; a transmit queue that is full is waited for.
+pub fn run(
+    bus: &mut dyn Bus,
+    stations: Vec<Box<dyn Station>>,
+    until: Option<Mono>,
+) -> Result<Vec<Box<dyn Station>>, BusError> {
+    let mut host = Host { places: stations.into_iter().map(|station| (station, Outbox::default())).collect() };
+    let now = bus.now().mono;
+    host.places.iter_mut().for_each(|(station, out)| station.power_on(now, out));
+    loop {
+        let now = bus.now().mono;
+        host.wake(now);
+        let full = !host.send(bus)?;
+        let next = host.next_wake().unwrap_or(now + IDLE);
+        let next = if full { next.min(now + FULL) } else { next };
+        let deadline = until.map_or(next, |until| until.min(next));
+        match bus.receive(deadline)? {
+            Event::Frame(received) => host.hear(None, received.at.mono, &received.frame),
+            Event::Interrupted => break,
+            Event::Timeout if until.is_some_and(|until| bus.now().mono >= until) => break,
+            Event::Timeout | Event::Fault(..) | Event::Dropped(_) | Event::Link(_) => {}
+        }
+    }
+    Ok(host.places.into_iter().map(|(station, _)| station).collect())
+}
+
+struct Host {
+    places: Vec<(Box<dyn Station>, Outbox)>,
+}
+
+impl Host {
+    fn next_wake(&self) -> Option<Mono> {
+        self.places.iter().filter_map(|(station, _)| station.next_wake()).min()
+    }
+
+    fn wake(&mut self, now: Mono) {
+        for (station, out) in &mut self.places {
+            if station.next_wake().is_some_and(|due| due <= now) {
+                station.wake(now, out);
+            }
+        }
+    }
+
+    /// A frame that everybody but its sender gets.
+    fn hear(&mut self, sender: Option<usize>, now: Mono, frame: &Frame) {
+        for (index, (station, out)) in self.places.iter_mut().enumerate() {
+            if sender != Some(index) {
+                station.receive(now, frame, out);
+            }
+        }
+    }
+
+    /// Hands over what waits, the lowest identifier first; `false` when the bus takes no more.
+    fn send(&mut self, bus: &mut dyn Bus) -> Result<bool, BusError> {
+        loop {
+            let waiting = self.places.iter().enumerate();
+            let heads = waiting.filter_map(|(index, (_, out))| Some((priority(out.front()?), index)));
+            let Some((_, index)) = heads.min() else { return Ok(true) };
+            let Some(frame) = self.places[index].1.front().copied() else { return Ok(true) };
+            match bus.send(&frame) {
+                Ok(()) => {}
+                Err(BusError::QueueFull) => return Ok(false),
+                Err(error) => return Err(error),
+            }
+            let now = bus.now().mono;
+            let (station, out) = &mut self.places[index];
+            out.pop();
+            station.sent(now, &frame);
+            self.hear(Some(index), now, &frame);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::memory::{Clock, MemoryBus};
+    use crate::sim::{Device, Setup};
+    use std::collections::VecDeque;
+
+    /// The other side of the wire: sends at given moments, keeps what it receives.
+    #[derive(Default)]
+    struct Master {
+        planned: VecDeque<(Mono, Frame)>,
+        received: Vec<String>,
+    }
+
+    impl Station for Master {
+        fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+        fn receive(&mut self, _: Mono, frame: &Frame, _: &mut Outbox) {
+            self.received.push(frame.to_string());
+        }
+
+        fn wake(&mut self, now: Mono, out: &mut Outbox) {
+            while self.next_wake().is_some_and(|due| due <= now) {
+                self.planned.pop_front().into_iter().for_each(|(_, frame)| out.send(frame));
+            }
+        }
+
+        fn next_wake(&self) -> Option<Mono> {
+            self.planned.front().map(|(due, _)| *due)
+        }
+
+        fn sent(&mut self, _: Mono, _: &Frame) {}
+    }
+
+    fn ms(milliseconds: u64) -> Mono {
+        Mono::at(Duration::from_millis(milliseconds))
+    }
+
+    fn device(kind: &str, node: u8) -> Box<dyn Station> {
+        let model = crate::device::catalog::by_name(kind).expect("built in");
+        let mut setup = Setup::new(model, crate::canopen::id::NodeId::new(node).expect("a node-ID"));
+        for channel in &mut setup.channels {
+            (channel.base, channel.amplitude, channel.noise) = (f64::from(channel.channel), 0.0, 0.0);
+        }
+        Box::new(Device::new(setup).expect("a device"))
+    }
+
+    fn master(frames: &[(u64, &str)]) -> Master {
+        let planned = frames.iter().map(|(at, text)| (ms(*at), text.parse().expect("a frame"))).collect();
+        Master { planned, ..Master::default() }
+    }
+
+    fn received(bus: &MemoryBus) -> Vec<String> {
+        bus.stations::<Master>().flat_map(|master| master.received.clone()).collect()
+    }
+
+    #[test]
+    fn devices_serve_a_master_on_the_other_side() {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(master(&[(10, "605#4000100000000000"), (20, "000#0100"), (30, "080#")]));
+        let stations = run(&mut bus, vec![device("mh4", 5), device("dps", 127)], Some(ms(150))).expect("no error");
+        assert_eq!(
+            received(&bus),
+            ["705#00", "77F#00", "585#4300100094018200", "185#0000803F00", "1FF#E8030000"].map(str::to_owned)
+        );
+        assert_eq!(stations.len(), 2);
+        assert_eq!(bus.now().mono, ms(150));
+    }
+
+    #[test]
+    fn a_full_queue_loses_nothing() {
+        let mut bus = MemoryBus::new(Clock::Virtual).with_queue_length(1);
+        bus.attach(master(&[(10, "000#0103")]));
+        run(&mut bus, vec![device("mc1609", 3)], Some(ms(120))).expect("no error");
+        assert_eq!(
+            received(&bus),
+            ["703#00", "183#0A0014001E002800", "283#32003C0046005000", "383#5A0064006E007800", "483#82008C009600A000"]
+                .map(str::to_owned)
+        );
+    }
+
+    #[test]
+    fn an_interrupt_ends_it() {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.interrupt_at(ms(70));
+        run(&mut bus, vec![device("mh4", 5)], None).expect("no error");
+        assert_eq!(bus.now().mono, ms(70));
+    }
+}
