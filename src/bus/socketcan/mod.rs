@@ -1,9 +1,10 @@
 //! Linux SocketCAN: kernel filters, kernel timestamps, the kernel's drop counter, error frames.
 //!
 //! A system call costs more than everything else done for a frame. So one `recvmmsg` serves up to
-//! 64 calls of `receive`, the clocks are read once for all of them, and the socket is waited for
+//! 64 calls of `receive`, the clock is read once for all of them, and the socket is waited for
 //! only after it was found empty.
 
+mod clocks;
 mod faults;
 mod interfaces;
 mod receive;
@@ -12,6 +13,7 @@ use super::interrupt::Interrupts;
 use super::{Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall, poll};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
+use clocks::Clocks;
 pub use interfaces::{Interface, interfaces};
 use receive::{Batch, Message};
 use socketcan::{CanAddr, CanFrame, CanInterface, CanSocket, Socket, SocketOptions};
@@ -27,12 +29,6 @@ const MAX_FILTERS: usize = 512;
 const RECEIVE_BUFFER: i32 = 8 << 20;
 /// How often an interface that went down is looked at; the kernel does not tell when it is back.
 const LINK_CHECK: Duration = Duration::from_millis(200);
-/// A frame cannot have waited longer than this for being read. Where the clocks say so, the wall
-/// clock was set in between.
-const LONGEST_LAG: Duration = Duration::from_secs(10);
-/// How far the two clocks of one reading may lie apart.
-const JITTER: Duration = Duration::from_millis(1);
-
 /// A CAN interface of the Linux kernel.
 pub struct SocketCan {
     name: String,
@@ -40,12 +36,7 @@ pub struct SocketCan {
     interrupts: Interrupts,
     opened: Instant,
     batch: Batch,
-    /// When the batch was read.
-    read: Stamp,
-    /// The socket was empty then: nothing in the batch was received earlier.
-    empty_at: Mono,
-    /// The reading of the batch left nothing in the socket.
-    emptied: bool,
+    clocks: Clocks,
     /// The socket is empty as far as is known: wait before reading again.
     drained: bool,
     /// Events that come before the rest of the batch.
@@ -90,9 +81,7 @@ impl SocketCan {
             interrupts,
             opened: Instant::now(),
             batch: Batch::new(),
-            read: Stamp::default(),
-            empty_at: Mono::START,
-            emptied: false,
+            clocks: Clocks::default(),
             drained: false,
             ready: VecDeque::new(),
             up: true,
@@ -142,12 +131,8 @@ impl SocketCan {
     fn fill(&mut self) -> Result<(), BusError> {
         match self.batch.fill(self.socket.as_fd()) {
             Ok(count) => {
-                if self.emptied {
-                    self.empty_at = self.read.mono;
-                }
-                self.emptied = count < receive::BATCH;
-                self.drained = self.emptied;
-                self.read = self.now();
+                self.drained = count < receive::BATCH;
+                self.clocks.batch(self.mono(), self.drained);
                 Ok(())
             }
             Err(error) => match error.raw_os_error() {
@@ -196,7 +181,8 @@ impl SocketCan {
                 self.ready.push_back(Event::Dropped(more));
             }
         }
-        let at = self.stamp(message.wall);
+        let opened = self.opened;
+        let at = self.clocks.stamp(message.wall, &|| now(opened));
         match CanFrame::from(message.frame) {
             CanFrame::Error(frame) => {
                 self.ready.extend(faults::faults(frame).into_iter().map(|fault| Event::Fault(fault, at)));
@@ -214,19 +200,6 @@ impl SocketCan {
             }
         }
         None
-    }
-
-    /// Both times of a frame, from the kernel's wall time and the clocks when it was read.
-    ///
-    /// The kernel stamps with the wall clock only. What matters for deadlines and intervals is the
-    /// monotonic time: the moment of reading less the time the frame had waited. If the wall clock
-    /// was set in between, that difference is nonsense; it shows where the frame would have been
-    /// received after it was read, or before the socket was last seen empty.
-    fn stamp(&self, kernel: Option<Duration>) -> Stamp {
-        let Some(kernel) = kernel else { return self.read };
-        let longest = self.read.mono.since(self.empty_at).saturating_add(JITTER).min(LONGEST_LAG);
-        let lag = self.read.wall.since_epoch().checked_sub(kernel).filter(|&lag| lag <= longest).unwrap_or_default();
-        Stamp { mono: (self.read.mono - lag).max(self.empty_at), wall: Wall::at(kernel) }
     }
 }
 
@@ -249,7 +222,7 @@ impl Bus for SocketCan {
     }
 
     fn now(&self) -> Stamp {
-        Stamp { mono: self.mono(), wall: Wall::now() }
+        now(self.opened)
     }
 
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
@@ -304,6 +277,10 @@ impl Bus for SocketCan {
             }
         }
     }
+}
+
+fn now(opened: Instant) -> Stamp {
+    Stamp { mono: Mono::at(opened.elapsed()), wall: Wall::now() }
 }
 
 /// A raw CAN socket that blocks on nothing, not yet bound.

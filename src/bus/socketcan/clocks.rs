@@ -1,0 +1,188 @@
+//! Both times of a frame, from the kernel's one.
+
+use crate::bus::{Mono, Stamp, Wall};
+use std::time::Duration;
+
+/// How long a comparison of the clocks holds. They drift apart by less than 1 ms in that time.
+const COMPARE_EVERY: Duration = Duration::from_secs(1);
+/// How far a time may be off because one clock is read after the other, or has drifted.
+const JITTER: Duration = Duration::from_millis(1);
+
+/// The kernel stamps frames with the wall clock only. What matters for deadlines and intervals is the
+/// monotonic time, so the clocks are compared now and then, and a frame's wall time is shifted by the
+/// difference.
+///
+/// The wall clock may be set at any time. That shows where a frame would then have been received
+/// after it was read, or before the socket was last seen empty; and it cannot do more harm than lie
+/// between these two.
+#[derive(Debug, Default)]
+pub(super) struct Clocks {
+    /// When the present batch was read.
+    read: Mono,
+    /// When the socket was last seen empty before.
+    empty_at: Mono,
+    /// The reading of the present batch left nothing in the socket.
+    emptied: bool,
+    /// When the clocks were last compared, and the wall time at [`Mono::START`] according to that.
+    compared: Option<(Mono, Duration)>,
+}
+
+impl Clocks {
+    /// A batch was read at `now`, and nothing was left if `emptied`.
+    pub(super) fn batch(&mut self, now: Mono, emptied: bool) {
+        if self.emptied {
+            self.empty_at = self.read;
+        }
+        self.emptied = emptied;
+        self.read = now;
+    }
+
+    /// When a frame of the present batch was received. `now` reads both clocks.
+    pub(super) fn stamp(&mut self, kernel: Option<Duration>, now: &dyn Fn() -> Stamp) -> Stamp {
+        let start = match self.compared {
+            Some((at, start)) if self.read.since(at) < COMPARE_EVERY => start,
+            _ => self.compare(now),
+        };
+        let Some(wall) = kernel else {
+            return Stamp { mono: self.read, wall: Wall::at(start.saturating_add(self.read.since_start())) };
+        };
+        let mut mono = self.place(wall, start);
+        // Once a batch is enough: what does not fit then was stamped before the clock was set.
+        if mono.is_none() && self.compared.is_some_and(|(at, _)| at < self.read) {
+            let start = self.compare(now);
+            mono = self.place(wall, start);
+        }
+        Stamp { mono: mono.unwrap_or(self.read), wall: Wall::at(wall) }
+    }
+
+    fn compare(&mut self, now: &dyn Fn() -> Stamp) -> Duration {
+        let now = now();
+        let start = now.wall.since_epoch().saturating_sub(now.mono.since_start());
+        self.compared = Some((now.mono, start));
+        start
+    }
+
+    /// The monotonic time that belongs to `wall`, if a frame of this batch can have come then.
+    fn place(&self, wall: Duration, start: Duration) -> Option<Mono> {
+        let mono = Mono::at(wall.checked_sub(start)?);
+        let possible = mono + JITTER >= self.empty_at && mono <= self.read + JITTER;
+        possible.then(|| mono.clamp(self.empty_at, self.read))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    const OPENED: u64 = 1_436_509_052_000;
+
+    fn mono(millis: u64) -> Mono {
+        Mono::at(Duration::from_millis(millis))
+    }
+
+    /// The clocks of a computer, in milliseconds; they are looked at as seldom as possible.
+    struct Computer {
+        mono: Cell<u64>,
+        wall: Cell<u64>,
+        looks: Cell<u32>,
+    }
+
+    impl Computer {
+        fn new() -> Computer {
+            Computer { mono: Cell::new(0), wall: Cell::new(OPENED), looks: Cell::new(0) }
+        }
+
+        fn pass(&self, millis: u64) {
+            self.mono.set(self.mono.get() + millis);
+            self.wall.set(self.wall.get() + millis);
+        }
+
+        fn stamp(&self, clocks: &mut Clocks, wall: u64) -> Mono {
+            let now = || {
+                self.looks.set(self.looks.get() + 1);
+                Stamp { mono: mono(self.mono.get()), wall: Wall::at(Duration::from_millis(self.wall.get())) }
+            };
+            let stamp = clocks.stamp(Some(Duration::from_millis(wall)), &now);
+            assert_eq!(stamp.wall, Wall::at(Duration::from_millis(wall)));
+            stamp.mono
+        }
+    }
+
+    #[test]
+    fn a_frame_was_received_before_it_was_read() {
+        let (computer, mut clocks) = (Computer::new(), Clocks::default());
+        computer.pass(100);
+        clocks.batch(mono(100), true);
+        assert_eq!(computer.stamp(&mut clocks, OPENED + 40), mono(40));
+        assert_eq!(computer.stamp(&mut clocks, OPENED + 90), mono(90));
+        computer.pass(500);
+        clocks.batch(mono(600), true);
+        assert_eq!(computer.stamp(&mut clocks, OPENED + 599), mono(599));
+        assert_eq!(computer.looks.get(), 1);
+        computer.pass(700);
+        clocks.batch(mono(1300), true);
+        assert_eq!(computer.stamp(&mut clocks, OPENED + 1200), mono(1200));
+        assert_eq!(computer.looks.get(), 2);
+    }
+
+    #[test]
+    fn the_wall_clock_is_set_between_two_batches() {
+        for step in [-3_600_000, -50, 50, 3_600_000i64] {
+            let (computer, mut clocks) = (Computer::new(), Clocks::default());
+            computer.pass(100);
+            clocks.batch(mono(100), true);
+            assert_eq!(computer.stamp(&mut clocks, OPENED + 40), mono(40));
+            computer.wall.set(computer.wall.get().saturating_add_signed(step));
+            computer.pass(10);
+            let wall = computer.wall.get();
+            computer.pass(2);
+            clocks.batch(mono(112), true);
+            assert_eq!(computer.stamp(&mut clocks, wall), mono(110), "{step}");
+        }
+    }
+
+    #[test]
+    fn the_wall_clock_is_set_while_a_frame_waits() {
+        for step in [-3_600_000, 3_600_000i64] {
+            let (computer, mut clocks) = (Computer::new(), Clocks::default());
+            computer.pass(100);
+            clocks.batch(mono(100), true);
+            assert_eq!(computer.stamp(&mut clocks, OPENED + 40), mono(40));
+            computer.pass(10);
+            let before = computer.wall.get();
+            computer.wall.set(before.saturating_add_signed(step));
+            computer.pass(2);
+            clocks.batch(mono(112), true);
+            // As stamped before the step and as after it, whatever order they were read in.
+            let after = computer.wall.get();
+            assert_eq!(computer.stamp(&mut clocks, after), mono(112), "{step}");
+            assert!((mono(100)..=mono(112)).contains(&computer.stamp(&mut clocks, before)), "{step}");
+            assert_eq!(computer.stamp(&mut clocks, after), mono(112), "{step}");
+            assert!(computer.looks.get() <= 3);
+        }
+    }
+
+    #[test]
+    fn a_backlog_is_older_than_the_last_reading() {
+        let (computer, mut clocks) = (Computer::new(), Clocks::default());
+        computer.pass(100);
+        clocks.batch(mono(100), false);
+        assert_eq!(computer.stamp(&mut clocks, OPENED + 10), mono(10));
+        clocks.batch(mono(101), true);
+        assert_eq!(computer.stamp(&mut clocks, OPENED + 20), mono(20));
+        // Read at 101 with nothing left: what comes now is not older, whatever the jitter.
+        clocks.batch(mono(105), true);
+        assert_eq!(computer.stamp(&mut clocks, OPENED + 100), mono(101));
+    }
+
+    #[test]
+    fn without_the_kernel_the_moment_of_reading_counts() {
+        let (computer, mut clocks) = (Computer::new(), Clocks::default());
+        computer.pass(100);
+        clocks.batch(mono(90), true);
+        let now = || Stamp { mono: mono(100), wall: Wall::at(Duration::from_millis(OPENED + 100)) };
+        let expected = Stamp { mono: mono(90), wall: Wall::at(Duration::from_millis(OPENED + 90)) };
+        assert_eq!(clocks.stamp(None, &now), expected);
+    }
+}
