@@ -54,8 +54,9 @@ def communication(number):
     yield array(f"TPDO {number} mapping", 0x1A00 + number - 1, od.UNSIGNED32)
 
 
-def remote_device():
-    """What a master knows beforehand of any measuring device with up to four TPDOs."""
+def remote_device(types):
+    """What a master knows beforehand of any measuring device with up to four TPDOs. `types` names the
+    CiA 404 objects to which this device gives a type of its own."""
     dictionary = od.ObjectDictionary()
     objects = [
         variable("Device type", 0x1000, 0, od.UNSIGNED32),
@@ -66,7 +67,7 @@ def remote_device():
         # A maker's own process value, as one of the built-in devices maps it.
         variable("Process value", 0x2090, 0, od.INTEGER32),
     ]
-    objects += [array(*entry) for entry in ANALOGUE_INPUT]
+    objects += [array(name, index, types.get(index, kind)) for name, index, kind in ANALOGUE_INPUT]
     for number in range(1, 5):
         objects += communication(number)
     for entry in objects:

@@ -1,11 +1,12 @@
 """Asks a measuring device everything that a master asks, with python-canopen, and prints it as JSON.
 
-    master.py [--sync] [--values N] IFACE NODE...
+    master.py [--sync] [--values N] [--type INDEX=TYPE]... IFACE NODE...
 
 For every node one line: device type, identity, name (segmented), unit, digits and value of each
 channel, the NMT states told by the heartbeat that it switches on, and N values of each valid TPDO
-(3) that comes by SYNC, sent here with --sync, or by itself. What it changed it puts back. Exit
-status 1 and a line on standard error when an answer is missing or wrong.
+(3) that comes by SYNC, sent here with --sync, or by itself. --type 6130=INTEGER32 is for devices
+that give an object of CiA 404 a type of their own. What it changed it puts back. Exit status 1 and
+a line on standard error when an answer is missing or wrong.
 """
 
 import argparse
@@ -13,6 +14,7 @@ import json
 import sys
 
 import canopen
+from canopen import objectdictionary as od
 from canopen.sdo import SdoAbortedError
 
 from dictionary import ANALOGUE_INPUT, remote_device
@@ -116,10 +118,17 @@ def ask(network, node, sync, count):
     return answer
 
 
+def own_type(text):
+    """Reads INDEX=TYPE, as 6130=INTEGER32."""
+    index, name = text.split("=")
+    return int(index, 16), getattr(od, name)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sync", action="store_true")
     parser.add_argument("--values", metavar="N", type=int, default=3)
+    parser.add_argument("--type", metavar="INDEX=TYPE", type=own_type, action="append", default=[])
     parser.add_argument("interface", metavar="IFACE")
     parser.add_argument("nodes", metavar="NODE", nargs="+", type=lambda text: int(text, 0))
     arguments = parser.parse_args()
@@ -127,7 +136,7 @@ def main():
     network.connect(interface="socketcan", channel=arguments.interface)
     try:
         for number in arguments.nodes:
-            node = network.add_node(number, remote_device())
+            node = network.add_node(number, remote_device(dict(arguments.type)))
             node.sdo.RESPONSE_TIMEOUT = PATIENCE
             print(json.dumps(ask(network, node, arguments.sync, arguments.values)), flush=True)
     except (RuntimeError, canopen.SdoCommunicationError, SdoAbortedError, canopen.nmt.NmtError) as error:
