@@ -2,7 +2,10 @@ use super::*;
 use crate::bus::memory::{Clock, MemoryBus};
 use crate::bus::{Bus, Event};
 use crate::device::catalog;
+use crate::device::description::Scalar;
 use crate::sim::Direction;
+use crate::sim::model::Overload;
+use std::sync::Arc;
 use std::sync::Mutex;
 
 fn node(id: u8) -> NodeId {
@@ -692,6 +695,15 @@ fn the_same_seed_gives_the_same_frames_and_another_gives_others() {
     assert_ne!(first, run(2));
 }
 
+#[test]
+fn turns_do_not_drift_and_are_not_made_up_for() {
+    let second = Duration::from_secs(1);
+    assert_eq!(next_turn(ms(1000), second, ms(1000)), ms(2000));
+    assert_eq!(next_turn(ms(1000), second, ms(1999)), ms(2000));
+    assert_eq!(next_turn(ms(1000), second, ms(2000)), ms(3000));
+    assert_eq!(next_turn(ms(1000), second, ms(90_500)), ms(91_500));
+}
+
 /// A file in memory that the test keeps a hold of.
 #[derive(Clone, Default)]
 struct Shared(Arc<Mutex<Vec<u8>>>);
@@ -744,4 +756,47 @@ fn the_record_has_every_value_at_the_moment_its_frame_is_complete() {
             format!("{},5,pressure,,bar,overload-high,0x0000C07F", at[3]),
         ]
     );
+}
+
+mod garbage {
+    use super::*;
+    use crate::canopen::id::CanId;
+    use proptest::prelude::*;
+
+    fn frame() -> impl Strategy<Value = Frame> {
+        // Mostly at the identifiers that the devices listen to.
+        let id = prop_oneof![
+            3 => prop::sample::select(vec![0x000u16, 0x080, 0x601, 0x602, 0x603, 0x67f, 0x701, 0x702, 0x7e5]),
+            1 => 0u16..0x800,
+        ];
+        let data = prop::collection::vec(any::<u8>(), 0..=8);
+        (id, data, prop::bool::weighted(0.1), prop::bool::weighted(0.1)).prop_map(|(id, data, remote, extended)| {
+            let id = if extended { CanId::Extended(id.into()) } else { CanId::Standard(id) };
+            let len = u8::try_from(data.len()).expect("at most 8");
+            if remote { Frame::remote(id, len) } else { Frame::new(id, &data) }.expect("at most 8")
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Whatever is sent, nobody panics, time goes on, and after a reset every device is as delivered.
+        #[test]
+        fn any_traffic_is_survived(frames in prop::collection::vec(frame(), 1..60)) {
+            let kinds = [("mh4", 1), ("d20", 2), ("mc1609", 3), ("dps", 127)];
+            let mut bus = bus(kinds.map(|(kind, id)| still(kind, id, 5.0)));
+            for frame in frames {
+                bus.send(&frame).expect("room");
+                let until = bus.now().mono + Duration::from_millis(7);
+                prop_assert!(hear(&mut bus, until).len() < 100);
+            }
+            bus.send(&"000#8100".parse().expect("a frame")).expect("room");
+            let until = bus.now().mono + Duration::from_millis(400);
+            let heard = hear(&mut bus, until);
+            for (_, id) in kinds {
+                let boot_up = Frame::byte(CanId::heartbeat(node(id)), 0).to_string();
+                prop_assert!(heard.contains(&boot_up), "{boot_up} in {heard:?}");
+            }
+        }
+    }
 }
