@@ -129,8 +129,7 @@ impl Log {
                 Some(file) => Target::File(file.try_clone().map_err(|source| self.file_error(source))?),
                 None => Target::Stream(Box::new(io::stdout())),
             };
-            let rows = Rows::begin(target, form, true).map_err(|error| self.row_error(error))?;
-            let mut screen = Screen { rows, progress, console, error: None, begun: None };
+            let mut screen = Screen { rows: Rows::new(target, form), progress, console, error: None, begun: None };
             let outcome = log(master, &plan, &mut screen);
             screen.progress.finish();
             Ok((outcome, screen))
@@ -203,8 +202,7 @@ impl Log {
 fn remove_if_empty(path: &Path, file: Option<&File>) {
     let length =
         file.and_then(|file| file.metadata().ok()).filter(|metadata| metadata.is_file()).map(|metadata| metadata.len());
-    let header = crate::output::rows::HEADER.len() as u64 + 1;
-    if length.is_some_and(|length| length <= header) {
+    if length == Some(0) {
         // What cannot be removed stays, with its header: nothing is lost by it.
         let _ = std::fs::remove_file(path);
     }

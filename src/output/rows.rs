@@ -53,12 +53,14 @@ pub struct Rows {
     first: Option<Mono>,
     lost: u64,
     scratch: String,
+    header: bool,
 }
 
 impl Rows {
-    /// Rows of `form` to `target`; the header of a CSV file is written at once.
-    pub fn begin(target: Target, form: Form, header: bool) -> io::Result<Rows> {
-        let mut rows = Rows {
+    /// Rows of `form` to `target`. A CSV file begins with a header, which comes with the first row: where
+    /// nothing was measured, nothing is written.
+    pub fn new(target: Target, form: Form) -> Rows {
+        Rows {
             target,
             form,
             block: Vec::with_capacity(BLOCK + 4096),
@@ -67,19 +69,18 @@ impl Rows {
             first: None,
             lost: 0,
             scratch: String::new(),
-        };
-        if header && form == Form::Csv {
-            rows.block.extend_from_slice(HEADER.as_bytes());
-            rows.block.push(b'\n');
-            rows.flush()?;
+            header: form == Form::Csv,
         }
-        Ok(rows)
     }
 
     /// Adds a row.
     pub fn add(&mut self, sample: &Sample, source: &Source) -> io::Result<()> {
         let first = *self.first.get_or_insert(sample.at.mono);
         let elapsed = sample.at.mono.since(first);
+        if std::mem::take(&mut self.header) {
+            self.block.extend_from_slice(HEADER.as_bytes());
+            self.block.push(b'\n');
+        }
         match self.form {
             Form::Csv => self.csv(sample, source, elapsed)?,
             Form::Json => {
@@ -214,7 +215,7 @@ mod tests {
 
     fn text(form: Form, samples: &[(Sample, Source)]) -> String {
         let shared = Shared::default();
-        let mut rows = Rows::begin(Target::Stream(Box::new(shared.clone())), form, true).expect("memory");
+        let mut rows = Rows::new(Target::Stream(Box::new(shared.clone())), form);
         for (sample, source) in samples {
             rows.add(sample, source).expect("memory");
         }
@@ -288,7 +289,7 @@ mod tests {
         }
         let shared = Shared::default();
         let target = Target::Stream(Box::new(Small(shared.clone(), 49 + 75 + 10)));
-        let mut rows = Rows::begin(target, Form::Csv, true).expect("room for the header");
+        let mut rows = Rows::new(target, Form::Csv);
         let row = sample(0, Some(Number::Real32(1.1)), Some(Status::Ok), &[0xcd, 0xcc, 0x8c, 0x3f]);
         for _ in 0..3 {
             rows.add(&row, &source("pressure", "bar")).expect("not written yet");

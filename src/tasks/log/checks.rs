@@ -1,0 +1,86 @@
+//! What is checked before a recording changes anything.
+
+use super::{Mode, Plan};
+use crate::bus::BusError;
+use crate::canopen::id::CanId;
+use crate::master::{Error, Happening, Master};
+use crate::measure::decode::Wanted;
+use crate::measure::instrument::Instrument;
+use crate::tasks::{Failure, Kind};
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+/// Everything asked for must be in a TPDO, or nothing will ever come of it.
+pub(super) fn check_wanted(instruments: &[Instrument], plan: &Plan) -> Result<(), Failure> {
+    let polled = matches!(plan.mode, Mode::Poll(_));
+    for item in &plan.wanted {
+        let carried = |instrument: &Instrument| {
+            let entries = || {
+                let valid = instrument.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
+                valid.flat_map(|tpdo| &tpdo.mapping)
+            };
+            match item {
+                Wanted::Signal(name) => instrument.mapped_signals().any(|signal| signal.name == *name),
+                Wanted::Object(object) => entries().any(|entry| entry.object == *object),
+                Wanted::Status(name) => instrument
+                    .signals
+                    .iter()
+                    .filter(|signal| signal.name == *name)
+                    .any(|signal| entries().any(|entry| Some(entry.object) == signal.status)),
+            }
+        };
+        if !instruments.iter().any(carried) {
+            let (known, name) = match item {
+                Wanted::Signal(name) | Wanted::Status(name) => (
+                    instruments.iter().any(|instrument| instrument.signals.iter().any(|signal| signal.name == *name)),
+                    name.clone(),
+                ),
+                Wanted::Object(object) => (true, object.to_string()),
+            };
+            if !known {
+                let mut names: Vec<&str> = instruments
+                    .iter()
+                    .flat_map(|instrument| instrument.signals.iter().map(|signal| signal.name.as_str()))
+                    .collect();
+                names.dedup();
+                return Err(Failure::new(Kind::Usage, format!("no node has a signal \"{name}\""))
+                    .hint(format!("there are: {}", names.join(", "))));
+            }
+            if polled {
+                continue;
+            }
+            return Err(Failure::new(Kind::Unexpected, format!("no TPDO carries {name}"))
+                .hint("read it by SDO instead: add --poll 100ms"));
+        }
+    }
+    Ok(())
+}
+
+/// Two SYNC producers would double every synchronous TPDO.
+pub(super) fn refuse_second_sync(
+    master: &mut Master<'_>,
+    instruments: &[Instrument],
+    period: Duration,
+) -> Result<(), Failure> {
+    let ids: BTreeSet<CanId> = instruments.iter().map(|instrument| instrument.sync).collect();
+    if ids.len() > 1 {
+        return Err(Failure::new(Kind::CheckFailed, "the nodes listen to different SYNC identifiers (1005h)"));
+    }
+    let length = (period * 3).clamp(Duration::from_millis(200), Duration::from_secs(2));
+    let until = master.now() + length;
+    loop {
+        match master.next(until)? {
+            Happening::Frame(received) if ids.contains(&received.frame.id()) && !received.frame.is_remote() => {
+                return Err(Failure::new(
+                    Kind::CheckFailed,
+                    "somebody else sends SYNC on this bus: nothing was started",
+                )
+                .hint("leave --sync out: the nodes send on the SYNC that is there"));
+            }
+            Happening::Deadline => return Ok(()),
+            Happening::Interrupted => return Err(Error::Interrupted.into()),
+            Happening::Link(false) => return Err(BusError::Down(master.bus().name().to_owned()).into()),
+            _ => {}
+        }
+    }
+}
