@@ -9,7 +9,7 @@ use std::io::{self, Write};
 /// Print the completions for a shell
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  cangauge completions bash > ~/.local/share/bash-completion/completions/cangauge")]
-pub struct Completions {
+pub(crate) struct Completions {
     /// bash, zsh, fish, elvish or powershell
     shell: Shell,
 }

@@ -3,7 +3,9 @@
 use super::Cli;
 use crate::bus::BusError;
 use crate::master::{Error, SdoError};
+use crate::output::console::Console;
 use crate::tasks::{Failure, Kind};
+use clap::error::ErrorKind;
 use std::io;
 
 /// Several nodes that failed; the first one's kind is that of all.
@@ -39,6 +41,38 @@ fn code(kind: Kind) -> u8 {
         Kind::Io => 8,
         Kind::Interrupted => 130,
     }
+}
+
+/// What the parser says, in the contract's form: help and version as they are, and an error on one line
+/// with a hint. Returns the exit code.
+pub fn usage(error: &clap::Error) -> u8 {
+    if !error.use_stderr() || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        // A reader of the help that has gone has seen enough.
+        let _ = error.print();
+        return if error.use_stderr() { code(Kind::Usage) } else { 0 };
+    }
+    let text = error.render().to_string();
+    let paragraphs: Vec<&str> = text.split("\n\n").map(str::trim).collect();
+    let one_line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let first = paragraphs.first().map_or("", |first| first.trim_start_matches("error: "));
+    // What a value is wrong for says its own parser best.
+    let message = std::error::Error::source(error).map_or_else(|| first.to_owned(), |inner| inner.to_string());
+    let tip = paragraphs.iter().find_map(|paragraph| paragraph.strip_prefix("tip: "));
+    let help = paragraphs
+        .iter()
+        .find_map(|paragraph| paragraph.strip_prefix("Usage: "))
+        .map(|usage| format!("usage: {}", one_line(usage)));
+    let failure = Failure {
+        hint: Some(tip.map(one_line).or(help).unwrap_or_else(|| "cangauge --help".to_owned())),
+        ..Failure::new(Kind::Usage, one_line(&message))
+    };
+    // Parsing has failed, so the option has to be looked for by hand.
+    let words: Vec<String> = std::env::args().collect();
+    let json = words.iter().any(|word| word == "--format=json" || word == "-fjson")
+        || words.windows(2).any(|pair| (pair[0] == "--format" || pair[0] == "-f") && pair[1] == "json");
+    let console = Console { quiet: false, verbose: 0, json, color: anstream::ColorChoice::Auto, progress: None };
+    console.fail(&failure, code(Kind::Usage));
+    code(Kind::Usage)
 }
 
 /// Says what went wrong and returns the exit code.

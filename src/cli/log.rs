@@ -34,7 +34,7 @@ Examples:
   cangauge -b sim log 127 --duration 10s -o dps.csv
   cangauge -b sim log 1-3,127 pressure --poll 200ms --duration 5s --format json
   cangauge log 5 --passive --device mh4 -o run.csv")]
-pub struct Log {
+pub(crate) struct Log {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
     /// Only these: pressure, temperature, ch1 to ch16, pressure.status, or an object: 0x6130:1
@@ -137,7 +137,7 @@ impl Log {
         let Screen { mut rows, console, error, .. } = screen;
         let flushed = rows.flush();
         if let Some(error) = error.or(flushed.err()) {
-            if rows.lost() > 0 {
+            if rows.lost() > 0 && error.kind() != io::ErrorKind::BrokenPipe {
                 console.warn(&format!("{} rows could not be written", rows.lost()));
             }
             return Err(self.row_error(error));

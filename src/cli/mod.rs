@@ -112,22 +112,15 @@ pub enum When {
     Never,
 }
 
-/// What to do.
+/// What to do. The help of each stands with its arguments.
 #[derive(Debug, Subcommand)]
-pub enum Command {
-    /// List every node that answers
+pub(crate) enum Command {
     Scan(scan::Scan),
-    /// Read measured values now
     Read(read::Read),
-    /// Send NMT commands and tell states
     Nmt(nmt::Nmt),
-    /// Read and write objects
     Sdo(sdo::Sdo),
-    /// Record measurements
     Log(log::Log),
-    /// Simulate devices on a bus
     Sim(sim::Sim),
-    /// Print the completions for a shell
     Completions(completions::Completions),
 }
 

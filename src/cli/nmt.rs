@@ -21,7 +21,7 @@ use std::io::{self, Write};
 #[command(
     after_help = "Examples:\n  cangauge -b sim nmt start 1\n  cangauge -b sim nmt reset 127\n  cangauge -b sim nmt state 1-3"
 )]
-pub struct Nmt {
+pub(crate) struct Nmt {
     #[command(subcommand)]
     action: Action,
 }

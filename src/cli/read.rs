@@ -23,7 +23,7 @@ use std::io::{self, Write};
 #[command(
     after_help = "Examples:\n  cangauge -b sim read 1\n  cangauge -b sim read 127 pressure --in bar\n  cangauge -b sim read 1,127 --format json"
 )]
-pub struct Read {
+pub(crate) struct Read {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
     /// pressure, temperature, ch1 to ch16, pressure.status, or an object as it is: 0x6130:1

@@ -23,7 +23,7 @@ const WAIT: Duration = Duration::from_millis(200);
 /// what a heartbeat tells; "-" where nothing tells it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b sim scan\n  cangauge -b sim scan 1-16 --format json")]
-pub struct Scan {
+pub(crate) struct Scan {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     #[arg(default_value = "1-127")]
     nodes: Nodes,

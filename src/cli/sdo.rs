@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "Examples:\n  cangauge -b sim sdo read 1 0x1018:1\n  cangauge -b sim sdo read 1 vendor-id serial-number\n  cangauge -b sim sdo write 1 producer-heartbeat-time 1000 --verify"
 )]
-pub struct Sdo {
+pub(crate) struct Sdo {
     #[command(subcommand)]
     action: Action,
 }

@@ -12,7 +12,7 @@ use clap::Args;
 /// them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b vcan0 sim mh4@5 dps@127\n  cangauge -b vcan0 sim bench.toml")]
-pub struct Sim {
+pub(crate) struct Sim {
     /// mh4@5 d20@2 dps@127 mc1609@3, or a bench description in TOML
     #[arg(required = true, value_name = "DEVICE@NODE|FILE.toml")]
     devices: Vec<String>,

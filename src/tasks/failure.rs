@@ -110,6 +110,7 @@ impl From<BusError> for Failure {
             BusError::NoInterface(_) | BusError::NotCan(_) => {
                 Some("see what is there: ip -br link show type can; without hardware: --bus sim".to_owned())
             }
+            BusError::Unsupported(_) => Some("without it: --bus sim".to_owned()),
             _ => None,
         };
         Failure { hint, ..Failure::new(kind, error.to_string()) }
