@@ -29,9 +29,10 @@
 //! direction = "high"         # or "low"
 //! ```
 
-use super::device::{Device, Setup};
+use super::device::Device;
 use super::model::{Direction, Overload};
 use super::record::Recorder;
+use super::setup::Setup;
 use crate::bus::memory::{BIT_RATE, Clock, MemoryBus};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;

@@ -3,10 +3,10 @@
 use super::channels::{Channels, status};
 use super::emergency::Emergencies;
 use super::memory::Memory;
-use super::model::Overload;
 use super::objects::{Area, Objects, Signature};
 use super::record::{Line, Recorder, line, plain};
 use super::sdo_server::SdoServer;
+use super::setup::Setup;
 use super::tpdo::{Cause, Tpdo};
 use crate::bus::memory::{Outbox, Station};
 use crate::bus::time::Mono;
@@ -14,11 +14,8 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
-use crate::device::catalog::Model;
-use crate::device::description::{Scalar, SimChannel};
 use crate::device::quirk::Quirk;
 use std::collections::VecDeque;
-use std::sync::Arc;
 use std::time::Duration;
 
 /// How long a device is away after a reset of the node.
@@ -33,36 +30,6 @@ const SERIAL_NUMBER: ObjectId = ObjectId::new(0x1018, 4);
 const NMT_STARTUP: ObjectId = ObjectId::new(0x1f80, 0);
 /// CAN overrun and SYNC length: the code that CiA 301 has for a SYNC with unexpected bytes.
 const SYNC_LENGTH: u16 = 0x8240;
-
-/// What a device is told when it is put together.
-#[derive(Clone, Debug)]
-pub struct Setup {
-    /// Its kind.
-    pub model: Arc<Model>,
-    /// Its node-ID.
-    pub node: NodeId,
-    /// Its serial number.
-    pub serial: u32,
-    /// Whether it becomes OPERATIONAL by itself.
-    pub start: bool,
-    /// Objects that were set and saved before.
-    pub set: Vec<(ObjectId, Scalar)>,
-    /// Its measuring channels.
-    pub channels: Vec<SimChannel>,
-    /// Overloads by channel.
-    pub overloads: Vec<(u8, Overload)>,
-    /// What makes the noise different from that of another run.
-    pub seed: u64,
-}
-
-impl Setup {
-    /// A device as its description has it.
-    pub fn new(model: Arc<Model>, node: NodeId) -> Setup {
-        let sim = &model.description.sim;
-        let (serial, channels) = (sim.serial, sim.channels.clone());
-        Setup { model, node, serial, start: false, set: Vec::new(), channels, overloads: Vec::new(), seed: 0 }
-    }
-}
 
 /// What a device is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -266,11 +233,11 @@ impl Device {
 
     /// A parameter was written while PDOs are running.
     fn apply(&mut self, object: ObjectId, now: Mono) {
-        let all = !(0x1800..0x1c00).contains(&object.index);
+        let measuring = object.index >= 0x6000;
         for tpdo in &mut self.tpdos {
             if tpdo.is_configured_by(object.index) {
                 tpdo.start(&self.memory.objects, &self.memory.channels, now);
-            } else if all {
+            } else if measuring {
                 // A limit, a unit, an offset: what can cause an event is worked out anew.
                 tpdo.watch(&self.memory.objects, &self.memory.channels, now);
             }
@@ -363,6 +330,13 @@ impl Device {
     }
 }
 
+/// When something that was due at `due` comes next: one period later, without drift. Turns that were missed
+/// because nobody played the device are not made up for.
+pub(super) fn next_turn(due: Mono, period: Duration, now: Mono) -> Mono {
+    let next = due + period;
+    if next > now { next } else { now + period }
+}
+
 /// The state as a heartbeat tells it (CiA 301, 7.2.8.3.2.2).
 fn state_code(state: NmtState) -> u8 {
     match state {
@@ -412,7 +386,7 @@ impl Station for Device {
         let Phase::Running(state) = self.phase else { return };
         if let Some(due) = self.heartbeat.filter(|due| *due <= now) {
             out.send(Frame::byte(CanId::heartbeat(self.memory.node), state_code(state)));
-            self.heartbeat = self.heartbeat_period().map(|period| due + period);
+            self.heartbeat = self.heartbeat_period().map(|period| next_turn(due, period, now));
         }
         if self.sdo.deadline().is_some_and(|deadline| deadline <= now)
             && let Some(abort) = self.sdo.give_up()

@@ -241,6 +241,18 @@ mod tests {
     }
 
     #[test]
+    fn the_cob_id_moves_them_or_switches_them_off() {
+        let (mut objects, mut emergencies) = mh4();
+        objects.put(EMCY_COB_ID, 0x99u32.to_le_bytes().to_vec());
+        emergencies.raise(&mut objects, 0x8110, 0, 0);
+        assert_eq!(frames(&objects, &mut emergencies), ["099#1081110000000000"]);
+        objects.put(EMCY_COB_ID, 0x8000_0099u32.to_le_bytes().to_vec());
+        emergencies.raise(&mut objects, 0x8120, 0, 0);
+        assert_eq!(frames(&objects, &mut emergencies), Vec::<String>::new());
+        assert_eq!(objects.number(HISTORY), 2);
+    }
+
+    #[test]
     fn dps_has_its_own_codes_and_registers() {
         let model = catalog::by_name("dps").expect("built in");
         let mut objects = Objects::new(&model, node());

@@ -161,6 +161,16 @@ mod tests {
     }
 
     #[test]
+    fn the_stations_hear_each_other_and_not_themselves() {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        let hosted: Vec<Box<dyn Station>> = vec![Box::new(master(&[(10, "000#0105"), (20, "080#")])), device("mh4", 5)];
+        let stations = run(&mut bus, hosted, Some(ms(50))).expect("no error");
+        let station: &dyn std::any::Any = &*stations[0];
+        let master: &Master = station.downcast_ref().expect("the master");
+        assert_eq!(master.received, ["705#00", "185#0000803F00"]);
+    }
+
+    #[test]
     fn a_full_queue_loses_nothing() {
         let mut bus = MemoryBus::new(Clock::Virtual).with_queue_length(1);
         bus.attach(master(&[(10, "000#0103")]));

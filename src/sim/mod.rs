@@ -20,10 +20,12 @@ mod number;
 mod objects;
 mod record;
 mod sdo_server;
+mod setup;
 mod tpdo;
 
 pub use abort::Abort;
 pub use bench::{Bench, BenchError};
-pub use device::{Device, Setup};
+pub use device::Device;
 pub use model::{Direction, Overload};
 pub use record::{HEADER, Recorder};
+pub use setup::Setup;

@@ -2,7 +2,11 @@ use super::*;
 use crate::bus::memory::{Clock, MemoryBus};
 use crate::bus::{Bus, Event};
 use crate::device::catalog;
+use crate::device::catalog::Model;
+use crate::device::description::Scalar;
 use crate::sim::Direction;
+use crate::sim::model::Overload;
+use std::sync::Arc;
 use std::sync::Mutex;
 
 fn node(id: u8) -> NodeId {
@@ -184,6 +188,12 @@ fn guarding_answers_with_a_toggle_where_there_is_guarding() {
             ("702#R1", "-"),
         ],
     );
+    // The toggle begins anew with the communication.
+    play(&mut d20, &[("602#2217100000000000", "582#6017100000000000"), ("702#R1", "702#05")]);
+    play(&mut d20, &[("000#8202", "-")]);
+    let until = d20.now().mono + Duration::from_millis(20);
+    assert_eq!(hear(&mut d20, until), ["702#00"]);
+    play(&mut d20, &[("702#R1", "702#7F"), ("702#R1", "702#FF")]);
     let mut mh4 = bus([still("mh4", 5, 5.0)]);
     play(&mut mh4, &[("705#R1", "705#00"), ("705#R1", "-")]);
 }
@@ -280,7 +290,7 @@ fn mh4_remaps_only_while_the_pdo_is_off() {
             ("601#23001A0110013061", "581#80001A0141000406"),
             ("601#23001A0120013061", "581#60001A0100000000"),
             ("601#23001A0220013091", "581#60001A0200000000"),
-            ("601#23001A0320023061", "581#60001A0300000000"),
+            ("601#23001A0308015061", "581#60001A0300000000"),
             ("601#2F001A0003000000", "581#80001A0042000406"),
             ("601#2F001A0002000000", "581#60001A0000000000"),
             ("601#2300180180010040", "581#8000180130000906"),
@@ -379,6 +389,124 @@ fn passing_a_limit_outwards_sends_once() {
     for (value, limit) in heard.iter().zip([5.8, 4.2, 5.8, 4.2]) {
         assert!((value - limit).abs() < 0.01, "{heard:?}");
     }
+}
+
+#[test]
+fn the_hysteresis_keeps_a_limit_from_being_passed_again() {
+    // 5 ± 1 never comes back by 2: each limit is passed once and for all.
+    let mut setup = still("mh4", 5, 5.0);
+    setup.channels[0].amplitude = 1.0;
+    setup.channels[0].period_s = 1.0;
+    setup.set = vec![
+        (id("1800:2"), Scalar::Integer(254)),
+        (id("6134:1"), Scalar::Real(4.5)),
+        (id("6135:1"), Scalar::Real(5.5)),
+        (id("6136:1"), Scalar::Real(2.0)),
+    ];
+    setup.start = true;
+    let mut bus = bus([setup]);
+    assert_eq!(hear(&mut bus, ms(5000)).len(), 1 + 2);
+}
+
+#[test]
+fn what_can_cause_an_event_can_change_while_running() {
+    let mut setup = still("mh4", 5, 5.0);
+    setup.channels[0].amplitude = 1.05;
+    setup.channels[0].period_s = 1.0;
+    setup.set = vec![(id("1800:2"), Scalar::Integer(255))];
+    setup.start = true;
+    let mut bus = bus([setup]);
+    assert_eq!(hear(&mut bus, ms(1000)), ["705#00"]);
+    // 6133h:1 = 0.5.
+    play(&mut bus, &[("605#233361010000003F", "585#6033610100000000")]);
+    assert_eq!(hear(&mut bus, ms(2000)).len(), 7);
+}
+
+/// A device with an inhibit time, which none of the built-in ones has.
+const INHIBITED: &str = r#"
+    name = "inhibited"
+    title = ""
+    vendor = ""
+    source = ""
+    [identify]
+    [[signal]]
+    name = "pressure"
+    channel = 1
+    value = "0x6130:1"
+    [[object]]
+    at = "0x1800:1"
+    name = "cob-id"
+    type = "u32"
+    access = "rw"
+    default = "$NODEID+0x180"
+    [[object]]
+    at = "0x1800:2"
+    name = "transmission-type"
+    type = "u8"
+    access = "rw"
+    default = 255
+    [[object]]
+    at = "0x1800:3"
+    name = "inhibit-time"
+    type = "u16"
+    access = "rw"
+    default = 2000
+    [[object]]
+    at = "0x1A00:0"
+    name = "mapping-entries"
+    type = "u8"
+    access = "rw"
+    default = 1
+    [[object]]
+    at = "0x1A00:1"
+    name = "mapping"
+    type = "u32"
+    access = "rw"
+    default = 0x61300120
+    [[object]]
+    at = "0x6130:1"
+    name = "ai-input-pv"
+    type = "r32"
+    access = "ro"
+    pdo = true
+    [[object]]
+    at = "0x6133:1"
+    name = "delta"
+    type = "r32"
+    access = "rw"
+    default = 0.1
+    [[sim.channel]]
+    channel = 1
+    unit = 0x4E0000
+    base = 5.0
+    amplitude = 1.0
+    period_s = 1.0
+    noise = 0.0
+    start = 0.0
+    end = 10.0
+"#;
+
+#[test]
+fn the_inhibit_time_keeps_events_apart() {
+    let run = |inhibit: i64| {
+        let model = Arc::new(Model::from_toml(INHIBITED).expect("a description"));
+        let mut setup = Setup::new(model, node(5));
+        setup.set = vec![(id("1800:3"), Scalar::Integer(inhibit))];
+        setup.start = true;
+        bus([setup])
+    };
+    // Without it, 4 / 0.1 = 40 events in a second, the fastest after 16 ms.
+    let mut free = run(0);
+    assert!((36..=40).contains(&timed(&mut free, ms(1000)).len()));
+    let mut held = run(2000);
+    let heard = timed(&mut held, ms(2000));
+    let gaps: Vec<u128> = heard[1..].windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+    assert!(heard.len() > 8 && gaps.iter().all(|gap| *gap >= 200), "{gaps:?}");
+    assert!(gaps.contains(&200), "what was held back is sent as soon as it may: {gaps:?}");
+    // It changes only while the PDO is off.
+    play(&mut held, &[("605#2B00180300000000", "585#8000180330000906")]);
+    ask(&mut held, "605#2300180185010080");
+    assert!(ask(&mut held, "605#2B00180300000000").contains(&"585#6000180300000000".to_owned()));
 }
 
 #[test]
@@ -485,10 +613,13 @@ fn an_overload_while_running() {
             ("605#4050610100000000", "585#4F50610103000000"),
             ("605#4030710100000000", "585#4B30710100800000"),
             ("605#4001100000000000", "585#4F01100081000000"),
-            // Stopped: no emergencies; after a reset the error is told again.
-            ("000#8105", "-"),
+            // The communication begins anew: the error is still there and is no new one.
+            ("000#8205", "-"),
         ],
     );
+    assert_eq!(hear(&mut bus, ms(700)), ["705#00"]);
+    // After a reset of the node it is told again.
+    play(&mut bus, &[("605#4001100000000000", "585#4F01100081000000"), ("000#8105", "-")]);
     assert_eq!(hear(&mut bus, ms(1000)), ["705#00", "085#01F0810103000000"]);
 }
 
@@ -552,9 +683,30 @@ fn strings_come_in_segments_or_at_once() {
             ("602#4018100400000000", "582#4218100404030201"),
         ],
     );
+    // Each segment has a second of its own.
+    play(&mut bus, &[("601#4008100000000000", "581#4108100008000000")]);
+    let later = |bus: &mut MemoryBus| {
+        let until = bus.now().mono + Duration::from_millis(700);
+        hear(bus, until)
+    };
+    assert_eq!(later(&mut bus), Vec::<String>::new());
+    play(&mut bus, &[("601#6000000000000000", "581#004D482D342D4341")]);
+    assert_eq!(later(&mut bus), Vec::<String>::new());
+    play(&mut bus, &[("601#7000000000000000", "581#1D4E000000000000")]);
+    // A stop ends the transfer.
+    play(
+        &mut bus,
+        &[
+            ("601#4008100000000000", "581#4108100008000000"),
+            ("000#0201", "-"),
+            ("000#8001", "-"),
+            ("601#6000000000000000", "581#8000000001000405"),
+        ],
+    );
     // A client that does not fetch its segments is given up after a second.
     play(&mut bus, &[("601#4008100000000000", "581#4108100008000000")]);
-    assert_eq!(hear(&mut bus, ms(5000)), ["581#8008100000000405"]);
+    let until = bus.now().mono + Duration::from_secs(5);
+    assert_eq!(hear(&mut bus, until), ["581#8008100000000405"]);
 }
 
 #[test]
@@ -647,6 +799,19 @@ fn autozero_and_the_extremes() {
 }
 
 #[test]
+fn the_scaling_factor_counts() {
+    let mut bus = bus([still("mh4", 5, 1.5)]);
+    play(
+        &mut bus,
+        &[
+            ("605#2326610100000040", "705#00 585#6026610100000000"),
+            ("605#4030610100000000", "585#4330610100004040"),
+            ("605#2326610200000040", "585#8026610202000106"),
+        ],
+    );
+}
+
+#[test]
 fn devices_that_start_by_themselves() {
     let mut setup = still("mh4", 5, 5.0);
     setup.set = vec![(id("1F80"), Scalar::Integer(8))];
@@ -690,6 +855,36 @@ fn the_same_seed_gives_the_same_frames_and_another_gives_others() {
     assert_eq!(first.len(), 4 + 100 + 20);
     assert_eq!(first, run(1));
     assert_ne!(first, run(2));
+}
+
+#[test]
+fn a_tpdo_that_a_reset_overtakes_is_neither_sent_nor_recorded() {
+    let file = Shared::default();
+    let recorder = Recorder::new(Box::new(file.clone())).expect("memory");
+    let mut setup = Setup::new(catalog::by_name("mh4").expect("built in"), node(5));
+    setup.start = true;
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(Device::new(setup).expect("a device").recording(recorder.clone()));
+    hear(&mut bus, ms(10));
+    // The reset waits behind the SYNC and wins the wire from the TPDO that the SYNC has caused.
+    bus.send(&"080#".parse().expect("a frame")).expect("room");
+    bus.send(&"000#8105".parse().expect("a frame")).expect("room");
+    assert_eq!(hear(&mut bus, ms(200)), ["705#00"]);
+    let sent = ask(&mut bus, "080#");
+    assert_eq!(sent.len(), 1);
+    recorder.flush().expect("memory");
+    let text = String::from_utf8(file.0.lock().expect("not poisoned").clone()).expect("text");
+    let raw: Vec<&str> = text.lines().skip(1).filter_map(|line| line.rsplit_once(",0x")).map(|(_, raw)| raw).collect();
+    assert_eq!(raw, [&sent[0][4..12]]);
+}
+
+#[test]
+fn turns_do_not_drift_and_are_not_made_up_for() {
+    let second = Duration::from_secs(1);
+    assert_eq!(next_turn(ms(1000), second, ms(1000)), ms(2000));
+    assert_eq!(next_turn(ms(1000), second, ms(1999)), ms(2000));
+    assert_eq!(next_turn(ms(1000), second, ms(2000)), ms(3000));
+    assert_eq!(next_turn(ms(1000), second, ms(90_500)), ms(91_500));
 }
 
 /// A file in memory that the test keeps a hold of.
@@ -744,4 +939,47 @@ fn the_record_has_every_value_at_the_moment_its_frame_is_complete() {
             format!("{},5,pressure,,bar,overload-high,0x0000C07F", at[3]),
         ]
     );
+}
+
+mod garbage {
+    use super::*;
+    use crate::canopen::id::CanId;
+    use proptest::prelude::*;
+
+    fn frame() -> impl Strategy<Value = Frame> {
+        // Mostly at the identifiers that the devices listen to.
+        let id = prop_oneof![
+            3 => prop::sample::select(vec![0x000u16, 0x080, 0x601, 0x602, 0x603, 0x67f, 0x701, 0x702, 0x7e5]),
+            1 => 0u16..0x800,
+        ];
+        let data = prop::collection::vec(any::<u8>(), 0..=8);
+        (id, data, prop::bool::weighted(0.1), prop::bool::weighted(0.1)).prop_map(|(id, data, remote, extended)| {
+            let id = if extended { CanId::Extended(id.into()) } else { CanId::Standard(id) };
+            let len = u8::try_from(data.len()).expect("at most 8");
+            if remote { Frame::remote(id, len) } else { Frame::new(id, &data) }.expect("at most 8")
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Whatever is sent, nobody panics, time goes on, and after a reset every device is as delivered.
+        #[test]
+        fn any_traffic_is_survived(frames in prop::collection::vec(frame(), 1..60)) {
+            let kinds = [("mh4", 1), ("d20", 2), ("mc1609", 3), ("dps", 127)];
+            let mut bus = bus(kinds.map(|(kind, id)| still(kind, id, 5.0)));
+            for frame in frames {
+                bus.send(&frame).expect("room");
+                let until = bus.now().mono + Duration::from_millis(7);
+                prop_assert!(hear(&mut bus, until).len() < 100);
+            }
+            bus.send(&"000#8100".parse().expect("a frame")).expect("room");
+            let until = bus.now().mono + Duration::from_millis(400);
+            let heard = hear(&mut bus, until);
+            for (_, id) in kinds {
+                let boot_up = Frame::byte(CanId::heartbeat(node(id)), 0).to_string();
+                prop_assert!(heard.contains(&boot_up), "{boot_up} in {heard:?}");
+            }
+        }
+    }
 }
