@@ -11,12 +11,14 @@
 //!   matching. Never prints; time is told by what is received.
 //! - [`sim`] → bus, device, canopen (frames, ids, values only). Simulated devices, written from the
 //!   standard and the manuals and not with the client's encoders.
-//! - [`measure`] → master, device, canopen. From TPDOs and SDO answers to samples, and their statistics.
+//! - [`measure`] → master, device, canopen, bus (moments). From TPDOs and SDO answers to samples, and their
+//!   statistics. When something came is an argument.
 //! - [`tasks`] → measure, master, device, canopen, bus (the trait). The procedures that users think in.
 //!   They return reports and print nothing.
-//! - [`output`] → tasks (reports), measure, device, canopen (values). Rows and text; knows no bus and no
-//!   command line.
-//! - [`cli`] → everything; holds no protocol bytes and no sockets. One file a subcommand.
+//! - [`output`] → tasks (reports), measure, device, canopen (values), bus (moments). Rows and text; knows no
+//!   transport and no command line.
+//! - [`cli`] → tasks, output, measure, master, sim, bus, device, canopen (values). Holds no protocol bytes and
+//!   no sockets. One file a subcommand.
 
 pub mod bus;
 pub mod canopen;

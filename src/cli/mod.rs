@@ -28,8 +28,12 @@ Examples, on the simulated bus; leave `-b sim` out where one CAN interface is up
   cangauge -b sim sdo read 1 0x1018:1                    one object, bare
   cangauge -b sim nmt reset 1                            restart it, wait for the boot-up
 
-Exit codes: 0 done; 1 the answer is no; 2 usage, nothing was sent; 3 no answer; 4 refused by the device;
-5 bus; 6 unexpected; 7 partial; 8 file; 130 interrupted.";
+Exit codes:
+  0  done                                    5  the bus fails: interface missing, down, bus-off
+  1  the answer is no                        6  an unexpected answer or state
+  2  usage: nothing was sent                 7  some nodes succeeded and some failed
+  3  no answer in time                       8  a file or a stream fails
+  4  refused by the device                 130  interrupted before there was a result";
 
 /// Find, configure and log CANopen measuring devices (CiA 404): pressure and temperature transmitters,
 /// thermocouple modules
@@ -65,7 +69,7 @@ pub struct Global {
     #[arg(long, global = true, value_name = "[NODE=]NAME|FILE")]
     pub(crate) device: Vec<Override>,
 
-    /// Form of the output; for log, text means csv
+    /// Form of the output: for people, one object a line, or comma-separated; for log, text means csv
     #[arg(short, long, global = true, value_name = "FORM", default_value = "text")]
     pub(crate) format: Format,
 
@@ -81,34 +85,28 @@ pub struct Global {
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub(crate) verbose: u8,
 
-    /// Show live values and progress on stderr
+    /// Show live values and progress on stderr; auto: on a terminal
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
     pub(crate) progress: When,
 
-    /// Colour on stderr
+    /// Colour on stderr; auto: on a terminal, and without NO_COLOR
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
     pub(crate) color: When,
 }
 
-/// Form of the output.
+// No doc comments on the variants: clap would spread each over lines of its own in every help text.
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Format {
-    /// For people
+pub(crate) enum Format {
     Text,
-    /// One object per line
     Json,
-    /// Comma-separated values
     Csv,
 }
 
-/// When to do something for a terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum When {
-    /// On a terminal
+pub(crate) enum When {
     Auto,
-    /// In any case
     Always,
-    /// In no case
     Never,
 }
 

@@ -9,7 +9,7 @@ use crate::tasks::scan::{Found, listen, scan};
 use crate::tasks::{Failure, Kind, failure::together};
 use clap::Args;
 use std::io::{self, Write};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How long `--passive` listens: a heartbeat of once a second is heard three times.
 const LISTEN: Duration = Duration::from_secs(3);
@@ -34,25 +34,27 @@ pub(crate) struct Scan {
 
 impl Scan {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let begun = Instant::now();
         let nodes: Vec<NodeId> = match &self.nodes {
             Nodes::All => NodeId::all().collect(),
             Nodes::These(nodes) => nodes.clone(),
         };
         let overrides = open::overrides(global, &nodes)?;
-        let found = global.with_master(|master| {
-            if self.passive {
-                return Ok(listen(master, &nodes, global.timeout.map_or(LISTEN, |timeout| timeout.0)).or_fail()?);
-            }
-            let wait = global.timing(WAIT).timeout;
-            let rounds = 1 + global.timing(WAIT).retries;
-            Ok(scan(master, &nodes, wait, rounds, &overrides).or_fail()?)
+        let (found, took) = global.with_master(|master| {
+            let begun = master.now();
+            let found = if self.passive {
+                listen(master, &nodes, global.timeout.map_or(LISTEN, |timeout| timeout.0)).or_fail()?
+            } else {
+                let wait = global.timing(WAIT).timeout;
+                let rounds = 1 + global.timing(WAIT).retries;
+                scan(master, &nodes, wait, rounds, &overrides).or_fail()?
+            };
+            Ok((found, master.now().since(begun)))
         })?;
         if found.is_empty() {
             return Err(nobody(self.passive).into());
         }
         print(&found, global.format).map_err(stdout)?;
-        self.say(&found, begun.elapsed(), global);
+        self.say(&found, took, global);
         let failures: Vec<Failure> = found.iter().filter_map(|found| found.failure.clone()).collect();
         together(found.len(), failures).map_err(|failures| Several(failures).into())
     }

@@ -3,6 +3,7 @@
 use super::channels::{Channels, status};
 use super::emergency::Emergencies;
 use super::memory::Memory;
+use super::nmt::{Command, State};
 use super::objects::{Area, Objects, Signature};
 use super::record::{Line, Recorder, line, plain};
 use super::sdo_server::SdoServer;
@@ -12,7 +13,6 @@ use crate::bus::memory::{Outbox, Station};
 use crate::bus::time::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
-use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::device::quirk::Quirk;
 use std::collections::VecDeque;
@@ -37,7 +37,7 @@ enum Phase {
     Off,
     /// Away until then.
     Starting(Mono),
-    Running(NmtState),
+    Running(State),
 }
 
 /// A simulated device.
@@ -107,7 +107,7 @@ impl Device {
     }
 
     /// Its NMT state; `None` without power and while it starts.
-    pub fn state(&self) -> Option<NmtState> {
+    pub fn state(&self) -> Option<State> {
         match self.phase {
             Phase::Running(state) => Some(state),
             Phase::Off | Phase::Starting(_) => None,
@@ -120,7 +120,7 @@ impl Device {
     }
 
     fn is_operational(&self) -> bool {
-        self.phase == Phase::Running(NmtState::Operational)
+        self.phase == Phase::Running(State::Operational)
     }
 
     /// Initialisation is over: boot-up, then PRE-OPERATIONAL or at once OPERATIONAL.
@@ -131,20 +131,20 @@ impl Device {
         // MH-4, 4.1.16: 8 starts by itself. CiA 302-2: bit 3 set with bit 2 clear.
         let startup = self.memory.objects.number(NMT_STARTUP);
         let starts = self.setup.start || startup & 0b1100 == 0b1000;
-        self.enter(if starts { NmtState::Operational } else { NmtState::PreOperational }, now);
+        self.enter(if starts { State::Operational } else { State::PreOperational }, now);
         self.memory.emergencies.publish(&mut self.memory.objects);
         self.look_for_overload(now);
         self.send_emergencies(now, out);
     }
 
-    fn enter(&mut self, state: NmtState, now: Mono) {
+    fn enter(&mut self, state: State, now: Mono) {
         let before = std::mem::replace(&mut self.phase, Phase::Running(state));
         match state {
-            NmtState::Operational if before != self.phase => self.start_tpdos(now),
-            NmtState::Operational => {}
+            State::Operational if before != self.phase => self.start_tpdos(now),
+            State::Operational => {}
             _ => self.tpdos.iter_mut().for_each(Tpdo::stop),
         }
-        if state == NmtState::Stopped {
+        if state == State::Stopped {
             self.sdo.forget();
             self.memory.emergencies.drop_waiting();
         }
@@ -195,28 +195,26 @@ impl Device {
         self.heartbeat = self.heartbeat_period().map(|_| first);
     }
 
-    fn obey(&mut self, command: NmtCommand, now: Mono, out: &mut Outbox) {
+    fn obey(&mut self, command: Command, now: Mono, out: &mut Outbox) {
         match command {
-            NmtCommand::ResetNode => self.reset(Area::All, now, out),
-            NmtCommand::ResetCommunication => self.reset(Area::Communication, now, out),
-            NmtCommand::Start | NmtCommand::Stop | NmtCommand::EnterPreOperational => {
-                self.enter(command.target(), now);
-            }
+            Command::ResetNode => self.reset(Area::All, now, out),
+            Command::ResetCommunication => self.reset(Area::Communication, now, out),
+            Command::Enter(state) => self.enter(state, now),
         }
     }
 
     /// The answer to node guarding, where the device has it and no heartbeat takes its place.
-    fn guard(&mut self, state: NmtState, out: &mut Outbox) {
+    fn guard(&mut self, state: State, out: &mut Outbox) {
         if !self.memory.objects.has(GUARD_TIME) || self.heartbeat_period().is_some() {
             return;
         }
         let toggle = if self.toggle { 0x80 } else { 0x00 };
-        out.send(Frame::byte(CanId::heartbeat(self.memory.node), state_code(state) | toggle));
+        out.send(Frame::byte(CanId::heartbeat(self.memory.node), state.code() | toggle));
         self.toggle = !self.toggle;
     }
 
     fn serve(&mut self, request: [u8; 8], now: Mono, out: &mut Outbox) {
-        let pre_operational = self.phase == Phase::Running(NmtState::PreOperational);
+        let pre_operational = self.phase == Phase::Running(State::PreOperational);
         let mut access = self.memory.at(now.since_start(), pre_operational);
         let answer = self.sdo.request(now, request, &mut access);
         let written = access.written;
@@ -321,7 +319,7 @@ impl Device {
     }
 
     fn send_emergencies(&mut self, now: Mono, out: &mut Outbox) {
-        if matches!(self.phase, Phase::Running(NmtState::Stopped)) {
+        if matches!(self.phase, Phase::Running(State::Stopped)) {
             self.memory.emergencies.drop_waiting();
         }
         while let Some(frame) = self.memory.emergencies.next_frame(&self.memory.objects, self.memory.node, now) {
@@ -337,16 +335,6 @@ pub(super) fn next_turn(due: Mono, period: Duration, now: Mono) -> Mono {
     if next > now { next } else { now + period }
 }
 
-/// The state as a heartbeat tells it (CiA 301, 7.2.8.3.2.2).
-fn state_code(state: NmtState) -> u8 {
-    match state {
-        NmtState::Stopped => 0x04,
-        NmtState::Operational => 0x05,
-        NmtState::PreOperational => 0x7f,
-        NmtState::Other(code) => code,
-    }
-}
-
 impl Station for Device {
     fn power_on(&mut self, now: Mono, out: &mut Outbox) {
         self.memory.node = self.saved_node();
@@ -356,20 +344,18 @@ impl Station for Device {
 
     fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
         let Phase::Running(state) = self.phase else { return };
-        if let Some((command, node)) = NmtCommand::parse(frame) {
-            if node.is_none_or(|node| node == self.memory.node) {
-                self.obey(command, now, out);
-            }
+        if let Some(command) = Command::for_node(self.memory.node, frame) {
+            self.obey(command, now, out);
         } else if frame.is_remote() {
             if frame.id() == CanId::heartbeat(self.memory.node) {
                 self.guard(state, out);
             }
         } else if self.is_sync(frame) {
-            if state != NmtState::Stopped {
+            if state != State::Stopped {
                 self.sync(frame, now, out);
             }
         } else if frame.id() == CanId::sdo_request(self.memory.node)
-            && state != NmtState::Stopped
+            && state != State::Stopped
             && let Some(request) = frame.all_eight()
         {
             self.serve(request, now, out);
@@ -385,7 +371,7 @@ impl Station for Device {
         }
         let Phase::Running(state) = self.phase else { return };
         if let Some(due) = self.heartbeat.filter(|due| *due <= now) {
-            out.send(Frame::byte(CanId::heartbeat(self.memory.node), state_code(state)));
+            out.send(Frame::byte(CanId::heartbeat(self.memory.node), state.code()));
             self.heartbeat = self.heartbeat_period().map(|period| next_turn(due, period, now));
         }
         if self.sdo.deadline().is_some_and(|deadline| deadline <= now)

@@ -1,0 +1,367 @@
+//! What makes a device send its TPDOs, and what stands in them.
+
+use super::*;
+
+#[test]
+fn mh4_is_silent_until_somebody_sends_sync() {
+    let mut bus = bus([Setup::new(catalog::by_name("mh4").expect("built in"), node(5))]);
+    assert_eq!(ask(&mut bus, "000#0105"), ["705#00"]);
+    assert_eq!(hear(&mut bus, ms(60_000)), Vec::<String>::new());
+    let answer = ask(&mut bus, "080#");
+    assert_eq!(answer.len(), 1);
+    assert!(answer[0].starts_with("185#") && answer[0].ends_with("00") && answer[0].len() == 14, "{answer:?}");
+}
+
+#[test]
+fn dps_sends_psi_every_100_ms() {
+    let mut bus = bus([still("dps", 127, 17.898)]);
+    assert_eq!(ask(&mut bus, "000#017F"), ["77F#00"]);
+    let heard = timed(&mut bus, ms(1005));
+    assert_eq!(heard.iter().map(|(at, _)| *at).collect::<Vec<_>>(), (1..=10).map(|n| n * 100).collect::<Vec<u128>>());
+    // 17898 = 45EAh.
+    assert!(heard.iter().all(|(_, frame)| frame == "1FF#EA450000"), "{heard:?}");
+    // Table 29: 1800h:5 to 1000 ms.
+    play(&mut bus, &[("67F#22001805E8030000", "5FF#6000180500000000")]);
+    let heard = timed(&mut bus, ms(4100));
+    assert_eq!(heard.len(), 3);
+    assert_eq!(heard[1].0 - heard[0].0, 1000);
+}
+
+#[test]
+fn dps_remaps_as_its_table_26_prints() {
+    let mut bus = bus([still("dps", 127, 50.0)]);
+    play(
+        &mut bus,
+        &[
+            ("67F#22001801FF0100C0", "77F#00 5FF#6000180100000000"),
+            ("67F#22001A0000000000", "5FF#60001A0000000000"),
+            ("67F#22001A0110010071", "5FF#60001A0100000000"),
+            ("67F#2F001A0001000000", "5FF#60001A0000000000"),
+            ("67F#22001801FF010040", "5FF#6000180100000000"),
+            ("67F#2200180200000000", "5FF#6000180200000000"),
+            ("000#017F", "-"),
+            // Table 27: on SYNC, if changed. 50 of 100 psi are 2047.5 of 4095 counts.
+            ("080#", "1FF#0008"),
+            ("080#", "-"),
+            // Table 28: every third.
+            ("67F#2200180203000000", "5FF#6000180200000000"),
+            ("080#", "-"),
+            ("080#", "-"),
+            ("080#", "1FF#0008"),
+            ("080#", "-"),
+        ],
+    );
+}
+
+#[test]
+fn d20_remaps_by_the_count_alone() {
+    let mut bus = bus([still("d20", 2, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            ("000#0102", "702#00"),
+            ("080#", "182#88130000"),
+            ("602#22001A0000000000", "582#80001A0022000008"),
+            ("000#8002", "-"),
+            ("602#22001A0120013061", "582#80001A0100000106"),
+            ("602#22001A0000000000", "582#60001A0000000000"),
+            ("000#0102", "-"),
+            // "PDO does not supply any data; DLC = 0".
+            ("080#", "182#"),
+            ("000#8002", "-"),
+            ("602#22001A0120013161", "582#80001A0141000406"),
+            ("602#22001A0120013061", "582#60001A0100000000"),
+            ("602#22001A0001000000", "582#60001A0000000000"),
+            ("000#0102", "-"),
+            ("080#", "182#0000A040"),
+        ],
+    );
+}
+
+#[test]
+fn mh4_remaps_only_while_the_pdo_is_off() {
+    let mut bus = bus([still("mh4", 1, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            // 3.4.2, and each step out of order before it.
+            ("601#2F001A0000000000", "701#00 581#80001A0000000106"),
+            ("601#2300180182010040", "581#8000180130000906"),
+            ("601#23001801810100C0", "581#6000180100000000"),
+            ("601#23001A0120013061", "581#80001A0100000106"),
+            ("601#2F001A0000000000", "581#60001A0000000000"),
+            ("601#23001A0120001061", "581#80001A0141000406"),
+            ("601#23001A0110013061", "581#80001A0141000406"),
+            ("601#23001A0120013061", "581#60001A0100000000"),
+            ("601#23001A0220013091", "581#60001A0200000000"),
+            ("601#23001A0308015061", "581#60001A0300000000"),
+            ("601#2F001A0003000000", "581#80001A0042000406"),
+            ("601#2F001A0002000000", "581#60001A0000000000"),
+            ("601#2300180180010040", "581#8000180130000906"),
+            ("601#2300180185010040", "581#6000180100000000"),
+            ("000#0101", "-"),
+            ("080#", "185#0000A04088130000"),
+        ],
+    );
+}
+
+#[test]
+fn every_nth_sync_and_if_changed() {
+    let mut moving = Setup::new(catalog::by_name("mh4").expect("built in"), node(5));
+    moving.channels[0].noise = 0.0;
+    moving.channels[0].period_s = 1.0;
+    let mut bus = bus([moving]);
+    play(
+        &mut bus,
+        &[("605#2F00180204000000", "705#00 585#6000180200000000"), ("605#2F00180105000000", "585#8000180110000706")],
+    );
+    assert_eq!(ask(&mut bus, "000#0105"), Vec::<String>::new());
+    let answers: Vec<usize> = (0..9).map(|_| ask(&mut bus, "080#").len()).collect();
+    assert_eq!(answers, [0, 0, 0, 1, 0, 0, 0, 1, 0]);
+    // Started anew, the count begins anew.
+    ask(&mut bus, "000#8005");
+    ask(&mut bus, "000#0105");
+    let answers: Vec<usize> = (0..4).map(|_| ask(&mut bus, "080#").len()).collect();
+    assert_eq!(answers, [0, 0, 0, 1]);
+    play(&mut bus, &[("605#2F00180200000000", "585#6000180200000000")]);
+    // A moving value has changed with every SYNC; two SYNCs within one sample of 640 us have not.
+    assert_eq!(ask(&mut bus, "080#").len(), 1);
+    assert_eq!(ask(&mut bus, "080#").len(), 1);
+    for _ in 0..3 {
+        bus.send(&"080#".parse().expect("a frame")).expect("room");
+    }
+    let until = bus.now().mono + Duration::from_millis(5);
+    let changed = hear(&mut bus, until).len();
+    assert!(changed < 3, "{changed}");
+    // Types that CiA reserves, and types that this device does not offer.
+    for kind in ["F1", "FB", "FC", "FD"] {
+        assert_eq!(ask(&mut bus, &format!("605#2F001802{kind}000000")), ["585#8000180230000906"]);
+    }
+}
+
+#[test]
+fn event_timer_of_types_254_and_255() {
+    for kind in ["FE", "FF"] {
+        let mut bus = bus([still("mh4", 5, 5.0)]);
+        ask(&mut bus, &format!("605#2F001802{kind}000000"));
+        play(&mut bus, &[("605#2B00180564000000", "585#6000180500000000"), ("000#0105", "-")]);
+        let heard = timed(&mut bus, ms(1020));
+        assert_eq!(heard.len(), 10, "{kind} {heard:?}");
+        assert!(heard.windows(2).all(|pair| pair[1].0 - pair[0].0 == 100), "{heard:?}");
+        assert!(heard.iter().all(|(_, frame)| frame == "185#0000A04000"));
+        assert_eq!(ask(&mut bus, "080#").len(), 0, "not on SYNC");
+    }
+}
+
+#[test]
+fn a_change_by_delta_sends() {
+    // 5 ± 1.05 within a second, delta 0.5.
+    let mut setup = still("mh4", 5, 5.0);
+    setup.channels[0].amplitude = 1.05;
+    setup.channels[0].period_s = 1.0;
+    setup.set = vec![(id("1800:2"), Scalar::Integer(255)), (id("6133:1"), Scalar::Real(0.5))];
+    setup.start = true;
+    let mut bus = bus([setup]);
+    let heard: Vec<f32> = hear(&mut bus, ms(1000)).iter().skip(1).map(|frame| pressure(frame)).collect();
+    assert_eq!(heard.len(), 7, "{heard:?}");
+    for (value, expected) in heard.iter().zip([5.5, 6.0, 5.5, 5.0, 4.5, 4.0, 4.5]) {
+        assert!((value - expected).abs() < 0.02, "{heard:?}");
+    }
+}
+
+/// The REAL32 in the first four bytes.
+fn pressure(frame: &str) -> f32 {
+    let frame: Frame = frame.parse().expect("a frame");
+    f32::from_le_bytes(frame.data()[..4].try_into().expect("four bytes"))
+}
+
+#[test]
+fn passing_a_limit_outwards_sends_once() {
+    let mut setup = still("mh4", 5, 5.0);
+    setup.channels[0].amplitude = 1.0;
+    setup.channels[0].period_s = 1.0;
+    setup.set = vec![
+        (id("1800:2"), Scalar::Integer(254)),
+        (id("6134:1"), Scalar::Real(4.2)),
+        (id("6135:1"), Scalar::Real(5.8)),
+        (id("6136:1"), Scalar::Real(0.1)),
+    ];
+    setup.start = true;
+    let mut bus = bus([setup]);
+    let heard: Vec<f32> = hear(&mut bus, ms(2000)).iter().skip(1).map(|frame| pressure(frame)).collect();
+    assert_eq!(heard.len(), 4, "{heard:?}");
+    for (value, limit) in heard.iter().zip([5.8, 4.2, 5.8, 4.2]) {
+        assert!((value - limit).abs() < 0.01, "{heard:?}");
+    }
+}
+
+#[test]
+fn the_hysteresis_keeps_a_limit_from_being_passed_again() {
+    // 5 ± 1 never comes back by 2: each limit is passed once and for all.
+    let mut setup = still("mh4", 5, 5.0);
+    setup.channels[0].amplitude = 1.0;
+    setup.channels[0].period_s = 1.0;
+    setup.set = vec![
+        (id("1800:2"), Scalar::Integer(254)),
+        (id("6134:1"), Scalar::Real(4.5)),
+        (id("6135:1"), Scalar::Real(5.5)),
+        (id("6136:1"), Scalar::Real(2.0)),
+    ];
+    setup.start = true;
+    let mut bus = bus([setup]);
+    assert_eq!(hear(&mut bus, ms(5000)).len(), 1 + 2);
+}
+
+#[test]
+fn what_can_cause_an_event_can_change_while_running() {
+    let mut setup = still("mh4", 5, 5.0);
+    setup.channels[0].amplitude = 1.05;
+    setup.channels[0].period_s = 1.0;
+    setup.set = vec![(id("1800:2"), Scalar::Integer(255))];
+    setup.start = true;
+    let mut bus = bus([setup]);
+    assert_eq!(hear(&mut bus, ms(1000)), ["705#00"]);
+    // 6133h:1 = 0.5.
+    play(&mut bus, &[("605#233361010000003F", "585#6033610100000000")]);
+    assert_eq!(hear(&mut bus, ms(2000)).len(), 7);
+}
+
+/// A device with an inhibit time, which none of the built-in ones has.
+const INHIBITED: &str = r#"
+    name = "inhibited"
+    title = ""
+    vendor = ""
+    source = ""
+    [identify]
+    [[signal]]
+    name = "pressure"
+    channel = 1
+    value = "0x6130:1"
+    [[object]]
+    at = "0x1800:1"
+    name = "cob-id"
+    type = "u32"
+    access = "rw"
+    default = "$NODEID+0x180"
+    [[object]]
+    at = "0x1800:2"
+    name = "transmission-type"
+    type = "u8"
+    access = "rw"
+    default = 255
+    [[object]]
+    at = "0x1800:3"
+    name = "inhibit-time"
+    type = "u16"
+    access = "rw"
+    default = 2000
+    [[object]]
+    at = "0x1A00:0"
+    name = "mapping-entries"
+    type = "u8"
+    access = "rw"
+    default = 1
+    [[object]]
+    at = "0x1A00:1"
+    name = "mapping"
+    type = "u32"
+    access = "rw"
+    default = 0x61300120
+    [[object]]
+    at = "0x6130:1"
+    name = "ai-input-pv"
+    type = "r32"
+    access = "ro"
+    pdo = true
+    [[object]]
+    at = "0x6133:1"
+    name = "delta"
+    type = "r32"
+    access = "rw"
+    default = 0.1
+    [[sim.channel]]
+    channel = 1
+    unit = 0x4E0000
+    base = 5.0
+    amplitude = 1.0
+    period_s = 1.0
+    noise = 0.0
+    start = 0.0
+    end = 10.0
+"#;
+
+#[test]
+fn the_inhibit_time_keeps_events_apart() {
+    let run = |inhibit: i64| {
+        let model = Arc::new(Model::from_toml(INHIBITED).expect("a description"));
+        let mut setup = Setup::new(model, node(5));
+        setup.set = vec![(id("1800:3"), Scalar::Integer(inhibit))];
+        setup.start = true;
+        bus([setup])
+    };
+    // Without it, 4 / 0.1 = 40 events in a second, the fastest after 16 ms.
+    let mut free = run(0);
+    assert!((36..=40).contains(&timed(&mut free, ms(1000)).len()));
+    let mut held = run(2000);
+    let heard = timed(&mut held, ms(2000));
+    let gaps: Vec<u128> = heard[1..].windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+    assert!(heard.len() > 8 && gaps.iter().all(|gap| *gap >= 200), "{gaps:?}");
+    assert!(gaps.contains(&200), "what was held back is sent as soon as it may: {gaps:?}");
+    // It changes only while the PDO is off.
+    play(&mut held, &[("605#2B00180300000000", "585#8000180330000906")]);
+    ask(&mut held, "605#2300180185010080");
+    assert!(ask(&mut held, "605#2B00180300000000").contains(&"585#6000180300000000".to_owned()));
+}
+
+#[test]
+fn an_invalid_pdo_is_not_sent_and_a_moved_one_is_where_it_was_moved() {
+    let mut bus = bus([still("mh4", 5, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            ("000#0105", "705#00"),
+            ("605#23001801850100C0", "585#6000180100000000"),
+            ("080#", "-"),
+            ("605#23001801AA010040", "585#6000180100000000"),
+            ("080#", "1AA#0000A04000"),
+            // Restricted, 29 bits, a mapping written by mistake.
+            ("605#23001801AA0100C0", "585#6000180100000000"),
+            ("605#2300180181050040", "585#8000180130000906"),
+            ("605#2300180185010060", "585#8000180130000906"),
+            ("605#2300180120013061", "585#8000180130000906"),
+            ("605#4000180100000000", "585#43001801AA0100C0"),
+        ],
+    );
+}
+
+#[test]
+fn sync_on_another_identifier() {
+    let mut bus = bus([still("mh4", 5, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            ("605#2305100081000000", "705#00 585#6005100000000000"),
+            ("000#0105", "-"),
+            ("080#", "-"),
+            ("081#", "185#0000A04000"),
+            ("081#R", "-"),
+            ("00000081#", "-"),
+        ],
+    );
+}
+
+#[test]
+fn a_sync_with_bytes_is_an_emergency_on_mh4() {
+    let mut bus = bus([still("mh4", 5, 5.0)]);
+    play(
+        &mut bus,
+        &[
+            ("000#0105", "705#00"),
+            ("080#01", "085#4082110000000000 185#0000A04000"),
+            ("080#02", "185#0000A04000"),
+            ("080#", "085#0000000000000000 185#0000A04000"),
+        ],
+    );
+    let mut d20 = self::bus([still("d20", 2, 5.0)]);
+    play(&mut d20, &[("000#0102", "702#00"), ("080#01", "182#88130000")]);
+}
