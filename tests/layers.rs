@@ -53,6 +53,9 @@ const RESERVED: &[(&str, &[&str])] = &[
 /// Functions that read a clock or wait, wherever they are called from.
 const CLOCKS: [[&str; 2]; 4] = [["Instant", "now"], ["SystemTime", "now"], ["Wall", "now"], ["thread", "sleep"]];
 
+/// A path in the code and its line.
+type Use = (usize, Vec<String>);
+
 /// The most lines of a file.
 const LINES: usize = 600;
 
@@ -203,7 +206,7 @@ fn without_tests(tokens: &[Token], files: &mut Vec<String>) -> Vec<Token> {
 }
 
 /// Every path in the code, the trees of `use` taken apart: `crate::{a, b::c}` is `crate::a` and `crate::b::c`.
-fn paths(tokens: &[Token]) -> Vec<(usize, Vec<String>)> {
+fn paths(tokens: &[Token]) -> Vec<Use> {
     let mut found = Vec::new();
     let mut at = 0;
     while at < tokens.len() {
@@ -218,7 +221,7 @@ fn paths(tokens: &[Token]) -> Vec<(usize, Vec<String>)> {
     found
 }
 
-fn tree(tokens: &[Token], mut at: usize, before: &[String], found: &mut Vec<(usize, Vec<String>)>) -> usize {
+fn tree(tokens: &[Token], mut at: usize, before: &[String], found: &mut Vec<Use>) -> usize {
     let mut path = before.to_vec();
     let mut line = 0;
     while let Some(token) = tokens.get(at) {
@@ -278,7 +281,7 @@ impl Source {
     }
 
     /// Paths from the root of the crate (`crate` left out), and those that lead out of it.
-    fn paths(&self) -> (Vec<(usize, Vec<String>)>, Vec<(usize, Vec<String>)>) {
+    fn paths(&self) -> (Vec<Use>, Vec<Use>) {
         let (mut inner, mut outer) = (Vec::new(), Vec::new());
         for (line, path) in paths(&self.tokens) {
             let supers = path.iter().take_while(|part| *part == "super").count();

@@ -35,7 +35,7 @@ pub(crate) struct Read {
 
 fn parse_unit(text: &str) -> Result<Unit, String> {
     Unit::from_symbol(text)
-        .ok_or_else(|| format!("\"{text}\" is not a known unit (bar, mbar, kPa, MPa, psi, degC, degF, K, 0x…)"))
+        .ok_or_else(|| format!("\"{text}\" is not a known unit (bar, mbar, kPa, MPa, psi, degC, degF, K, 0x4E0000)"))
 }
 
 /// A value ready to be shown.

@@ -187,7 +187,7 @@ pub fn encode(
             Ok((data_type.encode_text(text).map_err(|error| usage(error.to_string()))?, data_type))
         }
         _ => Err(usage("its type is not known".to_owned()).hint(format!(
-            "say it: cangauge sdo write {} {object} {text} --type u32 (or i16, r32, vs …)",
+            "say it: cangauge sdo write {} {object} {text} --type u32 (or i16, r32, vs)",
             knowledge.node
         ))),
     }
