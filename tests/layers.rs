@@ -268,6 +268,9 @@ struct Source {
     tokens: Vec<Token>,
 }
 
+/// A path and the line it stands in.
+type PathAt = (usize, Vec<String>);
+
 impl Source {
     fn new(file: &str, text: &str, files: &mut Vec<String>) -> Source {
         let stem = file.trim_end_matches(".rs");

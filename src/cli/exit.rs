@@ -44,8 +44,8 @@ fn code(kind: Kind) -> u8 {
 }
 
 /// What the parser says, in the contract's form: help and version as they are, and an error on one line
-/// with a hint. Returns the exit code.
-pub fn usage(error: &clap::Error) -> u8 {
+/// with a hint. `words` are those of the command line. Returns the exit code.
+pub fn usage(error: &clap::Error, mut words: impl Iterator<Item = String>) -> u8 {
     if !error.use_stderr() || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         // A reader of the help that has gone has seen enough.
         let _ = error.print();
@@ -67,9 +67,11 @@ pub fn usage(error: &clap::Error) -> u8 {
         ..Failure::new(Kind::Usage, one_line(&message))
     };
     // Parsing has failed, so the option has to be looked for by hand.
-    let words: Vec<String> = std::env::args().collect();
-    let json = words.iter().any(|word| word == "--format=json" || word == "-fjson")
-        || words.windows(2).any(|pair| (pair[0] == "--format" || pair[0] == "-f") && pair[1] == "json");
+    let mut json = false;
+    while let Some(word) = words.next() {
+        json |= word == "--format=json" || word == "-fjson";
+        json |= (word == "--format" || word == "-f") && words.next().is_some_and(|form| form == "json");
+    }
     let console = Console { quiet: false, verbose: 0, json, color: anstream::ColorChoice::Auto, progress: None };
     console.fail(&failure, code(Kind::Usage));
     code(Kind::Usage)

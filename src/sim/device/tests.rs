@@ -9,6 +9,7 @@ use crate::sim::model::Overload;
 use std::sync::Arc;
 use std::sync::Mutex;
 
+mod stored;
 mod tpdo;
 
 fn node(id: u8) -> NodeId {
@@ -345,108 +346,6 @@ fn strings_come_in_segments_or_at_once() {
     play(&mut bus, &[("601#4008100000000000", "581#4108100008000000")]);
     let until = bus.now().mono + Duration::from_secs(5);
     assert_eq!(hear(&mut bus, until), ["581#8008100000000405"]);
-}
-
-#[test]
-fn storing_restoring_and_what_a_reset_does_to_each() {
-    let mut bus = bus([still("mh4", 5, 5.0)]);
-    let reset = |bus: &mut MemoryBus| {
-        ask(bus, "000#8105");
-        let until = bus.now().mono + Duration::from_millis(150);
-        hear(bus, until)
-    };
-    play(
-        &mut bus,
-        &[
-            ("605#233161010000AB00", "705#00 585#6031610100000000"),
-            ("605#2B17100060EA0000", "585#6017100000000000 705#7F"),
-            ("605#2310100365766173", "585#8010100320000008"),
-            ("605#2310100373617665", "585#6010100300000000"),
-        ],
-    );
-    assert_eq!(reset(&mut bus), ["705#00"]);
-    play(
-        &mut bus,
-        &[
-            ("605#4031610100000000", "585#433161010000AB00"),
-            ("605#4017100000000000", "585#4B17100000000000"),
-            // Restored after the reset, not before.
-            ("605#231110016C6F6164", "585#6011100100000000"),
-            ("605#4031610100000000", "585#433161010000AB00"),
-        ],
-    );
-    assert_eq!(reset(&mut bus), ["705#00"]);
-    play(&mut bus, &[("605#4031610100000000", "585#4331610100004E00")]);
-}
-
-#[test]
-fn saving_everything_loses_the_identifiers_of_an_mh4() {
-    for (sub, after) in [("01", "4300180185010040"), ("02", "43001801AA010040")] {
-        let mut bus = bus([still("mh4", 5, 5.0)]);
-        ask(&mut bus, "605#23001801850100C0");
-        ask(&mut bus, "605#23001801AA010040");
-        assert_eq!(ask(&mut bus, &format!("605#231010{sub}73617665")), [format!("585#601010{sub}00000000")]);
-        assert_eq!(ask(&mut bus, "605#4000180100000000"), ["585#43001801AA010040"], "until the reset it works");
-        ask(&mut bus, "000#8105");
-        let until = bus.now().mono + Duration::from_millis(150);
-        hear(&mut bus, until);
-        assert_eq!(ask(&mut bus, "605#4000180100000000"), [format!("585#{after}")]);
-    }
-}
-
-#[test]
-fn a_node_id_with_its_signature_is_taken_at_the_reset_after_saving() {
-    let mut bus = bus([still("mh4", 5, 5.0)]);
-    play(
-        &mut bus,
-        &[
-            ("605#2320230003000000", "705#00 585#8020230020000008"),
-            ("605#2320230003736574", "585#6020230000000000"),
-            ("605#2310100173617665", "585#6010100100000000"),
-            ("000#8105", "-"),
-        ],
-    );
-    assert_eq!(hear(&mut bus, ms(300)), ["703#00"]);
-    assert_eq!(device(&mut bus).node(), node(3));
-    play(
-        &mut bus,
-        &[
-            ("605#4000100000000000", "-"),
-            ("603#4000100000000000", "583#4300100094018200"),
-            ("603#4000180100000000", "583#4300180183010040"),
-        ],
-    );
-}
-
-#[test]
-fn autozero_and_the_extremes() {
-    let mut bus = bus([still("mh4", 5, 0.25)]);
-    play(
-        &mut bus,
-        &[
-            ("605#4020200100000000", "705#00 585#432020010000803E"),
-            ("605#236561017A65726F", "585#8065610100000206"),
-            ("605#232561017A65726F", "585#6025610100000000"),
-            ("605#4025610100000000", "585#8025610101000106"),
-            ("605#4027610100000000", "585#43276101000080BE"),
-            ("605#4030610100000000", "585#4330610100000000"),
-            ("605#232220017A65726F", "585#6022200100000000"),
-            ("605#4020200100000000", "585#4320200100000000"),
-        ],
-    );
-}
-
-#[test]
-fn the_scaling_factor_counts() {
-    let mut bus = bus([still("mh4", 5, 1.5)]);
-    play(
-        &mut bus,
-        &[
-            ("605#2326610100000040", "705#00 585#6026610100000000"),
-            ("605#4030610100000000", "585#4330610100004040"),
-            ("605#2326610200000040", "585#8026610202000106"),
-        ],
-    );
 }
 
 #[test]
