@@ -39,7 +39,7 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("signal_hook", &["bus"]),
     ("socket2", &["bus"]),
     ("socketcan", &["bus"]),
-    ("std::env", &[]),
+    ("std::env", &["main"]),
     ("std::fs", &["bus", "cli", "output", "sim"]),
     ("std::io", &["bus", "cli", "output", "sim"]),
     ("std::net", &["bus"]),
@@ -267,9 +267,6 @@ struct Source {
     module: Vec<String>,
     tokens: Vec<Token>,
 }
-
-/// A path and the line it stands in.
-type PathAt = (usize, Vec<String>);
 
 impl Source {
     fn new(file: &str, text: &str, files: &mut Vec<String>) -> Source {
