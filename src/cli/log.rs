@@ -131,7 +131,11 @@ impl Log {
             };
             let mut screen = Screen { rows: Rows::new(target, form), progress, console, error: None, begun: None };
             let outcome = log(master, &plan, &mut screen);
-            screen.progress.finish();
+            let interrupted = match &outcome {
+                Ok(outcome) => outcome.interrupted,
+                Err(failure) => failure.kind == Kind::Interrupted,
+            };
+            screen.progress.finish(interrupted);
             Ok((outcome, screen))
         })?;
         let Screen { mut rows, console, error, .. } = screen;

@@ -17,6 +17,7 @@ use crate::output::console::Console;
 use anstream::ColorChoice;
 use args::{BusSpec, Duration, Override};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use exit::IntoFailure;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -153,7 +154,10 @@ impl Global {
         let result = work(&mut master);
         // What a command leaves behind at its end still goes out: an abort, a node's state.
         master.settle();
-        result
+        let finished = bus.finish().or_fail();
+        let result = result?;
+        finished?;
+        Ok(result)
     }
 }
 

@@ -26,6 +26,6 @@ impl Sim {
         let stations = devices.into_iter().map(|device| Box::new(device) as Box<dyn Station>).collect();
         global.console().note("simulating; Ctrl-C ends");
         sim::host::run(&mut *bus, stations, None).or_fail()?;
-        Ok(())
+        Ok(bus.finish().or_fail()?)
     }
 }

@@ -4,6 +4,7 @@ use super::text;
 use crate::measure::sample::{Sample, Source};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::BTreeMap;
+use std::io::{self, Write};
 use std::time::Duration;
 
 /// How often lines are redrawn, a second.
@@ -56,7 +57,7 @@ impl Progress {
             let Some(source) = sources.get(sample.source) else { continue };
             let (_, values) = self.nodes.entry(source.node.get()).or_insert_with(|| {
                 let line = self.multi.insert_before(&self.total, ProgressBar::new_spinner());
-                line.set_style(style("{prefix:<4} {wide_msg}"));
+                line.set_style(style("{prefix:<4} {msg}"));
                 line.set_prefix(source.node.to_string());
                 (line, BTreeMap::new())
             });
@@ -96,12 +97,16 @@ impl Progress {
         }
     }
 
-    /// Removes the lines.
-    pub fn finish(&mut self) {
-        for (line, _) in self.nodes.values() {
-            line.finish_and_clear();
+    /// Removes the lines. After Ctrl-C they stay: the terminal has written `^C` behind them, and where the
+    /// cursor stands now is not known.
+    pub fn finish(&mut self, interrupted: bool) {
+        if interrupted && !self.is_hidden() {
+            // A terminal that takes no more is gone.
+            let _ = writeln!(io::stderr());
+        } else {
+            let _ = self.multi.clear();
         }
-        self.total.finish_and_clear();
+        self.multi.set_draw_target(ProgressDrawTarget::hidden());
     }
 }
 
