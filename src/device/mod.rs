@@ -3,4 +3,5 @@
 pub mod catalog;
 pub mod description;
 pub mod dictionary;
+pub mod eds;
 pub mod quirk;
