@@ -15,16 +15,16 @@ pub(super) fn info(ini: &Ini, warnings: &mut Vec<Warning>) -> Info {
     let Some(section) = ini.section("deviceinfo") else {
         return info;
     };
-    info.vendor_name = text(section, "vendorname");
-    info.vendor_number = number(section, "vendornumber", warnings);
-    info.product_name = text(section, "productname");
-    info.product_number = number(section, "productnumber", warnings);
-    info.revision_number = number(section, "revisionnumber", warnings);
-    info.order_code = text(section, "ordercode");
-    info.lss_supported = switch(section, "lss_supported", warnings);
+    info.vendor_name = text(section, "VendorName");
+    info.vendor_number = number(section, "VendorNumber", warnings);
+    info.product_name = text(section, "ProductName");
+    info.product_number = number(section, "ProductNumber", warnings);
+    info.revision_number = number(section, "RevisionNumber", warnings);
+    info.order_code = text(section, "OrderCode");
+    info.lss_supported = switch(section, "LSS_Supported", warnings);
     info.bit_rates = BIT_RATES
         .into_iter()
-        .filter(|rate| switch(section, &format!("baudrate_{rate}"), warnings) == Some(true))
+        .filter(|rate| switch(section, &format!("BaudRate_{rate}"), warnings) == Some(true))
         .map(|rate| rate * 1000)
         .collect();
     if let Some(item) = section.get("compactpdo")
@@ -41,17 +41,17 @@ pub(super) fn commissioning(ini: &Ini, warnings: &mut Vec<Warning>) -> Option<Co
     let section = spellings.iter().find_map(|name| ini.section(name))?;
     Some(Commissioning {
         node_id: node_id(section, warnings),
-        node_name: text(section, "nodename"),
+        node_name: text(section, "NodeName"),
         bit_rate: bit_rate(section, warnings),
-        net_number: number(section, "netnumber", warnings),
-        network_name: text(section, "networkname"),
-        manager: switch(section, "canopenmanager", warnings),
-        lss_serial: number(section, "lss_serialnumber", warnings),
+        net_number: number(section, "NetNumber", warnings),
+        network_name: text(section, "NetworkName"),
+        manager: switch(section, "CANopenManager", warnings),
+        lss_serial: number(section, "LSS_SerialNumber", warnings),
     })
 }
 
 fn node_id(section: &Section, warnings: &mut Vec<Warning>) -> Option<NodeId> {
-    let number = number(section, "nodeid", warnings)?;
+    let number = number(section, "NodeID", warnings)?;
     let node = u8::try_from(number).ok().and_then(|id| NodeId::new(id).ok());
     if let (None, Some(item)) = (node, section.get("nodeid")) {
         warnings.push(Warning::new(item.line, format!("NodeID: {number} is not a node-ID (1 to 127)")));
@@ -61,7 +61,7 @@ fn node_id(section: &Section, warnings: &mut Vec<Warning>) -> Option<NodeId> {
 
 /// Kbit/s; some tools write bit/s, which no bit rate in kbit/s can be mistaken for.
 fn bit_rate(section: &Section, warnings: &mut Vec<Warning>) -> Option<u32> {
-    let number = number(section, "baudrate", warnings)?;
+    let number = number(section, "Baudrate", warnings)?;
     if number <= 1000 {
         return (number > 0).then_some(number * 1000);
     }
@@ -75,11 +75,11 @@ fn bit_rate(section: &Section, warnings: &mut Vec<Warning>) -> Option<u32> {
 }
 
 fn text(section: &Section, key: &str) -> Option<String> {
-    section.get(key).map(|item| item.value.clone())
+    section.get(&key.to_ascii_lowercase()).map(|item| item.value.clone())
 }
 
 fn number(section: &Section, key: &str, warnings: &mut Vec<Warning>) -> Option<u32> {
-    let item = section.get(key)?;
+    let item = section.get(&key.to_ascii_lowercase())?;
     let reading = value::integer(&item.value);
     let number = reading.as_ref().and_then(|reading| u32::try_from(reading.value).ok());
     let doubt = match (number, reading.and_then(|reading| reading.doubt)) {
@@ -91,7 +91,7 @@ fn number(section: &Section, key: &str, warnings: &mut Vec<Warning>) -> Option<u
 }
 
 fn switch(section: &Section, key: &str, warnings: &mut Vec<Warning>) -> Option<bool> {
-    let item = section.get(key)?;
+    let item = section.get(&key.to_ascii_lowercase())?;
     let on = value::switch(&item.value);
     if on.is_none() {
         let text = format!("[{}] {key}: {} is neither 0 nor 1", section.shown, quoted(&item.value));

@@ -3,8 +3,9 @@
 //! CiA 306 has no escapes, no quotes and no comments behind a value, so a value is all that follows the
 //! first `=`. Names are compared without regard to letter case and blanks: `[1018 Sub 1]`, `Supported Objects`.
 //!
-//! A key or section that comes twice: the first one wins, as in the Windows function for INI files,
-//! which the vendors' tools were tried out with. A second section adds only keys that the first lacks.
+//! A key or section that comes twice: the first one wins, and a second section adds only keys that the first
+//! lacks. Tools differ here (the INI function of Windows takes the first, CANchkEDS the last); what a person
+//! sees first is the first, and the warning names both lines.
 
 use super::Warning;
 use super::text::{quoted, shown};

@@ -10,6 +10,7 @@
 //!
 //! How objects are called is told in `names.rs`.
 
+mod content;
 mod info;
 mod ini;
 mod names;

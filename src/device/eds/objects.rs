@@ -1,13 +1,13 @@
 //! From the sections of objects to entries of the object dictionary.
 
+use super::content::{Content, number};
 use super::ini::{Ini, Section};
 use super::names::{Described, Kind};
 use super::sections::{self, Parts};
-use super::text::quoted;
+use super::text::{quoted, shown};
 use super::{ObjectFlags, Warning, value};
 use crate::canopen::object::ObjectId;
-use crate::canopen::value::DataType;
-use crate::device::description::{Access, Scalar};
+use crate::device::description::Scalar;
 use crate::device::dictionary::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -28,16 +28,15 @@ pub(super) struct Objects {
 
 /// Object types (CiA 301, table 42).
 const NULL: i128 = 0;
-const DOMAIN: i128 = 2;
 const DEFTYPE: i128 = 5;
 const DEFSTRUCT: i128 = 6;
 const VAR: i128 = 7;
 const ARRAY: i128 = 8;
 const RECORD: i128 = 9;
 
-/// How much the entries may take together, in bytes. Three lines of a file can ask for 254 entries; the
-/// largest dictionaries of real devices need some 5 MB.
-const MOST_BYTES: usize = 64 << 20;
+/// How much the entries may take together, in bytes: room for a hundred thousand. Three lines of a file
+/// can ask for 254.
+const MOST_BYTES: usize = 32 << 20;
 
 /// Reads every object.
 pub(super) fn read(ini: &Ini, warnings: &mut Vec<Warning>) -> Objects {
@@ -50,55 +49,15 @@ pub(super) fn read(ini: &Ini, warnings: &mut Vec<Warning>) -> Objects {
 }
 
 /// Reads one object after the other.
-struct Reader<'a> {
-    ini: &'a Ini,
+pub(super) struct Reader<'a> {
+    pub(super) ini: &'a Ini,
     warnings: &'a mut Vec<Warning>,
     objects: Objects,
     room: usize,
 }
 
-/// What a section says of an entry, or of all elements of an array.
-struct Content {
-    data_type: DataType,
-    is_typed: bool,
-    access: Access,
-    default: Option<Scalar>,
-    low: Option<Scalar>,
-    high: Option<Scalar>,
-    pdo: bool,
-    parameter_value: Option<Scalar>,
-    flags: ObjectFlags,
-}
-
-impl Content {
-    /// Sub-index 0 of an array or record, which no section describes: CiA 301 does (7.4.5).
-    fn count(of: Option<u8>) -> Content {
-        Content {
-            data_type: DataType::Unsigned(1),
-            is_typed: true,
-            access: Access::Ro,
-            default: of.map(|count| Scalar::Integer(i64::from(count))),
-            low: None,
-            high: None,
-            pdo: false,
-            parameter_value: None,
-            flags: ObjectFlags::default(),
-        }
-    }
-
-    /// An estimate of what an entry takes beside its names.
-    fn bytes(&self) -> usize {
-        let texts = [&self.default, &self.low, &self.high, &self.parameter_value];
-        let length = |scalar: &Option<Scalar>| match scalar {
-            Some(Scalar::Text(text)) => text.len(),
-            _ => 0,
-        };
-        size_of::<Described>() + texts.into_iter().map(length).sum::<usize>()
-    }
-}
-
 impl Reader<'_> {
-    fn warn(&mut self, line: usize, text: String) {
+    pub(super) fn warn(&mut self, line: usize, text: String) {
         self.warnings.push(Warning::new(line, text));
     }
 
@@ -176,19 +135,18 @@ impl Reader<'_> {
         if object_type == Some(VAR) {
             self.warn(main.line, format!("[{}] is a variable, but has sub-objects; they are used", main.shown));
         }
-        if let Some(item) = main.get("subnumber") {
-            let described = parts.subs.len();
-            let announced = value::integer(&item.value).and_then(|number| usize::try_from(number.value).ok());
-            if announced.is_none_or(|announced| announced > described) {
-                let text =
-                    format!("[{}] SubNumber is {}, but {described} are described", main.shown, quoted(&item.value));
-                self.warn(item.line, text);
-            }
-        }
-        if parts.subs.is_empty() {
+        let described = parts.subs.len();
+        if described == 0 {
             let text = format!("[{}] has no sub-objects; only the count at sub-index 0 is known", main.shown);
             self.warn(main.line, text);
             self.push(ObjectId::new(index, 0), kind, main, "", &Content::count(None));
+        } else if let Some(item) = main.get("subnumber") {
+            let announced = value::integer(&item.value).and_then(|number| usize::try_from(number.value).ok());
+            if announced.is_none_or(|announced| announced > described) {
+                let text =
+                    format!("[{}] SubNumber is {}, but the file describes {described}", main.shown, shown(&item.value));
+                self.warn(item.line, text);
+            }
         }
     }
 
@@ -259,123 +217,14 @@ impl Reader<'_> {
                 self.objects.parameter_values.insert(object, value);
             }
         }
-        for (sub, item) in values.into_iter().chain(denotations) {
-            self.warn(item.line, format!("sub-index {sub} is not described"));
+        let lists = [(parts.values, values), (parts.denotations, denotations)];
+        for (section, (sub, item)) in
+            lists.into_iter().flat_map(|(section, rest)| rest.into_iter().map(move |one| (section, one)))
+        {
+            let name = section.map_or("", |section| section.shown.as_str());
+            self.warn(item.line, format!("[{name}] {sub}: there is no such sub-index"));
         }
     }
-
-    fn content(&mut self, section: &Section) -> Content {
-        let (data_type, is_typed) = self.data_type(section);
-        let mut scalar = |key: &str| {
-            let item = section.get(&key.to_ascii_lowercase())?;
-            self.scalar(&format!("[{}] {key}", section.shown), item.line, &item.value, data_type)
-        };
-        // What an unknown type makes of a value is unknown too, and text and bytes have no limits.
-        let has_limits = data_type.width().is_some();
-        let default = if is_typed { scalar("DefaultValue") } else { None };
-        let parameter_value = if is_typed { scalar("ParameterValue") } else { None };
-        let low = if has_limits { scalar("LowLimit") } else { None };
-        let high = if has_limits { scalar("HighLimit") } else { None };
-        let flags = number(section, "objflags").unwrap_or_default();
-        Content {
-            data_type,
-            is_typed,
-            access: self.access(section),
-            default,
-            low,
-            high,
-            pdo: self.pdo(section),
-            parameter_value,
-            flags: ObjectFlags { skip_write: flags & 1 != 0, skip_read: flags & 2 != 0 },
-        }
-    }
-
-    fn scalar(&mut self, place: &str, line: usize, text: &str, data_type: DataType) -> Option<Scalar> {
-        match value::scalar(text, data_type) {
-            Ok(reading) => {
-                let reading = reading?;
-                if let Some(doubt) = reading.doubt {
-                    self.warn(line, format!("{place}: {doubt}"));
-                }
-                Some(reading.value)
-            }
-            Err(error) => {
-                self.warn(line, format!("{place}: {error}; left out"));
-                None
-            }
-        }
-    }
-
-    /// The data type, and whether the file gives one that we know. Without, the entry has DOMAIN: its
-    /// object can still be read by its name, as bytes.
-    fn data_type(&mut self, section: &Section) -> (DataType, bool) {
-        let Some(item) = section.get("datatype") else {
-            if number(section, "objecttype") != Some(DOMAIN) {
-                self.warn(section.line, format!("[{}] has no DataType; its value is taken for bytes", section.shown));
-                return (DataType::Domain, false);
-            }
-            return (DataType::Domain, true);
-        };
-        let code = self.integer(section, "DataType").and_then(|code| u16::try_from(code).ok());
-        let known = code.and_then(|code| DataType::from_code(code).or_else(|| self.defined_type(code)));
-        match known {
-            Some(data_type) => (data_type, true),
-            None => {
-                let text = format!(
-                    "[{}] DataType: {} is unknown; its value is taken for bytes",
-                    section.shown,
-                    quoted(&item.value)
-                );
-                self.warn(item.line, text);
-                (DataType::Domain, false)
-            }
-        }
-    }
-
-    /// A type that the file itself defines: CANFestival's editor writes [A0] and, as the default of
-    /// [A0sub1], the type that it is made of.
-    fn defined_type(&self, code: u16) -> Option<DataType> {
-        let section =
-            self.ini.section(&format!("{code:x}sub1")).or_else(|| self.ini.section(&format!("{code:04x}sub1")))?;
-        DataType::from_code(u16::try_from(number(section, "defaultvalue")?).ok()?)
-    }
-
-    /// The access type. Where the file has none that we know, the device decides.
-    fn access(&mut self, section: &Section) -> Access {
-        let item = section.get("accesstype");
-        if let Some(access) = item.and_then(|item| value::access(&item.value)) {
-            return access;
-        }
-        let (line, what) = match item {
-            Some(item) => (item.line, format!("AccessType: {} is unknown", quoted(&item.value))),
-            None => (section.line, "has no AccessType".to_owned()),
-        };
-        self.warn(line, format!("[{}] {what}; taken for rw", section.shown));
-        Access::Rw
-    }
-
-    /// An integer, with a warning where it is doubtful.
-    fn integer(&mut self, section: &Section, key: &str) -> Option<i128> {
-        let item = section.get(&key.to_ascii_lowercase())?;
-        let reading = value::integer(&item.value)?;
-        if let Some(doubt) = reading.doubt {
-            self.warn(item.line, format!("[{}] {key}: {doubt}", section.shown));
-        }
-        Some(reading.value)
-    }
-
-    fn pdo(&mut self, section: &Section) -> bool {
-        let Some(item) = section.get("pdomapping") else { return false };
-        value::switch(&item.value).unwrap_or_else(|| {
-            let text = format!("[{}] PDOMapping: {} is neither 0 nor 1", section.shown, quoted(&item.value));
-            self.warn(item.line, text);
-            false
-        })
-    }
-}
-
-fn number(section: &Section, key: &str) -> Option<i128> {
-    value::integer(&section.get(key)?.value).map(|number| number.value)
 }
 
 /// A list by sub-index; the first of two with the same number counts.

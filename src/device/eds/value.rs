@@ -3,7 +3,7 @@
 use super::ini::without_comment;
 use super::text::quoted;
 use crate::canopen::id::NodeId;
-use crate::canopen::value::{DataType, parse_hex};
+use crate::canopen::value::{DataType, ValueError, parse_hex};
 use crate::device::description::{Access, Scalar};
 
 /// What was read, and what is doubtful about it.
@@ -95,7 +95,7 @@ pub(super) fn scalar(text: &str, data_type: DataType) -> Result<Option<Reading<S
     if text.is_empty() || (!is_text && without_comment(text) == Some("")) {
         return Ok(None);
     }
-    let form = || format!("{} is no value of type {data_type}", quoted(text));
+    let form = || format!("{} is not a value of type {data_type}", quoted(text));
     let reading = match data_type {
         DataType::VisibleString | DataType::UnicodeString => Some(Reading::sure(Scalar::Text(text.to_owned()))),
         DataType::Boolean => tolerant(text, truth),
@@ -112,7 +112,10 @@ pub(super) fn scalar(text: &str, data_type: DataType) -> Result<Option<Reading<S
     // The judge is the function that will put the value on the wire; a formula must fit every node-ID.
     match reading.value.encode(data_type, NodeId::MAX) {
         Ok(_) => Ok(Some(reading)),
-        Err(error) => Err(error.to_string()),
+        Err(ValueError::Range { low, high, .. }) => {
+            Err(format!("{} does not fit {data_type} ({low} to {high})", quoted(text)))
+        }
+        Err(ValueError::Form { .. }) => Err(form()),
     }
 }
 
@@ -281,7 +284,7 @@ mod tests {
         ] {
             assert!(scalar(wrong, data_type).is_err(), "{wrong}");
         }
-        assert_eq!(scalar("256", U8), Err("256 does not fit u8 (0 to 255)".to_owned()));
+        assert_eq!(scalar("256", U8), Err("\"256\" does not fit u8 (0 to 255)".to_owned()));
     }
 
     #[test]
