@@ -72,6 +72,7 @@ fn node_formula(text: &str, node: NodeId) -> Option<u32> {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Dictionary {
     entries: BTreeMap<ObjectId, Entry>,
+    aliases: BTreeMap<String, ObjectId>,
 }
 
 impl Dictionary {
@@ -83,6 +84,11 @@ impl Dictionary {
     /// Adds or replaces an entry.
     pub fn insert(&mut self, entry: Entry) {
         self.entries.insert(entry.object, entry);
+    }
+
+    /// Lets an entry be found under a second name, in lower case; full names go before.
+    pub fn insert_alias(&mut self, name: String, object: ObjectId) {
+        self.aliases.insert(name, object);
     }
 
     /// The entry at `object`.
@@ -107,8 +113,9 @@ impl Dictionary {
 
     /// The entry of a name: `vendor-id`, `ai-input-pv:1`. Letter case does not count.
     pub fn find(&self, name: &str) -> Option<&Entry> {
-        let name = name.to_ascii_lowercase();
-        self.iter().find(|entry| entry.full_name() == name)
+        let name = name.to_lowercase();
+        let alias = || self.get(*self.aliases.get(&name)?);
+        self.iter().find(|entry| entry.full_name() == name).or_else(alias)
     }
 
     /// Adds an entry of a device description, every sub-index of a run.
@@ -162,5 +169,21 @@ mod tests {
         assert_eq!(dictionary.iter().count(), 16);
         assert_eq!(dictionary.find("AI-input-pv:16").map(|entry| entry.object), Some(ObjectId::new(0x6130, 16)));
         assert_eq!(dictionary.find("ai-input-pv"), None);
+    }
+
+    #[test]
+    fn full_names_go_before_aliases() {
+        let described: ObjectEntry =
+            toml::from_str("at = \"0x2000:1-2\"\nname = \"überdruck\"\ntype = \"i16\"\naccess = \"ro\"")
+                .expect("an entry");
+        let mut dictionary = Dictionary::new();
+        dictionary.insert_described(&described).expect("a run");
+        dictionary.insert_alias("vent".to_owned(), ObjectId::new(0x2000, 2));
+        dictionary.insert_alias("überdruck:1".to_owned(), ObjectId::new(0x2000, 2));
+        dictionary.insert_alias("gone".to_owned(), ObjectId::new(0x2001, 0));
+        let find = |name: &str| dictionary.find(name).map(|entry| entry.object.sub);
+        assert_eq!(find("Vent"), Some(2));
+        assert_eq!(find("ÜBERDRUCK:1"), Some(1));
+        assert_eq!(find("gone"), None);
     }
 }

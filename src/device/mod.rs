@@ -3,5 +3,6 @@
 pub mod catalog;
 pub mod description;
 pub mod dictionary;
+pub mod eds;
 pub mod quirk;
 pub mod unit;

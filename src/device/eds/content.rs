@@ -1,0 +1,193 @@
+//! What one section says of an entry: type, access, default, limits, flags.
+
+use super::ini::Section;
+use super::names::Described;
+use super::objects::Reader;
+use super::text::quoted;
+use super::{ObjectFlags, value};
+use crate::canopen::id::NodeId;
+use crate::canopen::value::DataType;
+use crate::device::description::{Access, Scalar};
+
+/// The object type DOMAIN (CiA 301, table 42).
+const DOMAIN: i128 = 2;
+
+/// What a section says of an entry, or of all elements of an array.
+pub(super) struct Content {
+    pub(super) data_type: DataType,
+    pub(super) is_typed: bool,
+    pub(super) access: Access,
+    pub(super) default: Option<Scalar>,
+    pub(super) low: Option<Scalar>,
+    pub(super) high: Option<Scalar>,
+    pub(super) pdo: bool,
+    pub(super) parameter_value: Option<Scalar>,
+    pub(super) flags: ObjectFlags,
+}
+
+impl Content {
+    /// Sub-index 0 of an array or record, which no section describes: CiA 301 does.
+    pub(super) fn count(of: Option<u8>) -> Content {
+        Content {
+            data_type: DataType::Unsigned(1),
+            is_typed: true,
+            access: Access::Ro,
+            default: of.map(|count| Scalar::Integer(i64::from(count))),
+            low: None,
+            high: None,
+            pdo: false,
+            parameter_value: None,
+            flags: ObjectFlags::default(),
+        }
+    }
+
+    /// An estimate of what an entry takes beside its names.
+    pub(super) fn bytes(&self) -> usize {
+        let texts = [&self.default, &self.low, &self.high, &self.parameter_value];
+        let length = |scalar: &Option<Scalar>| match scalar {
+            Some(Scalar::Text(text)) => text.len(),
+            _ => 0,
+        };
+        size_of::<Described>() + texts.into_iter().map(length).sum::<usize>()
+    }
+}
+
+impl Reader<'_> {
+    /// What a section says.
+    pub(super) fn content(&mut self, section: &Section) -> Content {
+        let (data_type, is_typed) = self.data_type(section);
+        let mut scalar = |key: &str| {
+            let item = section.get(&key.to_ascii_lowercase())?;
+            self.scalar(&format!("[{}] {key}", section.shown), item.line, &item.value, data_type)
+        };
+        // What an unknown type makes of a value is unknown too, and text and bytes have no limits.
+        let has_limits = data_type.width().is_some();
+        let default = if is_typed { scalar("DefaultValue") } else { None };
+        let parameter_value = if is_typed { scalar("ParameterValue") } else { None };
+        let low = if has_limits { scalar("LowLimit") } else { None };
+        let high = if has_limits { scalar("HighLimit") } else { None };
+        let access = self.access(section);
+        let [low, high] = self.limits(section, data_type, access, [low, high]);
+        let flags = number(section, "objflags").unwrap_or_default();
+        Content {
+            data_type,
+            is_typed,
+            access,
+            default,
+            low,
+            high,
+            pdo: self.pdo(section),
+            parameter_value,
+            flags: ObjectFlags { skip_write: flags & 1 != 0, skip_read: flags & 2 != 0 },
+        }
+    }
+
+    /// Limits that leave nothing, or nothing but 0, to write to an object cannot be meant.
+    fn limits(
+        &mut self,
+        section: &Section,
+        data_type: DataType,
+        access: Access,
+        [low, high]: [Option<Scalar>; 2],
+    ) -> [Option<Scalar>; 2] {
+        let number = |limit: &Option<Scalar>| {
+            let bytes = limit.as_ref()?.encode(data_type, NodeId::MIN).ok()?;
+            data_type.decode(&bytes).ok()?.as_f64()
+        };
+        let what = match (number(&low), number(&high)) {
+            (Some(low), Some(high)) if low > high => "LowLimit is above HighLimit",
+            (Some(0.0), Some(0.0)) if access.is_writable() => "LowLimit and HighLimit are 0",
+            _ => return [low, high],
+        };
+        self.warn(section.line, format!("[{}] {what}; taken for no limits", section.shown));
+        [None, None]
+    }
+
+    pub(super) fn scalar(&mut self, place: &str, line: usize, text: &str, data_type: DataType) -> Option<Scalar> {
+        match value::scalar(text, data_type) {
+            Ok(reading) => {
+                let reading = reading?;
+                if let Some(doubt) = reading.doubt {
+                    self.warn(line, format!("{place}: {doubt}"));
+                }
+                Some(reading.value)
+            }
+            Err(error) => {
+                self.warn(line, format!("{place}: {error}; left out"));
+                None
+            }
+        }
+    }
+
+    /// The data type, and whether the file gives one that we know. Without, the entry has DOMAIN: its
+    /// object can still be read by its name, as bytes.
+    fn data_type(&mut self, section: &Section) -> (DataType, bool) {
+        let Some(item) = section.get("datatype") else {
+            if number(section, "objecttype") != Some(DOMAIN) {
+                self.warn(section.line, format!("[{}] has no DataType; its value is taken for bytes", section.shown));
+                return (DataType::Domain, false);
+            }
+            return (DataType::Domain, true);
+        };
+        let code = self.integer(section, "DataType").and_then(|code| u16::try_from(code).ok());
+        let known = code.and_then(|code| DataType::from_code(code).or_else(|| self.defined_type(code)));
+        match known {
+            Some(data_type) => (data_type, true),
+            None => {
+                let text = format!(
+                    "[{}] DataType: {} is unknown; its value is taken for bytes",
+                    section.shown,
+                    quoted(&item.value)
+                );
+                self.warn(item.line, text);
+                (DataType::Domain, false)
+            }
+        }
+    }
+
+    /// A type that the file itself defines: CANFestival's editor writes `[A0]` and, as the default of
+    /// `[A0sub1]`, the type that it is made of.
+    fn defined_type(&self, code: u16) -> Option<DataType> {
+        let section =
+            self.ini.section(&format!("{code:x}sub1")).or_else(|| self.ini.section(&format!("{code:04x}sub1")))?;
+        DataType::from_code(u16::try_from(number(section, "defaultvalue")?).ok()?)
+    }
+
+    /// The access type. Where the file has none that we know, the device decides.
+    fn access(&mut self, section: &Section) -> Access {
+        let item = section.get("accesstype");
+        if let Some(access) = item.and_then(|item| value::access(&item.value)) {
+            return access;
+        }
+        let (line, what) = match item {
+            Some(item) => (item.line, format!("AccessType: {} is unknown", quoted(&item.value))),
+            None => (section.line, "has no AccessType".to_owned()),
+        };
+        self.warn(line, format!("[{}] {what}; taken for rw", section.shown));
+        Access::Rw
+    }
+
+    /// An integer, with a warning where it is doubtful.
+    pub(super) fn integer(&mut self, section: &Section, key: &str) -> Option<i128> {
+        let item = section.get(&key.to_ascii_lowercase())?;
+        let reading = value::integer(&item.value)?;
+        if let Some(doubt) = reading.doubt {
+            self.warn(item.line, format!("[{}] {key}: {doubt}", section.shown));
+        }
+        Some(reading.value)
+    }
+
+    fn pdo(&mut self, section: &Section) -> bool {
+        let Some(item) = section.get("pdomapping") else { return false };
+        value::switch(&item.value).unwrap_or_else(|| {
+            let text = format!("[{}] PDOMapping: {} is neither 0 nor 1", section.shown, quoted(&item.value));
+            self.warn(item.line, text);
+            false
+        })
+    }
+}
+
+/// A number that says what kind of object it is; what is doubtful about it is said elsewhere, or of no weight.
+pub(super) fn number(section: &Section, key: &str) -> Option<i128> {
+    value::integer(&section.get(key)?.value).map(|number| number.value)
+}

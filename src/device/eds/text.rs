@@ -1,0 +1,103 @@
+//! From the bytes of a file to text.
+
+/// What Windows-1252 has at 80h to 9Fh, where Latin-1 has control characters. Five places are empty.
+const CP1252_80: [char; 32] = [
+    '€', '\u{fffd}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{fffd}', 'Ž', '\u{fffd}', '\u{fffd}',
+    '‘', '’', '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{fffd}', 'ž', 'Ÿ',
+];
+
+/// The text of a file, with every line ended by `\n`.
+///
+/// CiA 306 allows ISO 646 only. Real files are UTF-8, with or without byte order mark, or what a Windows
+/// editor wrote: UTF-16 with its mark, else Windows-1252. Bytes that are not UTF-8 decide for the last.
+/// Control characters (a name must not move the cursor of a terminal) become U+FFFD; what DOS and a
+/// full disk leave at the end of a file, ^Z and zeros, is no text.
+pub(super) fn decode(bytes: &[u8]) -> String {
+    let text = match bytes {
+        [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes),
+        [0xef, 0xbb, 0xbf, rest @ ..] => utf8_or_cp1252(rest),
+        _ => utf8_or_cp1252(bytes),
+    };
+    text.trim_end_matches(['\0', '\u{1a}'])
+        .replace("\r\n", "\n")
+        .chars()
+        .map(|character| match character {
+            '\r' => '\n',
+            '\n' | '\t' => character,
+            _ if character.is_control() => char::REPLACEMENT_CHARACTER,
+            _ => character,
+        })
+        .collect()
+}
+
+fn utf8_or_cp1252(bytes: &[u8]) -> String {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) => bytes.iter().map(|&byte| cp1252(byte)).collect(),
+    }
+}
+
+fn cp1252(byte: u8) -> char {
+    let high = byte.checked_sub(0x80).and_then(|place| CP1252_80.get(usize::from(place)));
+    high.copied().unwrap_or(char::from(byte))
+}
+
+fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
+    let units = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
+    char::decode_utf16(units).map(|unit| unit.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
+}
+
+/// A piece of a file for a message: short, and with nothing in it that a terminal would obey.
+pub(super) fn shown(text: &str) -> String {
+    const LONGEST: usize = 40;
+    let mut short: String = text.chars().take(LONGEST).collect();
+    if text.chars().nth(LONGEST).is_some() {
+        short.push('…');
+    }
+    short.escape_debug().to_string()
+}
+
+/// The same between quotation marks.
+pub(super) fn quoted(text: &str) -> String {
+    format!("\"{}\"", shown(text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_encoding_reads_the_same() {
+        let text = "[Gerät]\nDruck=5 µm\n";
+        let utf16: Vec<u16> = text.encode_utf16().collect();
+        let little: Vec<u8> = [0xfeff].iter().chain(&utf16).flat_map(|unit: &u16| unit.to_le_bytes()).collect();
+        let big: Vec<u8> = [0xfeff].iter().chain(&utf16).flat_map(|unit: &u16| unit.to_be_bytes()).collect();
+        assert_eq!(decode(text.as_bytes()), text);
+        assert_eq!(decode(format!("\u{feff}{text}").as_bytes()), text);
+        assert_eq!(decode(b"[Ger\xe4t]\nDruck=5 \xb5m\n"), text);
+        assert_eq!(decode(&little), text);
+        assert_eq!(decode(&big), text);
+    }
+
+    #[test]
+    fn cp1252_is_not_latin1() {
+        assert_eq!(decode(b"\x80\x84\x96\x9f\xa0\xff\x81"), "€„–Ÿ\u{a0}ÿ\u{fffd}");
+    }
+
+    #[test]
+    fn line_ends_and_rubbish_at_the_end() {
+        assert_eq!(decode(b"a\r\nb\rc\nd\x1a"), "a\nb\nc\nd");
+        assert_eq!(decode(b"a\n\0\0\0"), "a\n");
+        assert_eq!(decode(b"a\x1b[2Jb\t"), "a\u{fffd}[2Jb\t");
+        assert_eq!(decode(b""), "");
+        assert_eq!(decode(&[0xff, 0xfe, 0x41]), "");
+    }
+
+    #[test]
+    fn quotations_are_short_and_harmless() {
+        assert_eq!(quoted("0.0"), "\"0.0\"");
+        assert_eq!(quoted("a\"b\u{202e}"), "\"a\\\"b\\u{202e}\"");
+        assert_eq!(quoted(&"x".repeat(1000)).chars().count(), 43);
+    }
+}
