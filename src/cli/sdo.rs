@@ -58,7 +58,7 @@ struct WriteArgs {
     /// Which node: 5, 0x7f
     node: NodeId,
     /// OBJECT VALUE, or several OBJECT=VALUE: decimal, 0x1F, -5, 1.25e3, or text
-    #[arg(required = true, allow_hyphen_values = true, value_name = "OBJECT VALUE")]
+    #[arg(required = true, allow_negative_numbers = true, value_name = "OBJECT VALUE")]
     items: Vec<String>,
     /// Take the value for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
     #[arg(long = "type", value_name = "TYPE")]
