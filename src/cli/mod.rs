@@ -70,6 +70,10 @@ pub struct Global {
     #[arg(long, global = true, value_name = "[NODE=]NAME|FILE")]
     pub(crate) device: Vec<Override>,
 
+    /// Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several
+    #[arg(long, global = true, value_name = "[NODE=]FILE")]
+    pub(crate) eds: Vec<Override>,
+
     /// Form of the output: for people, one object a line, or comma-separated; for log, text means csv
     #[arg(short, long, global = true, value_name = "FORM", default_value = "text")]
     pub(crate) format: Format,

@@ -8,9 +8,9 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value, parse_hex};
 use crate::master::Master;
 use crate::output::{json, text};
-use crate::tasks::sdo::{Knowledge, ReadValue, encode, read, write};
+use crate::tasks::sdo::{Knowledge, ReadValue, SizeMode, encode, is_signature, read, write};
 use crate::tasks::{Failure, Kind};
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -58,17 +58,41 @@ struct WriteArgs {
     /// Which node: 5, 0x7f
     node: NodeId,
     /// OBJECT VALUE, or several OBJECT=VALUE: decimal, 0x1F, -5, 1.25e3, or text
-    #[arg(required = true, allow_hyphen_values = true, value_name = "OBJECT VALUE")]
+    #[arg(required = true, allow_negative_numbers = true, value_name = "OBJECT VALUE")]
     items: Vec<String>,
     /// Take the value for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
     #[arg(long = "type", value_name = "TYPE")]
     data_type: Option<DataType>,
+    /// Whether the write says how many bytes it carries: auto asks the description, and tries the other
+    /// way where the device takes it amiss
+    #[arg(long, value_name = "HOW", default_value = "auto")]
+    sdo_size: SdoSize,
     /// Read back and compare
     #[arg(long)]
     verify: bool,
     /// Take the bytes from a file
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SdoSize {
+    /// 2Fh, 2Bh, 27h, 23h
+    Indicated,
+    /// 22h
+    Omit,
+    /// As the device wants it
+    Auto,
+}
+
+impl From<SdoSize> for SizeMode {
+    fn from(size: SdoSize) -> SizeMode {
+        match size {
+            SdoSize::Indicated => SizeMode::Indicated,
+            SdoSize::Omit => SizeMode::Omitted,
+            SdoSize::Auto => SizeMode::Auto,
+        }
+    }
 }
 
 impl Sdo {
@@ -209,9 +233,9 @@ impl WriteArgs {
                 });
             }
             for (at, bytes, data_type) in ready {
-                write(master, &knowledge, at, &bytes)?;
+                write(master, &knowledge, at, &bytes, self.sdo_size.into())?;
                 if self.verify {
-                    self.verify(master, &mut knowledge, at, &bytes, data_type)?;
+                    self.verify(global, master, &mut knowledge, at, &bytes, data_type)?;
                 }
                 global.console().detail(&format!("node {}: {at} written: {}", self.node, hex(&bytes)));
             }
@@ -221,12 +245,19 @@ impl WriteArgs {
 
     fn verify(
         &self,
+        global: &Global,
         master: &mut Master<'_>,
         knowledge: &mut Knowledge,
         at: ObjectId,
         bytes: &[u8],
         data_type: DataType,
     ) -> anyhow::Result<()> {
+        if is_signature(bytes) {
+            let message =
+                format!("node {}: {at} acknowledged the signature; what it reads is something else", self.node);
+            global.console().note(&message);
+            return Ok(());
+        }
         let found = read(master, knowledge, at, Some(data_type))?;
         if found.raw != bytes {
             let message = format!("{at} was acknowledged and reads {} instead of {}", hex(&found.raw), hex(bytes));

@@ -1,6 +1,7 @@
 //! JSON Lines: one object a line.
 
 use crate::canopen::id::NodeId;
+use crate::canopen::nmt::NmtState;
 use crate::measure::sample::{Number, Sample, Source, Status};
 use crate::tasks::nmt::Report;
 use crate::tasks::scan::Found;
@@ -97,6 +98,29 @@ pub fn report(out: &mut dyn Write, report: &Report) -> io::Result<()> {
     }
     let state = report.state.map(|state| state.to_string());
     line(out, &State { node: report.node.get(), state, by: report.by.as_str() })
+}
+
+/// Who starts a device after power on.
+pub fn startup(out: &mut dyn Write, node: NodeId, starts: &str, raw: u64) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Startup<'a> {
+        node: u8,
+        startup: &'a str,
+        raw: u64,
+    }
+    line(out, &Startup { node: node.get(), startup: starts, raw })
+}
+
+/// Something that `nmt watch` saw.
+pub fn seen(out: &mut dyn Write, time: &str, node: NodeId, event: &str, state: Option<NmtState>) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Seen<'a> {
+        time: &'a str,
+        node: u8,
+        event: &'a str,
+        state: Option<String>,
+    }
+    line(out, &Seen { time, node: node.get(), event, state: state.map(|state| state.to_string()) })
 }
 
 /// A number as JSON has them: decimals keep their digits, what is not finite is null.
