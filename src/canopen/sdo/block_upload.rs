@@ -2,8 +2,8 @@
 //! whole (CiA 301, 7.2.4.3.12 to 7.2.4.3.15).
 //!
 //! Segments are taken in order only. When one was lost, the acknowledge names the last one before it, and the
-//! server sends the rest again. What a repetition could have mixed up, the CRC or the announced size must
-//! prove right; where a server offers neither, nothing is repeated.
+//! server sends the rest again. After a time-out it is not certain where the server stands: what comes then
+//! must be proved right by the CRC or the announced size, and where a server offers neither, nothing is tried.
 
 use super::crc::crc16;
 use super::upload::LONGEST;
@@ -31,8 +31,8 @@ pub struct BlockUpload {
     missing: usize,
     /// Sub-blocks in a row that brought nothing or did not come to their end.
     setbacks: u8,
-    /// Whether a sub-block was acknowledged without its end having been seen.
-    guessed: bool,
+    /// Whether anything had to be sent again.
+    disturbed: bool,
     /// Takes over when the server answers as to a normal read.
     plain: Upload,
 }
@@ -74,7 +74,7 @@ impl BlockUpload {
             crc: false,
             missing: 0,
             setbacks: 0,
-            guessed: false,
+            disturbed: false,
             plain: Upload::new(node, object, accept_60),
         }
     }
@@ -138,7 +138,7 @@ impl BlockUpload {
             let provable = self.crc || self.announced.is_some();
             if unambiguous && provable && self.setbacks < PATIENCE {
                 self.setbacks += 1;
-                self.guessed = true;
+                self.disturbed = true;
                 self.acknowledge(taken, None, out);
                 return None;
             }
@@ -202,6 +202,7 @@ impl BlockUpload {
             self.acknowledge(taken, Some(*frame), out);
             self.state = State::Acknowledged { closing: *frame };
         } else if is_last || sequence == self.block_size.get() {
+            self.disturbed |= !in_order;
             self.setbacks = if taken > 0 { 0 } else { self.setbacks + 1 };
             if self.setbacks > PATIENCE {
                 return self.fail(Violation::Stuck, frame, out);
@@ -241,7 +242,9 @@ impl BlockUpload {
                 [_, _, _, ..] => return self.fail(Violation::Crc, frame, out),
                 _ => return self.fail(Violation::Short, frame, out),
             }
-        } else if self.guessed && self.announced.and_then(|size| usize::try_from(size).ok()) != Some(length) {
+        }
+        // The CRC does not see how many zeros come first.
+        if self.disturbed && self.announced.is_some_and(|size| usize::try_from(size) != Ok(length)) {
             return self.fail(Violation::Size, frame, out);
         }
         self.send(0xa1, 0, 0, out);

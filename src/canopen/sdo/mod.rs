@@ -79,7 +79,7 @@ pub enum Violation {
     /// The data of a block transfer and its CRC do not fit together.
     #[error("CRC does not match the data")]
     Crc,
-    /// Another size than announced, where nothing else proves the data.
+    /// Another size than announced, and segments had to be sent again: something was mixed up.
     #[error("another size than announced after lost segments")]
     Size,
 }
