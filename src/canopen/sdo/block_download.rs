@@ -63,8 +63,8 @@ impl BlockDownload {
         Frame::full(CanId::sdo_request(self.node), frame)
     }
 
-    /// Whether the server has begun to take the data, so that it must be told when we give up. A refusal
-    /// while this is `false` was one of the request: nothing has been transferred, another way may be tried.
+    /// Whether the server has begun to take the data. A refusal while this is `false` was one of the request:
+    /// nothing has been transferred, another way may be tried.
     pub fn has_begun(&self) -> bool {
         self.state != State::Initiated
     }
@@ -113,17 +113,16 @@ impl BlockDownload {
         }
     }
 
-    /// Gives up: the server is told, if it had begun to answer.
+    /// Gives up: the server is told.
     pub fn on_timeout(&mut self, out: &mut Vec<Frame>) -> TransferError {
         self.abort(AbortCode::TIMEOUT, out);
         TransferError::NoAnswer
     }
 
-    /// Tells the server that the transfer is over, if it had begun to answer.
+    /// Tells the server that the transfer is over. Of a request that was not answered, too: perhaps only the
+    /// answer was lost, and a server in a block transfer takes everything that follows for a part of it.
     pub fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
-        if self.has_begun() {
-            out.push(abort_frame(self.node, self.object, code));
-        }
+        out.push(abort_frame(self.node, self.object, code));
     }
 
     fn acknowledged(&mut self, start: usize, count: u8, sent: u8, frame: &Frame, out: &mut Vec<Frame>) -> Progress<()> {

@@ -92,14 +92,19 @@ impl BlockUpload {
         Frame::full(CanId::sdo_request(self.node), request)
     }
 
-    /// Whether the server has begun to answer, so that it must be told when we give up. A refusal while this
-    /// is `false` was one of the request: nothing has been transferred, another way may be tried.
+    /// Whether the server has begun to answer. A refusal while this is `false` was one of the request: nothing
+    /// has been transferred, another way may be tried.
     pub fn has_begun(&self) -> bool {
         match self.state {
             State::Initiated => false,
             State::Plain => self.plain.has_begun(),
             State::SubBlock { .. } | State::Acknowledged { .. } => true,
         }
+    }
+
+    /// Whether the server answers in blocks. It has not, if it answered as to a normal read.
+    pub fn is_in_blocks(&self) -> bool {
+        matches!(self.state, State::SubBlock { .. } | State::Acknowledged { .. })
     }
 
     /// Bytes received so far and bytes announced, for a progress bar.
@@ -128,8 +133,8 @@ impl BlockUpload {
     }
 
     /// Nothing came in time. Within a sub-block, what came of it is acknowledged, so that the server sends
-    /// the rest again, and `None` says that the transfer goes on. Otherwise it is given up; the server is
-    /// told, if it had begun to answer.
+    /// the rest again, and `None` says that the transfer goes on. Otherwise it is given up, and the
+    /// server is told.
     pub fn on_timeout(&mut self, out: &mut Vec<Frame>) -> Option<TransferError> {
         if let State::SubBlock { taken, acknowledged, .. } = self.state {
             // With nothing taken, either the sub-block was lost or the acknowledge before it, and the
@@ -147,11 +152,10 @@ impl BlockUpload {
         Some(TransferError::NoAnswer)
     }
 
-    /// Tells the server that the transfer is over, if it had begun to answer.
+    /// Tells the server that the transfer is over. Of a request that was not answered, too: perhaps only the
+    /// answer was lost, and a server in a block transfer takes everything that follows for a part of it.
     pub fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
-        if self.has_begun() {
-            out.push(abort_frame(self.node, self.object, code));
-        }
+        out.push(abort_frame(self.node, self.object, code));
     }
 
     fn initiated(&mut self, head: u8, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {

@@ -38,6 +38,18 @@ pub enum Progress<T> {
     Failed(TransferError),
 }
 
+impl<T> Progress<T> {
+    /// The same with another result.
+    pub fn map<U>(self, result: impl FnOnce(T) -> U) -> Progress<U> {
+        match self {
+            Progress::NotOurs => Progress::NotOurs,
+            Progress::Continue => Progress::Continue,
+            Progress::Done(done) => Progress::Done(result(done)),
+            Progress::Failed(error) => Progress::Failed(error),
+        }
+    }
+}
+
 /// Why a transfer has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TransferError {
