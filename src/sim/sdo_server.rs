@@ -1,6 +1,8 @@
-//! The SDO server of a simulated device (CiA 301, 7.2.4): expedited and segmented transfers, one at a time.
+//! The SDO server of a simulated device (CiA 301, 7.2.4): expedited and segmented transfers, where described
+//! block transfers too, one at a time.
 
 use super::abort::Abort;
+use super::sdo_block::{self, Block, Step};
 use crate::bus::time::Mono;
 use crate::canopen::object::ObjectId;
 use crate::device::description::{SdoStyle, SizeIndication};
@@ -10,7 +12,7 @@ use std::time::Duration;
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The longest value that can be written.
-const LONGEST: usize = 1024;
+const LONGEST: usize = 1 << 20;
 
 /// The answer to an upload of 1 to 4 bytes.
 const SIZED: [u8; 5] = [0x43, 0x4f, 0x4b, 0x47, 0x43];
@@ -54,6 +56,12 @@ enum Transfer {
         toggle: bool,
         until: Mono,
     },
+    /// In blocks, either way.
+    Block {
+        object: ObjectId,
+        block: Block,
+        until: Mono,
+    },
 }
 
 impl SdoServer {
@@ -71,7 +79,9 @@ impl SdoServer {
     pub(super) fn deadline(&self) -> Option<Mono> {
         match &self.transfer {
             Transfer::None => None,
-            Transfer::Upload { until, .. } | Transfer::Download { until, .. } => Some(*until),
+            Transfer::Upload { until, .. } | Transfer::Download { until, .. } | Transfer::Block { until, .. } => {
+                Some(*until)
+            }
         }
     }
 
@@ -85,16 +95,38 @@ impl SdoServer {
     fn object(&self) -> Option<ObjectId> {
         match &self.transfer {
             Transfer::None => None,
-            Transfer::Upload { object, .. } | Transfer::Download { object, .. } => Some(*object),
+            Transfer::Upload { object, .. } | Transfer::Download { object, .. } | Transfer::Block { object, .. } => {
+                Some(*object)
+            }
         }
     }
 
-    /// A request, and the answer to it if there is one.
-    pub(super) fn request(&mut self, now: Mono, request: [u8; 8], memory: &mut dyn Dictionary) -> Option<[u8; 8]> {
+    /// A frame of this server is on the wire: the client's time begins with the last one.
+    pub(super) fn sent(&mut self, now: Mono) {
+        if let Transfer::Block { until, .. } = &mut self.transfer {
+            *until = now + PATIENCE;
+        }
+    }
+
+    /// Whether a sub-block is on its way to the client: whatever the client sends now, the rest of it is void.
+    pub(super) fn is_giving(&self) -> bool {
+        matches!(self.transfer, Transfer::Block { block: Block::Giving { .. }, .. })
+    }
+
+    /// A request, and the answers to it if there are any.
+    pub(super) fn request(&mut self, now: Mono, request: [u8; 8], memory: &mut dyn Dictionary) -> Vec<[u8; 8]> {
         let [command, low, high, sub, ..] = request;
         let addressed = ObjectId { index: u16::from(high) << 8 | u16::from(low), sub };
         // Segments carry no address: an abort names the object of the transfer, or none.
         let in_transfer = self.object().unwrap_or(ObjectId::new(0, 0));
+        // Within a block transfer a segment can look like any other request.
+        if command != 0x80 && matches!(self.transfer, Transfer::Block { .. }) {
+            match self.block(now, request, memory) {
+                Ok(Some(answers)) => return answers,
+                Ok(None) => {}
+                Err(code) => return vec![abort(in_transfer, code)],
+            }
+        }
         let (answer, object) = match command >> 5 {
             0 => (self.download_segment(now, request, memory), in_transfer),
             1 => (self.download(now, request, addressed, memory), addressed),
@@ -102,17 +134,75 @@ impl SdoServer {
             3 => (self.upload_segment(now, command), in_transfer),
             4 => {
                 self.transfer = Transfer::None;
-                return None;
+                return Vec::new();
+            }
+            5 if self.style.block && command & 0b11 == 0 => {
+                (self.upload_block(now, request, addressed, memory), addressed)
+            }
+            6 if self.style.block && command & 0b1 == 0 => {
+                (self.download_block(now, request, addressed, memory), addressed)
             }
             _ => (Err(Abort::COMMAND), addressed),
         };
         match answer {
-            Ok(answer) => Some(answer),
+            Ok(answer) => vec![answer],
             Err(code) => {
                 self.transfer = Transfer::None;
-                Some(abort(object, code))
+                vec![abort(object, code)]
             }
         }
+    }
+
+    /// A frame within a block transfer; `None` if it has no place there.
+    fn block(&mut self, now: Mono, frame: [u8; 8], memory: &mut dyn Dictionary) -> Result<Option<Vec<[u8; 8]>>, Abort> {
+        let Transfer::Block { object, block, .. } = std::mem::replace(&mut self.transfer, Transfer::None) else {
+            return Ok(None);
+        };
+        Ok(match block.step(frame, LONGEST)? {
+            Step::On(block, answers) => {
+                self.transfer = Transfer::Block { object, block, until: now + PATIENCE };
+                Some(answers)
+            }
+            Step::Arrived(bytes, answer) => {
+                memory.download(object, &bytes)?;
+                Some(vec![answer])
+            }
+            Step::Over => Some(Vec::new()),
+            Step::Foreign => None,
+        })
+    }
+
+    fn upload_block(
+        &mut self,
+        now: Mono,
+        request: [u8; 8],
+        object: ObjectId,
+        memory: &mut dyn Dictionary,
+    ) -> Result<[u8; 8], Abort> {
+        self.transfer = Transfer::None;
+        let bytes = memory.upload(object)?;
+        let threshold = usize::from(request[5]);
+        if threshold > 0 && bytes.len() <= threshold {
+            return self.upload(now, object, memory);
+        }
+        let (block, answer) = sdo_block::offer(request, bytes)?;
+        self.transfer = Transfer::Block { object, block, until: now + PATIENCE };
+        Ok(answer)
+    }
+
+    fn download_block(
+        &mut self,
+        now: Mono,
+        request: [u8; 8],
+        object: ObjectId,
+        memory: &mut dyn Dictionary,
+    ) -> Result<[u8; 8], Abort> {
+        self.transfer = Transfer::None;
+        let data = [request[4], request[5], request[6], request[7]];
+        let announced = announced(request[0] & 0b10 != 0, data, memory.width(object)?)?;
+        let (block, answer) = sdo_block::accept(request, announced);
+        self.transfer = Transfer::Block { object, block, until: now + PATIENCE };
+        Ok(answer)
     }
 
     fn upload(&mut self, now: Mono, object: ObjectId, memory: &mut dyn Dictionary) -> Result<[u8; 8], Abort> {
@@ -190,18 +280,7 @@ impl SdoServer {
         if self.style.expedited_only {
             return Err(Abort::COMMAND);
         }
-        let announced = if sized {
-            let size = usize::try_from(u32::from_le_bytes(data)).map_err(|_| Abort::MEMORY)?;
-            if size > LONGEST {
-                return Err(Abort::MEMORY);
-            }
-            if width.is_some_and(|width| width != size) {
-                return Err(Abort::LENGTH);
-            }
-            Some(size)
-        } else {
-            None
-        };
+        let announced = announced(sized, data, width)?;
         self.transfer =
             Transfer::Download { object, announced, bytes: Vec::new(), toggle: false, until: now + PATIENCE };
         Ok(frame(0x60, object, [0; 4]))
@@ -234,6 +313,21 @@ impl SdoServer {
         }
         Ok(answer)
     }
+}
+
+/// The announced size, if there is one and it makes sense.
+fn announced(sized: bool, data: [u8; 4], width: Option<usize>) -> Result<Option<usize>, Abort> {
+    if !sized {
+        return Ok(None);
+    }
+    let size = usize::try_from(u32::from_le_bytes(data)).map_err(|_| Abort::MEMORY)?;
+    if size > LONGEST {
+        return Err(Abort::MEMORY);
+    }
+    if width.is_some_and(|width| width != size) {
+        return Err(Abort::LENGTH);
+    }
+    Ok(Some(size))
 }
 
 fn frame(command: u8, object: ObjectId, data: [u8; 4]) -> [u8; 8] {
@@ -296,12 +390,14 @@ mod tests {
         toml::from_str(text).expect("a style")
     }
 
-    /// Plays request and answer lines; `-` is silence.
+    /// Plays request and answer lines; `-` is silence, several answers stand side by side.
     fn transcript(server: &mut SdoServer, memory: &mut Memory, lines: &[(&str, &str)]) {
         for (request, answer) in lines {
             let bytes: [u8; 8] = parse_hex(request).expect("bytes").try_into().expect("eight");
             let found = server.request(Mono::START, bytes, memory);
-            let found = found.map_or("-".to_owned(), |bytes| bytes.iter().map(|byte| format!("{byte:02X}")).collect());
+            let hex = |bytes: &[u8; 8]| bytes.iter().map(|byte| format!("{byte:02X}")).collect::<String>();
+            let found: Vec<String> = found.iter().map(hex).collect();
+            let found = if found.is_empty() { "-".to_owned() } else { found.join(" ") };
             assert_eq!(found, *answer, "after {request}");
         }
     }
@@ -422,7 +518,7 @@ mod tests {
                 ("1041424344454647", "8000200000000305"),
                 ("0041424344454647", "8000000001000405"),
                 // Too long, read only.
-                ("2100200001040000", "8000200005000405"),
+                ("2100200001001000", "8000200005000405"),
                 ("2101200009000000", "8001200002000106"),
             ],
         );
@@ -444,6 +540,126 @@ mod tests {
     }
 
     #[test]
+    fn block_download() {
+        let mut memory = memory();
+        let mut server = SdoServer::new(style("block = true"), false);
+        transcript(
+            &mut server,
+            &mut memory,
+            &[
+                ("C600200009000000", "A40020007F000000"),
+                ("0131323334353637", "-"),
+                ("8238390000000000", "A2027F0000000000"),
+                ("8238390000000000", "-"),
+                ("D5C3310000000000", "A100000000000000"),
+            ],
+        );
+        assert_eq!(memory.0[&ObjectId::new(0x2000, 0)], b"123456789");
+        transcript(
+            &mut server,
+            &mut memory,
+            &[
+                // Without CRC and size. The first segment lost, the second doubled: nothing in order.
+                ("C000200000000000", "A00020007F000000"),
+                ("0241424344454647", "-"),
+                ("0241424344454647", "-"),
+                ("8348000000000000", "A2007F0000000000"),
+                ("0131323334353637", "-"),
+                ("0341424344454647", "-"),
+                ("8348000000000000", "A2017F0000000000"),
+                ("0141424344454647", "-"),
+                ("8248000000000000", "A2027F0000000000"),
+                ("D900000000000000", "A100000000000000"),
+            ],
+        );
+        assert_eq!(memory.0[&ObjectId::new(0x2000, 0)], b"1234567ABCDEFGH");
+        transcript(
+            &mut server,
+            &mut memory,
+            &[
+                // Nothing at all.
+                ("C600200000000000", "A40020007F000000"),
+                ("8100000000000000", "A2017F0000000000"),
+                ("DD00000000000000", "A100000000000000"),
+                // Wrong CRC, another size than announced, too long, read only, an abort in the middle.
+                ("C600200001000000", "A40020007F000000"),
+                ("8141000000000000", "A2017F0000000000"),
+                ("D9FFFF0000000000", "8000200004000405"),
+                ("C200200002000000", "A00020007F000000"),
+                ("8141000000000000", "A2017F0000000000"),
+                ("D900000000000000", "8000200010000706"),
+                ("C600200001001000", "8000200005000405"),
+                ("C601200001000000", "8001200002000106"),
+                ("C600200009000000", "A40020007F000000"),
+                ("0141424344454647", "-"),
+                ("8000200000000405", "-"),
+                ("8248490000000000", "-"),
+                // An end without a beginning, and a new request instead of the end.
+                ("C100000000000000", "8000000001000405"),
+                ("C600200001000000", "A40020007F000000"),
+                ("8141000000000000", "A2017F0000000000"),
+                ("4000200000000000", "4100200000000000"),
+            ],
+        );
+    }
+
+    #[test]
+    fn block_upload() {
+        let mut memory = memory();
+        let mut server = SdoServer::new(style("block = true"), false);
+        memory.0.insert(ObjectId::new(0x2000, 0), b"123456789".to_vec());
+        transcript(
+            &mut server,
+            &mut memory,
+            &[
+                ("A40020007F000000", "C600200009000000"),
+                ("A300000000000000", "0131323334353637 8238390000000000"),
+                ("A2027F0000000000", "D5C3310000000000"),
+                ("A100000000000000", "-"),
+                // Sub-blocks of one, none taken, then a larger one; no CRC.
+                ("A000200001000000", "C200200009000000"),
+                ("A300000000000000", "0131323334353637"),
+                ("A200010000000000", "0131323334353637"),
+                ("A201050000000000", "8138390000000000"),
+                ("A201050000000000", "D500000000000000"),
+                ("A100000000000000", "-"),
+                // As to a normal read up to the threshold.
+                ("A40020007F090000", "4100200009000000"),
+                ("6000000000000000", "0031323334353637"),
+                ("7000000000000000", "1B38390000000000"),
+                ("A40020007F080000", "C600200009000000"),
+                // More acknowledged than sent; no block size, at the start and later; no such object.
+                ("A300000000000000", "0131323334353637 8238390000000000"),
+                ("A2037F0000000000", "8000200003000405"),
+                ("A400200000000000", "8000200002000405"),
+                ("A400200080000000", "8000200002000405"),
+                ("A40020007F000000", "C600200009000000"),
+                ("A300000000000000", "0131323334353637 8238390000000000"),
+                ("A201000000000000", "8000200002000405"),
+                ("A40099297F000000", "8000992900000206"),
+                // A start without a beginning.
+                ("A300000000000000", "8000000001000405"),
+            ],
+        );
+        memory.0.insert(ObjectId::new(0x2000, 0), Vec::new());
+        transcript(
+            &mut server,
+            &mut memory,
+            &[
+                ("A40020007F000000", "C600200000000000"),
+                ("A300000000000000", "8100000000000000"),
+                ("A2017F0000000000", "DD00000000000000"),
+                ("A100000000000000", "-"),
+            ],
+        );
+        transcript(&mut server, &mut memory, &[("A40020007F000000", "C600200000000000")]);
+        server.sent(Mono::at(PATIENCE));
+        assert_eq!(server.deadline(), Some(Mono::at(2 * PATIENCE)));
+        assert_eq!(server.give_up(), Some([0x80, 0x00, 0x20, 0, 0, 0, 0x04, 0x05]));
+        assert_eq!(server.deadline(), None);
+    }
+
+    #[test]
     fn a_client_that_stays_away_is_given_up() {
         let mut server = SdoServer::new(SdoStyle::default(), false);
         assert_eq!(server.deadline(), None);
@@ -461,7 +677,24 @@ mod tests {
             let mut server = SdoServer::new(SdoStyle::default(), false);
             for request in requests {
                 let answer = server.request(Mono::START, request, &mut memory);
-                prop_assert_eq!(answer.is_none(), request[0] >> 5 == 4);
+                prop_assert_eq!(answer.is_empty(), request[0] >> 5 == 4);
+            }
+        }
+
+        #[test]
+        fn block_transfers_take_any_frame(
+            requests in proptest::collection::vec((any::<[u8; 8]>(), 0..6usize), 1..60)
+        ) {
+            let mut memory = memory();
+            let mut server = SdoServer::new(style("block = true"), false);
+            for (mut request, kind) in requests {
+                // Now and then something that leads on.
+                let head = [request[0], 0xc6, 0xa4, 0xa2, 0xa3, 0x81][kind];
+                request[0] = head;
+                if head == 0xc6 || head == 0xa4 {
+                    request[1..4].copy_from_slice(&[0x00, 0x20, 0x00]);
+                }
+                prop_assert!(server.request(Mono::START, request, &mut memory).len() <= 127);
             }
         }
     }
