@@ -104,6 +104,9 @@ pub struct SdoStyle {
     /// Whether it has no segmented transfer, so that strings have at most four characters.
     #[serde(default)]
     pub expedited_only: bool,
+    /// Whether it knows block transfer.
+    #[serde(default)]
+    pub block: bool,
 }
 
 /// Whether the command specifier of an expedited transfer tells the size.
