@@ -395,7 +395,8 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
         }
         'cangauge;sdo;read' {
             [CompletionResult]::new('--type', '--type', [CompletionResultType]::ParameterName, 'Take the bytes for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex')
-            [CompletionResult]::new('--output', '--output', [CompletionResultType]::ParameterName, 'Write the bytes to a file')
+            [CompletionResult]::new('--output', '--output', [CompletionResultType]::ParameterName, 'Write the bytes to a file; - for stdout')
+            [CompletionResult]::new('--block', '--block', [CompletionResultType]::ParameterName, 'Whether to use block transfer: auto where it pays and the device offers it')
             [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
@@ -413,8 +414,8 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
-            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
-            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
             break
@@ -422,7 +423,8 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
         'cangauge;sdo;write' {
             [CompletionResult]::new('--type', '--type', [CompletionResultType]::ParameterName, 'Take the value for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex')
             [CompletionResult]::new('--sdo-size', '--sdo-size', [CompletionResultType]::ParameterName, 'Whether the write says how many bytes it carries: auto asks the description, and tries the other way where the device takes it amiss')
-            [CompletionResult]::new('--input', '--input', [CompletionResultType]::ParameterName, 'Take the bytes from a file')
+            [CompletionResult]::new('--input', '--input', [CompletionResultType]::ParameterName, 'Take the bytes from a file; - for stdin')
+            [CompletionResult]::new('--block', '--block', [CompletionResultType]::ParameterName, 'Whether to use block transfer: auto where it pays and the device offers it')
             [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')

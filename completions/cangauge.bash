@@ -1613,7 +1613,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo__subcmd__read)
-            opts="-b -t -f -q -v -h -V --type --hex --output --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --type --hex --output --block --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1625,6 +1625,10 @@ _cangauge() {
                     ;;
                 --output)
                     COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --block)
+                    COMPREPLY=($(compgen -W "always never auto" -- "${cur}"))
                     return 0
                     ;;
                 --bus)
@@ -1683,7 +1687,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo__subcmd__write)
-            opts="-b -t -f -q -v -h -V --type --sdo-size --verify --input --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --type --sdo-size --verify --input --block --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1699,6 +1703,10 @@ _cangauge() {
                     ;;
                 --input)
                     COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --block)
+                    COMPREPLY=($(compgen -W "always never auto" -- "${cur}"))
                     return 0
                     ;;
                 --bus)

@@ -100,13 +100,9 @@ impl Log {
     }
 
     fn record(&self, global: &Global, file: Option<&File>) -> anyhow::Result<Option<Outcome>> {
-        let show = match global.progress {
-            When::Auto => {
-                !global.quiet && io::stderr().is_terminal() && (file.is_some() || !io::stdout().is_terminal())
-            }
-            When::Always => true,
-            When::Never => false,
-        };
+        // Rows and live lines on one terminal would tear each other.
+        let torn = global.progress == When::Auto && file.is_none() && io::stdout().is_terminal();
+        let show = global.shows_progress() && !torn;
         let duration = self.duration.map(|duration| duration.0);
         let progress = Progress::new(show, duration, self.count);
         let console = Console { progress: Some(progress.multi()), ..global.console() };

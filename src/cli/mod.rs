@@ -18,6 +18,7 @@ use anstream::ColorChoice;
 use args::{BusSpec, Duration, Override};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use exit::IntoFailure;
+use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -140,6 +141,15 @@ impl Global {
                 When::Never => ColorChoice::Never,
             },
             progress: None,
+        }
+    }
+
+    /// Whether progress is shown.
+    pub(crate) fn shows_progress(&self) -> bool {
+        match self.progress {
+            When::Auto => !self.quiet && io::stderr().is_terminal(),
+            When::Always => true,
+            When::Never => false,
         }
     }
 

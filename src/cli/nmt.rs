@@ -249,7 +249,10 @@ fn print_seen(seen: &Seen, format: Format) -> io::Result<()> {
         Change::Back(state) => ("back", Some(state)),
     };
     match format {
-        Format::Json => json::seen(&mut out, &time, seen.node, event, state)?,
+        Format::Json => {
+            let state = state.map(|state| state.to_string());
+            json::seen(&mut out, &time, seen.node, event, state.as_deref())?;
+        }
         Format::Csv => {
             let state = state.map(|state| state.to_string()).unwrap_or_default();
             writeln!(out, "{time},{},{event},{state}", seen.node)?;

@@ -7,11 +7,14 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value, parse_hex};
 use crate::master::Master;
+use crate::master::transfer::BlockMode;
+use crate::output::progress::Transfer;
 use crate::output::{json, text};
-use crate::tasks::sdo::{Knowledge, ReadValue, SizeMode, encode, is_signature, read, write};
+use crate::tasks::sdo::{Knowledge, Options, ReadValue, SizeMode, encode, is_signature, read, write};
 use crate::tasks::{Failure, Kind};
 use clap::{Args, Subcommand, ValueEnum};
-use std::io::{self, Write};
+use std::fs::File;
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Read and write objects of the object dictionary
@@ -48,9 +51,12 @@ struct ReadArgs {
     /// Print the bytes in wire order
     #[arg(long)]
     hex: bool,
-    /// Write the bytes to a file
+    /// Write the bytes to a file; - for stdout
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Whether to use block transfer: auto where it pays and the device offers it
+    #[arg(long, value_name = "HOW", default_value = "auto")]
+    block: Block,
 }
 
 #[derive(Debug, Args)]
@@ -70,9 +76,32 @@ struct WriteArgs {
     /// Read back and compare
     #[arg(long)]
     verify: bool,
-    /// Take the bytes from a file
+    /// Take the bytes from a file; - for stdin
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
+    /// Whether to use block transfer: auto where it pays and the device offers it
+    #[arg(long, value_name = "HOW", default_value = "auto")]
+    block: Block,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Block {
+    /// For everything
+    Always,
+    /// For nothing
+    Never,
+    /// Where it pays
+    Auto,
+}
+
+impl From<Block> for BlockMode {
+    fn from(block: Block) -> BlockMode {
+        match block {
+            Block::Always => BlockMode::Always,
+            Block::Never => BlockMode::Never,
+            Block::Auto => BlockMode::Auto,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -122,10 +151,14 @@ impl ReadArgs {
         }
         let overrides = open::overrides(global, &[self.node])?;
         let mut knowledge = Knowledge::new(self.node, &overrides);
+        let bar = Transfer::new(global.shows_progress());
+        let mut progress = |moved| bar.moved(moved);
+        let mut options = Options { blocks: self.block.into(), size: SizeMode::Auto, progress: &mut progress };
         global.with_master(|master| {
             for object in &self.objects {
                 let at = resolve(&mut knowledge, master, object)?;
-                let value = read(master, &mut knowledge, at, self.data_type)?;
+                let value = read(master, &mut knowledge, at, self.data_type, &mut options)?;
+                bar.finish();
                 if let Some(note) = value.note {
                     global.console().warn(&format!("node {}: {at}: {note}", self.node));
                 }
@@ -174,6 +207,9 @@ impl ReadArgs {
 }
 
 fn save(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    if path == Path::new("-") {
+        return io::stdout().lock().write_all(bytes).map_err(stdout);
+    }
     let what = format!("write {}", path.display());
     std::fs::write(path, bytes).map_err(|source| FileError { what, source }.into())
 }
@@ -207,7 +243,14 @@ impl WriteArgs {
             None => None,
             Some(path) => {
                 let what = format!("read {}", path.display());
-                Some(std::fs::read(path).map_err(|source| FileError { what, source })?)
+                let mut bytes = Vec::new();
+                let result = if path == Path::new("-") {
+                    io::stdin().read_to_end(&mut bytes)
+                } else {
+                    File::open(path).and_then(|mut file| file.read_to_end(&mut bytes))
+                };
+                result.map_err(|source| FileError { what, source })?;
+                Some(bytes)
             }
         };
         // What can be known to be wrong is known before the bus is opened.
@@ -232,11 +275,16 @@ impl WriteArgs {
                     }
                 });
             }
+            let bar = Transfer::new(global.shows_progress());
+            let mut progress = |moved| bar.moved(moved);
+            let mut options =
+                Options { blocks: self.block.into(), size: self.sdo_size.into(), progress: &mut progress };
             for (at, bytes, data_type) in ready {
-                write(master, &knowledge, at, &bytes, self.sdo_size.into())?;
+                write(master, &knowledge, at, &bytes, &mut options)?;
                 if self.verify {
-                    self.verify(global, master, &mut knowledge, at, &bytes, data_type)?;
+                    self.verify(global, master, &mut knowledge, (at, &bytes, data_type), &mut options)?;
                 }
+                bar.finish();
                 global.console().detail(&format!("node {}: {at} written: {}", self.node, hex(&bytes)));
             }
             Ok(())
@@ -248,9 +296,8 @@ impl WriteArgs {
         global: &Global,
         master: &mut Master<'_>,
         knowledge: &mut Knowledge,
-        at: ObjectId,
-        bytes: &[u8],
-        data_type: DataType,
+        (at, bytes, data_type): (ObjectId, &[u8], DataType),
+        options: &mut Options<'_>,
     ) -> anyhow::Result<()> {
         if is_signature(bytes) {
             let message =
@@ -258,7 +305,7 @@ impl WriteArgs {
             global.console().note(&message);
             return Ok(());
         }
-        let found = read(master, knowledge, at, Some(data_type))?;
+        let found = read(master, knowledge, at, Some(data_type), options)?;
         if found.raw != bytes {
             let message = format!("{at} was acknowledged and reads {} instead of {}", hex(&found.raw), hex(bytes));
             return Err(Failure::of_node(Kind::Unexpected, self.node, message).into());

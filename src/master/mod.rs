@@ -7,7 +7,7 @@
 mod machine;
 mod sdo;
 mod send;
-mod transfer;
+pub mod transfer;
 
 pub use sdo::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, Way, read_object, write_object};

@@ -1,7 +1,6 @@
 //! JSON Lines: one object a line.
 
 use crate::canopen::id::NodeId;
-use crate::canopen::nmt::NmtState;
 use crate::measure::sample::{Number, Sample, Source, Status};
 use crate::tasks::nmt::Report;
 use crate::tasks::scan::Found;
@@ -112,15 +111,15 @@ pub fn startup(out: &mut dyn Write, node: NodeId, starts: &str, raw: u64) -> io:
 }
 
 /// Something that `nmt watch` saw.
-pub fn seen(out: &mut dyn Write, time: &str, node: NodeId, event: &str, state: Option<NmtState>) -> io::Result<()> {
+pub fn seen(out: &mut dyn Write, time: &str, node: NodeId, event: &str, state: Option<&str>) -> io::Result<()> {
     #[derive(Serialize)]
     struct Seen<'a> {
         time: &'a str,
         node: u8,
         event: &'a str,
-        state: Option<String>,
+        state: Option<&'a str>,
     }
-    line(out, &Seen { time, node: node.get(), event, state: state.map(|state| state.to_string()) })
+    line(out, &Seen { time, node: node.get(), event, state })
 }
 
 /// A number as JSON has them: decimals keep their digits, what is not finite is null.

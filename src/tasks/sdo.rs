@@ -7,6 +7,7 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::catalog::{Model, standard};
 use crate::device::description::SizeIndication;
 use crate::device::dictionary::Entry;
+use crate::master::transfer::{BlockMode, Moved, read_object};
 use crate::master::{Error, Master, Request, SdoError, SdoFailure};
 use crate::measure::survey::{Overrides, recognised};
 use crate::tasks::{Failure, Kind};
@@ -19,6 +20,16 @@ pub struct Knowledge {
     overrides: Overrides,
     /// Looked for once; `None` inside: not a device that is known.
     model: Option<Option<Arc<Model>>>,
+}
+
+/// How bytes travel, and who hears of it.
+pub struct Options<'a> {
+    /// When block transfer is used.
+    pub blocks: BlockMode,
+    /// Whether writes say how many bytes they carry.
+    pub size: SizeMode,
+    /// Hears every 100 ms of bytes moved, and of how many there are where that is known.
+    pub progress: &'a mut dyn FnMut(Moved),
 }
 
 /// A value read.
@@ -141,9 +152,11 @@ pub fn read(
     knowledge: &mut Knowledge,
     object: ObjectId,
     data_type: Option<DataType>,
+    options: &mut Options<'_>,
 ) -> Result<ReadValue, Failure> {
     let node = knowledge.node;
-    let answer = master.transfer_one(Request::read(node, object))??;
+    let expected = data_type.or_else(|| knowledge.type_of(knowledge.offline(object)));
+    let answer = read_object(master, (node, object), expected, options.blocks, options.progress)??;
     let entry = match data_type {
         Some(_) => knowledge.offline(object).cloned(),
         None => knowledge.entry(master, object)?,
@@ -228,8 +241,9 @@ pub fn write(
     knowledge: &Knowledge,
     object: ObjectId,
     data: &[u8],
-    mode: SizeMode,
+    options: &mut Options<'_>,
 ) -> Result<(), Failure> {
+    let mode = options.size;
     let omits = matches!(&knowledge.model, Some(Some(model)) if model.description.sdo.size == SizeIndication::Omitted);
     let sizes = if omits && mode == SizeMode::Auto || mode == SizeMode::Omitted {
         [DownloadSize::Omitted, DownloadSize::Indicated]
@@ -238,11 +252,11 @@ pub fn write(
     };
     let node = knowledge.node;
     let request = |size| {
-        let request = Request::write(node, object, data.to_vec(), size);
+        let request = Request::write(node, object, data.to_vec(), size).blocks(options.blocks.for_write(data.len()));
         // A signature acts: sent twice it may act twice.
         if is_signature(data) { request.once() } else { request }
     };
-    let first = master.transfer_one(request(sizes[0]))?;
+    let first = master.carry_out(request(sizes[0]), options.progress)?;
     match first {
         Err(SdoError { failure: SdoFailure::Refused(AbortCode::COMMAND_SPECIFIER | AbortCode::LENGTH), .. })
             if mode == SizeMode::Auto && (1..=4).contains(&data.len()) =>
