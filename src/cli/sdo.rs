@@ -2,6 +2,7 @@
 
 use super::args::ObjectArg;
 use super::exit::{FileError, stdout};
+use super::file::OutFile;
 use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -12,7 +13,7 @@ use crate::tasks::sdo::{Knowledge, ReadValue, encode, read, write};
 use crate::tasks::{Failure, Kind};
 use clap::{Args, Subcommand};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Read and write objects of the object dictionary
 ///
@@ -51,6 +52,9 @@ struct ReadArgs {
     /// Write the bytes to a file
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Overwrite the file
+    #[arg(long, requires = "output")]
+    force: bool,
 }
 
 #[derive(Debug, Args)]
@@ -58,7 +62,7 @@ struct WriteArgs {
     /// Which node: 5, 0x7f
     node: NodeId,
     /// OBJECT VALUE, or several OBJECT=VALUE: decimal, 0x1F, -5, 1.25e3, or text
-    #[arg(required = true, allow_hyphen_values = true, value_name = "OBJECT VALUE")]
+    #[arg(required = true, allow_negative_numbers = true, value_name = "OBJECT VALUE")]
     items: Vec<String>,
     /// Take the value for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
     #[arg(long = "type", value_name = "TYPE")]
@@ -98,6 +102,7 @@ impl ReadArgs {
         }
         let overrides = open::overrides(global, &[self.node])?;
         let mut knowledge = Knowledge::new(self.node, &overrides);
+        let mut file = self.output.as_deref().map(|path| OutFile::create(path, self.force)).transpose()?;
         global.with_master(|master| {
             for object in &self.objects {
                 let at = resolve(&mut knowledge, master, object)?;
@@ -105,8 +110,8 @@ impl ReadArgs {
                 if let Some(note) = value.note {
                     global.console().warn(&format!("node {}: {at}: {note}", self.node));
                 }
-                match &self.output {
-                    Some(path) => save(path, &value.raw)?,
+                match &mut file {
+                    Some(file) => file.write(&value.raw)?,
                     None => self.print(&value, object, global.format).map_err(stdout)?,
                 }
             }
@@ -147,11 +152,6 @@ impl ReadArgs {
             Format::Text => writeln!(out, "{object} {shown}"),
         }
     }
-}
-
-fn save(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    let what = format!("write {}", path.display());
-    std::fs::write(path, bytes).map_err(|source| FileError { what, source }.into())
 }
 
 impl WriteArgs {
