@@ -3,6 +3,7 @@
 use super::args::{Duration, Nodes};
 use super::exit::{IntoFailure, Several, stdout};
 use super::{Format, Global, open};
+use crate::bus::time::spoken;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtCommand;
 use crate::output::{json, table};
