@@ -27,6 +27,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -57,6 +58,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -81,6 +83,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -103,6 +106,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -121,7 +125,9 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('preop', 'preop', [CompletionResultType]::ParameterValue, 'To PRE-OPERATIONAL: everything but PDOs')
             [CompletionResult]::new('reset', 'reset', [CompletionResultType]::ParameterValue, 'Restart the application (reset node)')
             [CompletionResult]::new('reset-comm', 'reset-comm', [CompletionResultType]::ParameterValue, 'Restart the communication')
-            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Tell the states')
+            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it')
+            [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Follow heartbeats, boot-ups and losses until Ctrl-C')
+            [CompletionResult]::new('startup', 'startup', [CompletionResultType]::ParameterValue, 'Tell or set who starts a device after power on: wait for the master, or auto (by itself)')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
         }
@@ -132,6 +138,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -156,6 +163,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -180,6 +188,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -204,6 +213,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -228,6 +238,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -252,6 +263,33 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('--probe', '--probe', [CompletionResultType]::ParameterName, 'Where nothing tells the state: set the heartbeat (1017h) for a moment and put it back')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;nmt;watch' {
+            [CompletionResult]::new('-d', '-d', [CompletionResultType]::ParameterName, 'End after this time')
+            [CompletionResult]::new('--duration', '--duration', [CompletionResultType]::ParameterName, 'End after this time')
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -267,13 +305,38 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
             break
         }
+        'cangauge;nmt;startup' {
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
         'cangauge;nmt;help' {
             [CompletionResult]::new('start', 'start', [CompletionResultType]::ParameterValue, 'To OPERATIONAL: the nodes send their TPDOs')
             [CompletionResult]::new('stop', 'stop', [CompletionResultType]::ParameterValue, 'To STOPPED: only NMT, heartbeat and LSS')
             [CompletionResult]::new('preop', 'preop', [CompletionResultType]::ParameterValue, 'To PRE-OPERATIONAL: everything but PDOs')
             [CompletionResult]::new('reset', 'reset', [CompletionResultType]::ParameterValue, 'Restart the application (reset node)')
             [CompletionResult]::new('reset-comm', 'reset-comm', [CompletionResultType]::ParameterValue, 'Restart the communication')
-            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Tell the states')
+            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it')
+            [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Follow heartbeats, boot-ups and losses until Ctrl-C')
+            [CompletionResult]::new('startup', 'startup', [CompletionResultType]::ParameterValue, 'Tell or set who starts a device after power on: wait for the master, or auto (by itself)')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
         }
@@ -295,6 +358,12 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
         'cangauge;nmt;help;state' {
             break
         }
+        'cangauge;nmt;help;watch' {
+            break
+        }
+        'cangauge;nmt;help;startup' {
+            break
+        }
         'cangauge;nmt;help;help' {
             break
         }
@@ -305,6 +374,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -325,38 +395,44 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
         }
         'cangauge;sdo;read' {
             [CompletionResult]::new('--type', '--type', [CompletionResultType]::ParameterName, 'Take the bytes for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex')
-            [CompletionResult]::new('--output', '--output', [CompletionResultType]::ParameterName, 'Write the bytes to a file')
+            [CompletionResult]::new('--output', '--output', [CompletionResultType]::ParameterName, 'Write the bytes to a file; - for stdout')
+            [CompletionResult]::new('--block', '--block', [CompletionResultType]::ParameterName, 'Whether to use block transfer: auto where it pays and the device offers it')
             [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
             [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
             [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
             [CompletionResult]::new('--hex', '--hex', [CompletionResultType]::ParameterName, 'Print the bytes in wire order')
+            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, 'Overwrite the file')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
-            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
-            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
             break
         }
         'cangauge;sdo;write' {
             [CompletionResult]::new('--type', '--type', [CompletionResultType]::ParameterName, 'Take the value for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex')
-            [CompletionResult]::new('--input', '--input', [CompletionResultType]::ParameterName, 'Take the bytes from a file')
+            [CompletionResult]::new('--sdo-size', '--sdo-size', [CompletionResultType]::ParameterName, 'Whether the write says how many bytes it carries: auto asks the description, and tries the other way where the device takes it amiss')
+            [CompletionResult]::new('--input', '--input', [CompletionResultType]::ParameterName, 'Take the bytes from a file; - for stdin')
+            [CompletionResult]::new('--block', '--block', [CompletionResultType]::ParameterName, 'Whether to use block transfer: auto where it pays and the device offers it')
             [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -367,8 +443,8 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
-            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
-            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
             break
@@ -404,6 +480,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -411,7 +488,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
             [CompletionResult]::new('--passive', '--passive', [CompletionResultType]::ParameterName, 'Send nothing at all')
             [CompletionResult]::new('--no-nmt', '--no-nmt', [CompletionResultType]::ParameterName, 'Leave the nodes'' NMT states alone')
-            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, 'Overwrite the file')
+            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, 'Overwrite files that exist')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
@@ -429,6 +506,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -451,6 +529,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
             [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
             [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
@@ -489,7 +568,9 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('preop', 'preop', [CompletionResultType]::ParameterValue, 'To PRE-OPERATIONAL: everything but PDOs')
             [CompletionResult]::new('reset', 'reset', [CompletionResultType]::ParameterValue, 'Restart the application (reset node)')
             [CompletionResult]::new('reset-comm', 'reset-comm', [CompletionResultType]::ParameterValue, 'Restart the communication')
-            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Tell the states')
+            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it')
+            [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Follow heartbeats, boot-ups and losses until Ctrl-C')
+            [CompletionResult]::new('startup', 'startup', [CompletionResultType]::ParameterValue, 'Tell or set who starts a device after power on: wait for the master, or auto (by itself)')
             break
         }
         'cangauge;help;nmt;start' {
@@ -508,6 +589,12 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;help;nmt;state' {
+            break
+        }
+        'cangauge;help;nmt;watch' {
+            break
+        }
+        'cangauge;help;nmt;startup' {
             break
         }
         'cangauge;help;sdo' {

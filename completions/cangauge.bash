@@ -76,11 +76,17 @@ _cangauge() {
             cangauge__subcmd__help__subcmd__nmt,start)
                 cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__start"
                 ;;
+            cangauge__subcmd__help__subcmd__nmt,startup)
+                cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__startup"
+                ;;
             cangauge__subcmd__help__subcmd__nmt,state)
                 cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__state"
                 ;;
             cangauge__subcmd__help__subcmd__nmt,stop)
                 cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__stop"
+                ;;
+            cangauge__subcmd__help__subcmd__nmt,watch)
+                cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__watch"
                 ;;
             cangauge__subcmd__help__subcmd__sdo,read)
                 cmd="cangauge__subcmd__help__subcmd__sdo__subcmd__read"
@@ -103,11 +109,17 @@ _cangauge() {
             cangauge__subcmd__nmt,start)
                 cmd="cangauge__subcmd__nmt__subcmd__start"
                 ;;
+            cangauge__subcmd__nmt,startup)
+                cmd="cangauge__subcmd__nmt__subcmd__startup"
+                ;;
             cangauge__subcmd__nmt,state)
                 cmd="cangauge__subcmd__nmt__subcmd__state"
                 ;;
             cangauge__subcmd__nmt,stop)
                 cmd="cangauge__subcmd__nmt__subcmd__stop"
+                ;;
+            cangauge__subcmd__nmt,watch)
+                cmd="cangauge__subcmd__nmt__subcmd__watch"
                 ;;
             cangauge__subcmd__nmt__subcmd__help,help)
                 cmd="cangauge__subcmd__nmt__subcmd__help__subcmd__help"
@@ -124,11 +136,17 @@ _cangauge() {
             cangauge__subcmd__nmt__subcmd__help,start)
                 cmd="cangauge__subcmd__nmt__subcmd__help__subcmd__start"
                 ;;
+            cangauge__subcmd__nmt__subcmd__help,startup)
+                cmd="cangauge__subcmd__nmt__subcmd__help__subcmd__startup"
+                ;;
             cangauge__subcmd__nmt__subcmd__help,state)
                 cmd="cangauge__subcmd__nmt__subcmd__help__subcmd__state"
                 ;;
             cangauge__subcmd__nmt__subcmd__help,stop)
                 cmd="cangauge__subcmd__nmt__subcmd__help__subcmd__stop"
+                ;;
+            cangauge__subcmd__nmt__subcmd__help,watch)
+                cmd="cangauge__subcmd__nmt__subcmd__help__subcmd__watch"
                 ;;
             cangauge__subcmd__sdo,help)
                 cmd="cangauge__subcmd__sdo__subcmd__help"
@@ -155,7 +173,7 @@ _cangauge() {
 
     case "${cmd}" in
         cangauge)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version scan read nmt sdo log sim completions help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version scan read nmt sdo log sim completions help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 1 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -182,6 +200,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -213,7 +235,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__completions)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version bash elvish fish powershell zsh"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version bash elvish fish powershell zsh"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -240,6 +262,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -327,7 +353,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__help__subcmd__nmt)
-            opts="start stop preop reset reset-comm state"
+            opts="start stop preop reset reset-comm state watch startup"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -396,6 +422,20 @@ _cangauge() {
             COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
             return 0
             ;;
+        cangauge__subcmd__help__subcmd__nmt__subcmd__startup)
+            opts=""
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
         cangauge__subcmd__help__subcmd__nmt__subcmd__state)
             opts=""
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
@@ -411,6 +451,20 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__help__subcmd__nmt__subcmd__stop)
+            opts=""
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
+        cangauge__subcmd__help__subcmd__nmt__subcmd__watch)
             opts=""
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
@@ -509,7 +563,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__log)
-            opts="-d -n -o -b -t -f -q -v -h -V --duration --count --sync --poll --passive --no-nmt --output --force --summary --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-d -n -o -b -t -f -q -v -h -V --duration --count --sync --poll --passive --no-nmt --output --force --summary --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -575,6 +629,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -603,7 +661,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version start stop preop reset reset-comm state help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version start stop preop reset reset-comm state watch startup help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -630,6 +688,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -661,7 +723,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__help)
-            opts="start stop preop reset reset-comm state help"
+            opts="start stop preop reset reset-comm state watch startup help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -744,6 +806,20 @@ _cangauge() {
             COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
             return 0
             ;;
+        cangauge__subcmd__nmt__subcmd__help__subcmd__startup)
+            opts=""
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
         cangauge__subcmd__nmt__subcmd__help__subcmd__state)
             opts=""
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
@@ -772,8 +848,22 @@ _cangauge() {
             COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
             return 0
             ;;
+        cangauge__subcmd__nmt__subcmd__help__subcmd__watch)
+            opts=""
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
         cangauge__subcmd__nmt__subcmd__preop)
-            opts="-b -t -f -q -v -h -V --confirm --no-wait --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --confirm --no-wait --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -800,6 +890,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -831,7 +925,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__reset)
-            opts="-b -t -f -q -v -h -V --confirm --no-wait --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --confirm --no-wait --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -858,6 +952,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -889,7 +987,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__reset__subcmd__comm)
-            opts="-b -t -f -q -v -h -V --confirm --no-wait --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --confirm --no-wait --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -916,6 +1014,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -947,7 +1049,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__start)
-            opts="-b -t -f -q -v -h -V --confirm --no-wait --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --confirm --no-wait --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -974,6 +1076,72 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --format)
+                    COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
+                    return 0
+                    ;;
+                -f)
+                    COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
+                    return 0
+                    ;;
+                --trace)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --progress)
+                    COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
+                    return 0
+                    ;;
+                --color)
+                    COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
+                    return 0
+                    ;;
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
+        cangauge__subcmd__nmt__subcmd__startup)
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version wait auto"
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                --bus)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -b)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --timeout)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -t)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --retries)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1005,7 +1173,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__state)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --probe --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1032,6 +1200,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1063,7 +1235,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__stop)
-            opts="-b -t -f -q -v -h -V --confirm --no-wait --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --confirm --no-wait --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1090,6 +1262,80 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --format)
+                    COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
+                    return 0
+                    ;;
+                -f)
+                    COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
+                    return 0
+                    ;;
+                --trace)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --progress)
+                    COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
+                    return 0
+                    ;;
+                --color)
+                    COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
+                    return 0
+                    ;;
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
+        cangauge__subcmd__nmt__subcmd__watch)
+            opts="-d -b -t -f -q -v -h -V --duration --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                --duration)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -d)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --bus)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -b)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --timeout)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -t)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --retries)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1121,7 +1367,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__read)
-            opts="-b -t -f -q -v -h -V --in --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --in --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1155,6 +1401,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -1183,7 +1433,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__scan)
-            opts="-b -t -f -q -v -h -V --passive --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --passive --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1210,6 +1460,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1241,7 +1495,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version read write help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version read write help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1268,6 +1522,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1355,7 +1613,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo__subcmd__read)
-            opts="-b -t -f -q -v -h -V --type --hex --output --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --type --hex --output --force --block --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1367,6 +1625,10 @@ _cangauge() {
                     ;;
                 --output)
                     COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --block)
+                    COMPREPLY=($(compgen -W "always never auto" -- "${cur}"))
                     return 0
                     ;;
                 --bus)
@@ -1390,6 +1652,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1421,7 +1687,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo__subcmd__write)
-            opts="-b -t -f -q -v -h -V --type --verify --input --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --type --sdo-size --verify --input --block --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1431,8 +1697,16 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo-size)
+                    COMPREPLY=($(compgen -W "indicated omit auto" -- "${cur}"))
+                    return 0
+                    ;;
                 --input)
                     COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --block)
+                    COMPREPLY=($(compgen -W "always never auto" -- "${cur}"))
                     return 0
                     ;;
                 --bus)
@@ -1456,6 +1730,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1487,7 +1765,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sim)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1514,6 +1792,10 @@ _cangauge() {
                     return 0
                     ;;
                 --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;

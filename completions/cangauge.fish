@@ -1,6 +1,6 @@
 # Print an optspec for argparse to handle cmd's options that are independent of any subcommand.
 function __fish_cangauge_global_optspecs
-    string join \n b/bus= t/timeout= retries= device= f/format= trace= q/quiet v/verbose progress= color= h/help V/version
+    string join \n b/bus= t/timeout= retries= device= eds= f/format= trace= q/quiet v/verbose progress= color= h/help V/version
 end
 
 function __fish_cangauge_needs_command
@@ -28,6 +28,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -s b -l bus -d 'Which bu
 complete -c cangauge -n "__fish_cangauge_needs_command" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_needs_command" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -54,6 +55,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s b -l bus -d '
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -74,6 +76,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s b -l bus -d '
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -88,35 +91,39 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s q -l quiet -d
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -s q -l quiet -d 'Say less on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -s v -l verbose -d 'Say more on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -s h -l help -d 'Print help (see more with \'--help\')'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -f -a "start" -d 'To OPERATIONAL: the nodes send their TPDOs'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -f -a "stop" -d 'To STOPPED: only NMT, heartbeat and LSS'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -f -a "preop" -d 'To PRE-OPERATIONAL: everything but PDOs'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -f -a "reset" -d 'Restart the application (reset node)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -f -a "reset-comm" -d 'Restart the communication'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -f -a "state" -d 'Tell the states'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "start" -d 'To OPERATIONAL: the nodes send their TPDOs'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "stop" -d 'To STOPPED: only NMT, heartbeat and LSS'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "preop" -d 'To PRE-OPERATIONAL: everything but PDOs'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "reset" -d 'Restart the application (reset node)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "reset-comm" -d 'Restart the communication'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "state" -d 'Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "watch" -d 'Follow heartbeats, boot-ups and losses until Ctrl-C'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "startup" -d 'Tell or set who starts a device after power on: wait for the master, or auto (by itself)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -137,6 +144,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -157,6 +165,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -177,6 +186,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -197,6 +207,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -217,6 +228,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -227,21 +239,64 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l probe -d 'Where nothing tells the state: set the heartbeat (1017h) for a moment and put it back'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s q -l quiet -d 'Say less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s d -l duration -d 'End after this time' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "start" -d 'To OPERATIONAL: the nodes send their TPDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "stop" -d 'To STOPPED: only NMT, heartbeat and LSS'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "preop" -d 'To PRE-OPERATIONAL: everything but PDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "reset" -d 'Restart the application (reset node)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "reset-comm" -d 'Restart the communication'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "state" -d 'Tell the states'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "state" -d 'Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "watch" -d 'Follow heartbeats, boot-ups and losses until Ctrl-C'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "startup" -d 'Tell or set who starts a device after power on: wait for the master, or auto (by itself)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -260,11 +315,15 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -f -a "write" -d 'Write an object, or several OBJECT=VALUE'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l type -d 'Take the bytes for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l output -d 'Write the bytes to a file' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l output -d 'Write the bytes to a file; - for stdout' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l block -d 'Whether to use block transfer: auto where it pays and the device offers it' -r -f -a "always\t'For everything'
+never\t'For nothing'
+auto\t'Where it pays'"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -276,16 +335,24 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l hex -d 'Print the bytes in wire order'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l force -d 'Overwrite the file'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s q -l quiet -d 'Say less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s v -l verbose -d 'Say more on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l type -d 'Take the value for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l input -d 'Take the bytes from a file' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l sdo-size -d 'Whether the write says how many bytes it carries: auto asks the description, and tries the other way where the device takes it amiss' -r -f -a "indicated\t'2Fh, 2Bh, 27h, 23h'
+omit\t'22h'
+auto\t'As the device wants it'"
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l input -d 'Take the bytes from a file; - for stdin' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l block -d 'Whether to use block transfer: auto where it pays and the device offers it' -r -f -a "always\t'For everything'
+never\t'For nothing'
+auto\t'Where it pays'"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -299,7 +366,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l verify -d 'Read back and compare'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s q -l quiet -d 'Say less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s v -l verbose -d 'Say more on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from help" -f -a "read" -d 'Read objects: the value as it is, never scaled; several print "OBJECT VALUE" lines'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from help" -f -a "write" -d 'Write an object, or several OBJECT=VALUE'
@@ -314,6 +381,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s b -l bus -d 'W
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -326,7 +394,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l passive -d 'Send nothing at all'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Leave the nodes\' NMT states alone'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite the file'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite files that exist'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s q -l quiet -d 'Say less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s h -l help -d 'Print help (see more with \'--help\')'
@@ -335,6 +403,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s b -l bus -d 'W
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -353,6 +422,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s b -l b
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -380,6 +450,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "preop" -d 'To PRE-OPERATIONAL: everything but PDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "reset" -d 'Restart the application (reset node)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "reset-comm" -d 'Restart the communication'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "state" -d 'Tell the states'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "state" -d 'Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "watch" -d 'Follow heartbeats, boot-ups and losses until Ctrl-C'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "startup" -d 'Tell or set who starts a device after power on: wait for the master, or auto (by itself)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from sdo" -f -a "read" -d 'Read objects: the value as it is, never scaled; several print "OBJECT VALUE" lines'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from sdo" -f -a "write" -d 'Write an object, or several OBJECT=VALUE'

@@ -4,6 +4,7 @@
 pub mod args;
 mod completions;
 pub mod exit;
+mod file;
 mod log;
 mod nmt;
 mod open;
@@ -18,6 +19,7 @@ use anstream::ColorChoice;
 use args::{BusSpec, Duration, Override};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use exit::IntoFailure;
+use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -69,6 +71,10 @@ pub struct Global {
     /// TOML; NODE=NAME for one node of several
     #[arg(long, global = true, value_name = "[NODE=]NAME|FILE")]
     pub(crate) device: Vec<Override>,
+
+    /// Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several
+    #[arg(long, global = true, value_name = "[NODE=]FILE")]
+    pub(crate) eds: Vec<Override>,
 
     /// Form of the output: for people, one object a line, or comma-separated; for log, text means csv
     #[arg(short, long, global = true, value_name = "FORM", default_value = "text")]
@@ -136,6 +142,15 @@ impl Global {
                 When::Never => ColorChoice::Never,
             },
             progress: None,
+        }
+    }
+
+    /// Whether progress is shown.
+    pub(crate) fn shows_progress(&self) -> bool {
+        match self.progress {
+            When::Auto => !self.quiet && io::stderr().is_terminal(),
+            When::Always => true,
+            When::Never => false,
         }
     }
 

@@ -1,6 +1,6 @@
 //! `cangauge nmt`.
 
-use super::args::Nodes;
+use super::args::{Duration, Nodes};
 use super::exit::{IntoFailure, Several, stdout};
 use super::{Format, Global, open};
 use crate::bus::time::spoken;
@@ -8,10 +8,11 @@ use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtCommand;
 use crate::output::{json, table};
 use crate::tasks::failure::together;
-use crate::tasks::nmt::{By, Report, command, states};
+use crate::tasks::nmt::{By, Change, Report, Seen, Starts, command, probe, startup, states, watch};
 use crate::tasks::{Failure, Kind};
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use std::io::{self, Write};
+use std::ops::ControlFlow;
 
 /// Send NMT commands and tell states
 ///
@@ -38,8 +39,12 @@ enum Action {
     Reset(Targets),
     /// Restart the communication
     ResetComm(Targets),
-    /// Tell the states
-    State(Nodes1),
+    /// Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it
+    State(StateArgs),
+    /// Follow heartbeats, boot-ups and losses until Ctrl-C
+    Watch(WatchArgs),
+    /// Tell or set who starts a device after power on: wait for the master, or auto (by itself)
+    Startup(StartupArgs),
 }
 
 #[derive(Debug, Args)]
@@ -55,9 +60,38 @@ struct Targets {
 }
 
 #[derive(Debug, Args)]
-struct Nodes1 {
+struct StateArgs {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
+    /// Where nothing tells the state: set the heartbeat (1017h) for a moment and put it back
+    #[arg(long)]
+    probe: bool,
+}
+
+#[derive(Debug, Args)]
+struct WatchArgs {
+    /// Which nodes: 5, 0x7f, 1-16, 1,5; named ones are asked for their heartbeat time, else it is learned
+    #[arg(default_value = "all")]
+    nodes: Nodes,
+    /// End after this time
+    #[arg(short, long, value_name = "DUR")]
+    duration: Option<Duration>,
+}
+
+#[derive(Debug, Args)]
+struct StartupArgs {
+    /// Which node: 5, 0x7f
+    node: NodeId,
+    /// wait or auto; not given: only tell
+    set: Option<StartupMode>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum StartupMode {
+    /// The master starts the device
+    Wait,
+    /// The device starts itself
+    Auto,
 }
 
 impl Nmt {
@@ -68,7 +102,9 @@ impl Nmt {
             Action::Preop(targets) => (NmtCommand::EnterPreOperational, targets),
             Action::Reset(targets) => (NmtCommand::ResetNode, targets),
             Action::ResetComm(targets) => (NmtCommand::ResetCommunication, targets),
-            Action::State(nodes) => return state(global, &nodes.nodes),
+            Action::State(args) => return args.run(global),
+            Action::Watch(args) => return args.run(global),
+            Action::Startup(args) => return args.run(global),
         };
         let reports = global.with_master(|master| {
             let broadcast = targets.nodes == Nodes::All;
@@ -96,7 +132,6 @@ impl Targets {
     /// What is wrong with a node after a command. What cannot be confirmed is a failure only when asked to be.
     fn judge(&self, kind: NmtCommand, report: &Report, global: &Global) -> Option<Failure> {
         let wanted = kind.target();
-        let timeout = spoken(global.timing(crate::master::Timing::default().timeout).timeout);
         match (report.state, report.by) {
             // A device that starts by itself leaves PRE-OPERATIONAL at once after a reset.
             (Some(_), _) if kind.is_reset() => None,
@@ -106,18 +141,22 @@ impl Targets {
                 Some(Failure::of_node(Kind::Unexpected, report.node, message))
             }
             (None, _) => {
-                let why = if report.present {
-                    "sent, and nothing confirms it: no heartbeat (1017h is 0)".to_owned()
+                let (why, hint) = if !report.present {
+                    (
+                        "sent, and nothing came back: no heartbeat, no boot-up, no SDO answer",
+                        "who is there: cangauge scan".to_owned(),
+                    )
+                } else if kind.is_reset() {
+                    ("sent, and no boot-up came", format!("is it there? cangauge nmt state {}", report.node))
                 } else {
-                    format!("sent, and nothing came back within {timeout}: no heartbeat, no SDO answer")
+                    (
+                        "sent, and nothing confirms it: no heartbeat (1017h is 0)",
+                        format!("set a heartbeat: cangauge sdo write {} producer-heartbeat-time 1000", report.node),
+                    )
                 };
-                let why = if kind.is_reset() && report.present { "sent, and no boot-up came".to_owned() } else { why };
                 let failure = Failure::of_node(Kind::NoAnswer, report.node, why);
                 if self.confirm {
-                    return Some(failure.hint(format!(
-                        "set a heartbeat: cangauge sdo write {} producer-heartbeat-time 1000",
-                        report.node
-                    )));
+                    return Some(failure.hint(hint));
                 }
                 global.console().note(&failure.message);
                 None
@@ -126,22 +165,111 @@ impl Targets {
     }
 }
 
-fn state(global: &Global, nodes: &Nodes) -> anyhow::Result<()> {
-    let reports = global.with_master(|master| {
-        let nodes: Vec<NodeId> = open::nodes(master, global, nodes)?;
-        Ok(states(master, &nodes).or_fail()?)
-    })?;
-    print(&reports, global.format).map_err(stdout)?;
-    let silent = |report: &&Report| !report.present;
-    let failures: Vec<Failure> = reports
-        .iter()
-        .filter(silent)
-        .map(|report| {
-            Failure::of_node(Kind::NoAnswer, report.node, "no heartbeat and no SDO answer")
-                .hint("who is there: cangauge scan")
-        })
-        .collect();
-    together(reports.len(), failures).map_err(|failures| Several(failures).into())
+impl StateArgs {
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let reports = global.with_master(|master| {
+            let nodes: Vec<NodeId> = open::nodes(master, global, &self.nodes)?;
+            let mut reports = states(master, &nodes).or_fail()?;
+            for report in reports.iter_mut().filter(|report| self.probe && report.present && report.state.is_none()) {
+                let probed = probe(master, report.node).or_fail()?;
+                if let Some(trouble) = probed.trouble {
+                    global.console().warn(&format!("node {}: {trouble}", report.node));
+                }
+                *report = probed.report;
+            }
+            Ok(reports)
+        })?;
+        print(&reports, global.format).map_err(stdout)?;
+        let failures: Vec<Failure> = reports
+            .iter()
+            .filter(|report| !report.present)
+            .map(|report| {
+                Failure::of_node(Kind::NoAnswer, report.node, "no heartbeat and no SDO answer")
+                    .hint("who is there: cangauge scan")
+            })
+            .collect();
+        together(reports.len(), failures).map_err(|failures| Several(failures).into())
+    }
+}
+
+impl WatchArgs {
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let (nodes, ask) = match &self.nodes {
+            Nodes::All => (NodeId::all().collect(), false),
+            Nodes::These(nodes) => (nodes.clone(), true),
+        };
+        let mut failed = None;
+        global.with_master(|master| {
+            let until = self.duration.map(|duration| master.now() + duration.0);
+            let mut tell = |seen: &Seen| match print_seen(seen, global.format) {
+                Ok(()) => ControlFlow::Continue(()),
+                Err(error) => {
+                    failed = Some(error);
+                    ControlFlow::Break(())
+                }
+            };
+            Ok(watch(master, &nodes, ask, until, &mut tell).or_fail()?)
+        })?;
+        failed.map_or(Ok(()), |error| Err(stdout(error)))
+    }
+}
+
+impl StartupArgs {
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let overrides = open::overrides(global, &[self.node])?;
+        let set = self.set.map(|mode| match mode {
+            StartupMode::Wait => Starts::Wait,
+            StartupMode::Auto => Starts::Auto,
+        });
+        let report = global.with_master(|master| Ok(startup(master, self.node, &overrides, set)?))?;
+        let word = match report.starts {
+            Starts::Wait => "wait".to_owned(),
+            Starts::Auto => "auto".to_owned(),
+            Starts::Other(raw) => format!("0x{raw:X}"),
+        };
+        let mut out = io::stdout().lock();
+        match global.format {
+            Format::Json => json::startup(&mut out, self.node, &word, report.raw),
+            Format::Csv => writeln!(out, "{},{word},{}", self.node, report.raw),
+            Format::Text => writeln!(out, "{word}"),
+        }
+        .and_then(|()| out.flush())
+        .map_err(stdout)?;
+        if set.is_some() {
+            global.console().note(&format!("node {}: kept after power off only when it is stored (1010h)", self.node));
+        }
+        Ok(())
+    }
+}
+
+fn print_seen(seen: &Seen, format: Format) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    let time = humantime::format_rfc3339_micros(seen.at.wall.system_time()).to_string();
+    let (event, state) = match seen.change {
+        Change::State(state) => ("state", Some(state)),
+        Change::BootUp => ("boot-up", None),
+        Change::Lost(_) => ("lost", None),
+        Change::Back(state) => ("back", Some(state)),
+    };
+    match format {
+        Format::Json => {
+            let state = state.map(|state| state.to_string());
+            json::seen(&mut out, &time, seen.node, event, state.as_deref())?;
+        }
+        Format::Csv => {
+            let state = state.map(|state| state.to_string()).unwrap_or_default();
+            writeln!(out, "{time},{},{event},{state}", seen.node)?;
+        }
+        Format::Text => {
+            let rest = match seen.change {
+                Change::State(state) | Change::Back(state) => format!(" {state}"),
+                Change::Lost(silent) => format!(": silent for {}", spoken(silent)),
+                Change::BootUp => String::new(),
+            };
+            writeln!(out, "{time}  {:>3}  {event}{rest}", seen.node)?;
+        }
+    }
+    out.flush()
 }
 
 fn print(reports: &[Report], format: Format) -> io::Result<()> {

@@ -2,16 +2,20 @@
 
 use super::args::ObjectArg;
 use super::exit::{FileError, stdout};
+use super::file::OutFile;
 use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value, parse_hex};
 use crate::master::Master;
+use crate::master::transfer::BlockMode;
+use crate::output::progress::Transfer;
 use crate::output::{json, text};
-use crate::tasks::sdo::{Knowledge, ReadValue, encode, read, write};
+use crate::tasks::sdo::{Knowledge, Options, ReadValue, SizeMode, encode, is_signature, read, write};
 use crate::tasks::{Failure, Kind};
-use clap::{Args, Subcommand};
-use std::io::{self, Write};
+use clap::{Args, Subcommand, ValueEnum};
+use std::fs::File;
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Read and write objects of the object dictionary
@@ -48,9 +52,15 @@ struct ReadArgs {
     /// Print the bytes in wire order
     #[arg(long)]
     hex: bool,
-    /// Write the bytes to a file
+    /// Write the bytes to a file; - for stdout
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Overwrite the file
+    #[arg(long, requires = "output")]
+    force: bool,
+    /// Whether to use block transfer: auto where it pays and the device offers it
+    #[arg(long, value_name = "HOW", default_value = "auto")]
+    block: Block,
 }
 
 #[derive(Debug, Args)]
@@ -63,12 +73,59 @@ struct WriteArgs {
     /// Take the value for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
     #[arg(long = "type", value_name = "TYPE")]
     data_type: Option<DataType>,
+    /// Whether the write says how many bytes it carries: auto asks the description, and tries the other
+    /// way where the device takes it amiss
+    #[arg(long, value_name = "HOW", default_value = "auto")]
+    sdo_size: SdoSize,
     /// Read back and compare
     #[arg(long)]
     verify: bool,
-    /// Take the bytes from a file
+    /// Take the bytes from a file; - for stdin
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
+    /// Whether to use block transfer: auto where it pays and the device offers it
+    #[arg(long, value_name = "HOW", default_value = "auto")]
+    block: Block,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Block {
+    /// For everything
+    Always,
+    /// For nothing
+    Never,
+    /// Where it pays
+    Auto,
+}
+
+impl From<Block> for BlockMode {
+    fn from(block: Block) -> BlockMode {
+        match block {
+            Block::Always => BlockMode::Always,
+            Block::Never => BlockMode::Never,
+            Block::Auto => BlockMode::Auto,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SdoSize {
+    /// 2Fh, 2Bh, 27h, 23h
+    Indicated,
+    /// 22h
+    Omit,
+    /// As the device wants it
+    Auto,
+}
+
+impl From<SdoSize> for SizeMode {
+    fn from(size: SdoSize) -> SizeMode {
+        match size {
+            SdoSize::Indicated => SizeMode::Indicated,
+            SdoSize::Omit => SizeMode::Omitted,
+            SdoSize::Auto => SizeMode::Auto,
+        }
+    }
 }
 
 impl Sdo {
@@ -98,15 +155,23 @@ impl ReadArgs {
         }
         let overrides = open::overrides(global, &[self.node])?;
         let mut knowledge = Knowledge::new(self.node, &overrides);
+        let to_stdout = self.output.as_deref() == Some(Path::new("-"));
+        let path = self.output.as_deref().filter(|_| !to_stdout);
+        let mut file = path.map(|path| OutFile::create(path, self.force)).transpose()?;
+        let bar = Transfer::new(global.shows_progress());
+        let mut progress = |moved| bar.moved(moved);
+        let mut options = Options { blocks: self.block.into(), size: SizeMode::Auto, progress: &mut progress };
         global.with_master(|master| {
             for object in &self.objects {
                 let at = resolve(&mut knowledge, master, object)?;
-                let value = read(master, &mut knowledge, at, self.data_type)?;
+                let value = read(master, &mut knowledge, at, self.data_type, &mut options)?;
+                bar.finish();
                 if let Some(note) = value.note {
                     global.console().warn(&format!("node {}: {at}: {note}", self.node));
                 }
-                match &self.output {
-                    Some(path) => save(path, &value.raw)?,
+                match &mut file {
+                    Some(file) => file.write(&value.raw)?,
+                    None if to_stdout => io::stdout().lock().write_all(&value.raw).map_err(stdout)?,
                     None => self.print(&value, object, global.format).map_err(stdout)?,
                 }
             }
@@ -149,11 +214,6 @@ impl ReadArgs {
     }
 }
 
-fn save(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    let what = format!("write {}", path.display());
-    std::fs::write(path, bytes).map_err(|source| FileError { what, source }.into())
-}
-
 impl WriteArgs {
     /// The objects and values: `OBJECT VALUE`, or `OBJECT=VALUE` each.
     fn pairs(&self) -> Result<Vec<(ObjectArg, String)>, Failure> {
@@ -183,7 +243,14 @@ impl WriteArgs {
             None => None,
             Some(path) => {
                 let what = format!("read {}", path.display());
-                Some(std::fs::read(path).map_err(|source| FileError { what, source })?)
+                let mut bytes = Vec::new();
+                let result = if path == Path::new("-") {
+                    io::stdin().read_to_end(&mut bytes)
+                } else {
+                    File::open(path).and_then(|mut file| file.read_to_end(&mut bytes))
+                };
+                result.map_err(|source| FileError { what, source })?;
+                Some(bytes)
             }
         };
         // What can be known to be wrong is known before the bus is opened.
@@ -208,11 +275,16 @@ impl WriteArgs {
                     }
                 });
             }
+            let bar = Transfer::new(global.shows_progress());
+            let mut progress = |moved| bar.moved(moved);
+            let mut options =
+                Options { blocks: self.block.into(), size: self.sdo_size.into(), progress: &mut progress };
             for (at, bytes, data_type) in ready {
-                write(master, &knowledge, at, &bytes)?;
+                write(master, &knowledge, at, &bytes, &mut options)?;
                 if self.verify {
-                    self.verify(master, &mut knowledge, at, &bytes, data_type)?;
+                    self.verify(global, master, &mut knowledge, (at, &bytes, data_type), &mut options)?;
                 }
+                bar.finish();
                 global.console().detail(&format!("node {}: {at} written: {}", self.node, hex(&bytes)));
             }
             Ok(())
@@ -221,13 +293,19 @@ impl WriteArgs {
 
     fn verify(
         &self,
+        global: &Global,
         master: &mut Master<'_>,
         knowledge: &mut Knowledge,
-        at: ObjectId,
-        bytes: &[u8],
-        data_type: DataType,
+        (at, bytes, data_type): (ObjectId, &[u8], DataType),
+        options: &mut Options<'_>,
     ) -> anyhow::Result<()> {
-        let found = read(master, knowledge, at, Some(data_type))?;
+        if is_signature(bytes) {
+            let message =
+                format!("node {}: {at} acknowledged the signature; what it reads is something else", self.node);
+            global.console().note(&message);
+            return Ok(());
+        }
+        let found = read(master, knowledge, at, Some(data_type), options)?;
         if found.raw != bytes {
             let message = format!("{at} was acknowledged and reads {} instead of {}", hex(&found.raw), hex(bytes));
             return Err(Failure::of_node(Kind::Unexpected, self.node, message).into());

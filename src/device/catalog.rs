@@ -4,7 +4,8 @@ use super::description::Description;
 use super::dictionary::Dictionary;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use std::collections::BTreeMap;
+use crate::device::eds::Eds;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
 /// A description with its object dictionary laid out.
@@ -14,6 +15,8 @@ pub struct Model {
     pub description: Description,
     /// Its objects.
     pub dictionary: Dictionary,
+    /// Objects whose type the description leaves open: they read as bytes.
+    pub untyped: BTreeSet<ObjectId>,
 }
 
 /// What a device says of itself; what it did not answer is `None`.
@@ -48,7 +51,19 @@ impl Model {
         for object in &description.objects {
             dictionary.insert_described(object).map_err(DescriptionError)?;
         }
-        Ok(Model { description, dictionary })
+        Ok(Model { description, dictionary, untyped: BTreeSet::new() })
+    }
+
+    /// What an EDS or DCF file tells: objects and their types. What the device measures is found out from
+    /// the objects of CiA 404.
+    pub fn from_eds(eds: &Eds) -> Model {
+        let description = Description {
+            name: "eds".to_owned(),
+            title: eds.info.product_name.clone().unwrap_or_else(|| "the EDS file".to_owned()),
+            vendor: eds.info.vendor_name.clone().unwrap_or_default(),
+            ..Description::default()
+        };
+        Model { description, dictionary: eds.configured(), untyped: eds.untyped.clone() }
     }
 
     /// Whether the identity is as the description asks, so far as it needs no further reading.
@@ -138,7 +153,6 @@ mod tests {
     use super::*;
     use crate::canopen::value::DataType;
     use crate::device::description::{ObjectEntry, Scalar, parse_range};
-    use std::collections::BTreeSet;
 
     fn node() -> NodeId {
         NodeId::new(127).expect("a node-ID")

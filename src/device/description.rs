@@ -9,7 +9,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 
 /// Everything that is known of one kind of device.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Description {
     /// The short name for `--device`, `sim:` and the DEVICE column: `mh4`.
@@ -39,6 +39,8 @@ pub struct Description {
     pub bit_rates: BTreeMap<String, u32>,
     /// Index that stands for automatic bit rate detection, if the device has one.
     pub auto_bit_rate: Option<u8>,
+    /// Which object decides who starts it after power on.
+    pub startup: Option<Startup>,
     /// What it measures.
     #[serde(default, rename = "signal")]
     pub signals: Vec<SignalEntry>,
@@ -51,6 +53,18 @@ pub struct Description {
     /// What the simulator needs beyond the manual.
     #[serde(default)]
     pub sim: SimEntry,
+}
+
+/// Which object decides who starts the device after power on.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Startup {
+    /// Where it stands, an UNSIGNED32.
+    pub object: ObjectId,
+    /// The device waits for the master.
+    pub wait: u32,
+    /// The device starts itself.
+    pub auto: u32,
 }
 
 /// What a device answers that tells its kind; everything given must agree.
@@ -90,6 +104,9 @@ pub struct SdoStyle {
     /// Whether it has no segmented transfer, so that strings have at most four characters.
     #[serde(default)]
     pub expedited_only: bool,
+    /// Whether it knows block transfer.
+    #[serde(default)]
+    pub block: bool,
 }
 
 /// Whether the command specifier of an expedited transfer tells the size.

@@ -4,10 +4,13 @@
 //! [`Master::next`] is the one loop: it sends what waits, receives one thing, lets the SDO client see it
 //! and says what happened. Everything that blocks is built on it.
 
+mod machine;
 mod sdo;
 mod send;
+pub mod transfer;
 
 pub use sdo::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
+pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, Way, read_object, write_object};
 
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};
 use crate::canopen::frame::Frame;
@@ -200,7 +203,7 @@ impl<'bus> Master<'bus> {
                         return Ok(Happening::Deadline);
                     }
                     self.sdo.on_time(at, &self.timing, &mut self.outgoing);
-                    if !self.sdo.on_frame(&received, &mut self.outgoing) {
+                    if !self.sdo.on_frame(&received, &self.timing, &mut self.outgoing) {
                         return Ok(Happening::Frame(received));
                     }
                 }

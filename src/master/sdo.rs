@@ -2,15 +2,15 @@
 //! late answer never becomes the next reading.
 
 use super::Timing;
+use super::machine::Machine;
 use super::send::Outgoing;
+use super::transfer::{Blocks, Way, names_the_object};
 use crate::bus::time::spoken;
 use crate::bus::{Mono, Received, Stamp};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{
-    AbortCode, Download, DownloadSize, FitError, Progress, TransferError, Upload, Uploaded, Violation,
-};
+use crate::canopen::sdo::{AbortCode, DownloadSize, FitError, Progress, TransferError, Uploaded, Violation};
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 use std::time::Duration;
@@ -29,6 +29,9 @@ pub struct Request {
     kind: Kind,
     timeout: Option<Duration>,
     repeatable: bool,
+    blocks: Blocks,
+    /// The device does no block transfer of this object: that was found out in this very transfer.
+    refused_blocks: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -40,12 +43,23 @@ enum Kind {
 impl Request {
     /// A read.
     pub fn read(node: NodeId, object: ObjectId) -> Request {
-        Request { node, object, kind: Kind::Read, timeout: None, repeatable: true }
+        Request::new(node, object, Kind::Read)
     }
 
     /// A write of a plain value.
     pub fn write(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> Request {
-        Request { node, object, kind: Kind::Write { data, size }, timeout: None, repeatable: true }
+        Request::new(node, object, Kind::Write { data, size })
+    }
+
+    fn new(node: NodeId, object: ObjectId, kind: Kind) -> Request {
+        let (blocks, refused_blocks) = (Blocks::Never, false);
+        Request { node, object, kind, timeout: None, repeatable: true, blocks, refused_blocks }
+    }
+
+    /// In blocks, or not: see [`super::BlockMode`] for the choice.
+    pub fn blocks(mut self, blocks: Blocks) -> Request {
+        self.blocks = blocks;
+        self
     }
 
     /// Sent once only, whatever the time-outs say: signatures, and scans that do their own asking.
@@ -58,6 +72,23 @@ impl Request {
     pub fn within(mut self, timeout: Duration) -> Request {
         self.timeout = Some(timeout);
         self
+    }
+
+    /// Whether a request for blocks is only the first try.
+    fn falls_back(&self) -> bool {
+        matches!(self.blocks, Blocks::First { .. })
+    }
+
+    fn fall_back(&mut self) {
+        self.blocks = Blocks::Never;
+        self.refused_blocks = true;
+    }
+
+    fn machine(&self, accept_60: bool) -> Machine {
+        match &self.kind {
+            Kind::Read => Machine::read(self.node, self.object, accept_60, self.blocks),
+            Kind::Write { data, size } => Machine::write(self.node, self.object, data.clone(), *size, self.blocks),
+        }
     }
 
     /// Whether it reads or writes.
@@ -94,6 +125,8 @@ pub struct Answer {
     pub uploaded: Option<Uploaded>,
     /// When the last frame of the answer was received.
     pub at: Stamp,
+    /// How the data went.
+    pub way: Way,
 }
 
 /// Why a transfer has no result.
@@ -138,12 +171,6 @@ pub enum SdoFailure {
     Cancelled,
 }
 
-#[derive(Clone, Debug)]
-enum Machine {
-    Read(Upload),
-    Write(Download),
-}
-
 /// A transfer under way.
 #[derive(Debug)]
 struct Active {
@@ -152,6 +179,8 @@ struct Active {
     machine: Machine,
     /// Set when the last frame went out, never renewed by other traffic.
     deadline: Option<Mono>,
+    /// Frames given out that are not on their way yet.
+    unsent: usize,
     attempts_left: u32,
     /// The user's transfer that waits while this one makes sure that no old answer is still under way.
     behind: Option<(Ticket, Request)>,
@@ -186,51 +215,54 @@ pub(super) struct SdoClient {
 
 impl Active {
     fn new(ticket: Ticket, request: Request, accept_60: bool, timing: &Timing) -> Active {
-        let machine = match &request.kind {
-            Kind::Read => Machine::Read(Upload::new(request.node, request.object, accept_60)),
-            Kind::Write { data, size } => {
-                Machine::Write(Download::new(request.node, request.object, data.clone(), *size))
-            }
+        // A server that does not answer a request for blocks is asked in the usual way next.
+        let attempts = if request.falls_back() { 0 } else { timing.retries };
+        let attempts_left = if request.repeatable { attempts } else { 0 };
+        let machine = request.machine(accept_60);
+        Active { ticket, request, machine, deadline: None, unsent: 0, attempts_left, behind: None }
+    }
+
+    /// Hands frames to the queue, in place of those that are still in it.
+    fn give(&mut self, frames: Vec<Frame>, outgoing: &mut Outgoing) {
+        if self.unsent > 0 {
+            outgoing.drop_ticket(self.ticket);
+        }
+        self.unsent = frames.len();
+        self.deadline = None;
+        for frame in frames {
+            outgoing.push(frame, Some(self.ticket));
+        }
+    }
+
+    /// A read turns out to be of a large object: it is asked for in blocks, from the start.
+    fn turn_to_blocks(&mut self, accept_60: bool, out: &mut Vec<Frame>) {
+        out.clear();
+        self.machine.abort(AbortCode::GENERAL, out);
+        self.request.blocks = Blocks::First { threshold: 0 };
+        self.attempts_left = 0;
+        self.machine = self.request.machine(accept_60);
+        out.push(self.machine.request());
+    }
+
+    /// Whether the transfer has just failed only because the server does not do blocks.
+    fn is_refused_for_blocks(&self, error: TransferError) -> bool {
+        // What the device says of the object itself it would say again. A write that was answered with
+        // something unheard of may have done something.
+        let refused = match error {
+            TransferError::Aborted(code) => !names_the_object(code),
+            TransferError::Violation(..) => self.request.operation() == Operation::Read,
+            TransferError::NoAnswer => false,
         };
-        let attempts_left = if request.repeatable { timing.retries } else { 0 };
-        Active { ticket, request, machine, deadline: None, attempts_left, behind: None }
+        refused && self.request.falls_back() && !self.machine.has_begun()
     }
 
-    fn first_frame(&self) -> Frame {
-        match &self.machine {
-            Machine::Read(upload) => upload.request(),
-            Machine::Write(download) => download.request(),
-        }
-    }
-
-    fn has_begun(&self) -> bool {
-        match &self.machine {
-            Machine::Read(upload) => upload.has_begun(),
-            Machine::Write(download) => download.has_begun(),
-        }
-    }
-
-    fn on_frame(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Option<Uploaded>> {
-        match &mut self.machine {
-            Machine::Read(upload) => match upload.on_frame(frame, out) {
-                Progress::Done(uploaded) => Progress::Done(Some(uploaded)),
-                Progress::NotOurs => Progress::NotOurs,
-                Progress::Continue => Progress::Continue,
-                Progress::Failed(error) => Progress::Failed(error),
-            },
-            Machine::Write(download) => match download.on_frame(frame, out) {
-                Progress::Done(()) => Progress::Done(None),
-                Progress::NotOurs => Progress::NotOurs,
-                Progress::Continue => Progress::Continue,
-                Progress::Failed(error) => Progress::Failed(error),
-            },
-        }
-    }
-
-    fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
-        match &mut self.machine {
-            Machine::Read(upload) => upload.abort(code, out),
-            Machine::Write(download) => download.abort(code, out),
+    fn way(&self) -> Way {
+        if self.machine.is_in_blocks() {
+            Way::Blocks
+        } else if self.request.refused_blocks {
+            Way::PlainAfterAll
+        } else {
+            Way::Plain
         }
     }
 
@@ -283,24 +315,35 @@ impl SdoClient {
             // A server answers in order. While an answer for this very object may still be under way, a read
             // of another object comes first: once that is answered, nothing older can come.
             let haunted = node.ghosts.iter().any(|ghost| ghost.object == request.object);
-            let active = if haunted {
+            let mut active = if haunted {
                 let other = if request.object == DEVICE_TYPE { ERROR_REGISTER } else { DEVICE_TYPE };
                 let barrier = Request::read(request.node, other).once();
                 Active { behind: Some((ticket, request)), ..Active::new(ticket, barrier, node.accept_60, timing) }
             } else {
                 Active::new(ticket, request, node.accept_60, timing)
             };
-            outgoing.push(active.first_frame(), Some(ticket));
+            active.give(vec![active.machine.request()], outgoing);
             node.active = Some(active);
         }
     }
 
-    /// A frame of a transfer is on its way: from now on its answer is waited for.
+    /// A frame of a transfer is on its way: once the last of those given out is, its answer is waited for.
     pub(super) fn on_sent(&mut self, ticket: Ticket, now: Mono, timing: &Timing) {
         let active = self.nodes.values_mut().filter_map(|node| node.active.as_mut());
         if let Some(active) = active.into_iter().find(|active| active.ticket == ticket) {
-            active.deadline = Some(now + active.waited(timing));
+            active.machine.on_sent();
+            active.unsent = active.unsent.saturating_sub(1);
+            if active.unsent == 0 {
+                active.deadline = Some(now + active.waited(timing));
+            }
         }
+    }
+
+    /// Bytes transferred so far and bytes in all, where known; `None` of a transfer that is not under way.
+    pub(super) fn moved(&self, ticket: Ticket) -> Option<(usize, Option<usize>)> {
+        let mut active = self.nodes.values().filter_map(|node| node.active.as_ref());
+        let active = active.find(|active| active.ticket == ticket && active.behind.is_none())?;
+        Some(active.machine.moved())
     }
 
     pub(super) fn next_deadline(&self) -> Option<Mono> {
@@ -308,7 +351,7 @@ impl SdoClient {
     }
 
     /// Takes a frame; `false` if it is no SDO frame of a node that we deal with.
-    pub(super) fn on_frame(&mut self, received: &Received, outgoing: &mut Outgoing) -> bool {
+    pub(super) fn on_frame(&mut self, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let id = received.frame.id();
         let Some(number) = id.sdo_response_node().or_else(|| id.sdo_request_node()) else { return false };
         let Some(node) = self.nodes.get_mut(&number) else { return false };
@@ -317,25 +360,39 @@ impl SdoClient {
             return false;
         };
         let mut out = Vec::new();
-        let result = match active.on_frame(&received.frame, &mut out) {
+        let result = match active.machine.on_frame(&received.frame, &mut out) {
             Progress::NotOurs => {
                 node.settle(&received.frame);
                 return false;
             }
-            Progress::Continue => {
-                active.deadline = None;
-                let ticket = active.ticket;
-                for frame in out {
-                    outgoing.push(frame, Some(ticket));
+            Progress::Continue if out.is_empty() => {
+                // A part of a sub-block: the next one has its own time.
+                if active.unsent == 0 {
+                    active.deadline = Some(received.at.mono + active.waited(timing));
                 }
                 return true;
             }
-            Progress::Done(uploaded) => Ok(Answer { uploaded, at: received.at }),
-            Progress::Failed(TransferError::Aborted(code)) => Err(active.error(SdoFailure::Refused(code))),
-            Progress::Failed(TransferError::Violation(violation, frame)) => {
-                Err(active.error(SdoFailure::Violation(violation, frame)))
+            Progress::Continue => {
+                if active.request.blocks == Blocks::WhenLarge && active.machine.is_worth_blocks() {
+                    active.turn_to_blocks(node.accept_60, &mut out);
+                }
+                active.give(out, outgoing);
+                return true;
             }
-            Progress::Failed(TransferError::NoAnswer) => Err(active.error(SdoFailure::Cancelled)),
+            Progress::Done(uploaded) => Ok(Answer { uploaded, at: received.at, way: active.way() }),
+            Progress::Failed(error) => {
+                if active.is_refused_for_blocks(error) {
+                    active.request.fall_back();
+                    *active = Active::new(active.ticket, active.request.clone(), node.accept_60, timing);
+                    active.give(vec![active.machine.request()], outgoing);
+                    return true;
+                }
+                Err(active.error(match error {
+                    TransferError::Aborted(code) => SdoFailure::Refused(code),
+                    TransferError::Violation(violation, frame) => SdoFailure::Violation(violation, frame),
+                    TransferError::NoAnswer => SdoFailure::Cancelled,
+                }))
+            }
         };
         for frame in out {
             outgoing.push(frame, None);
@@ -360,22 +417,30 @@ impl SdoClient {
             let Some(active) = node.active.as_mut().filter(|active| active.deadline.is_some_and(|at| at <= now)) else {
                 continue;
             };
-            let begun = active.has_begun();
+            let begun = active.machine.has_begun();
+            let mut out = Vec::new();
+            if active.machine.on_timeout(&mut out).is_none() {
+                active.give(out, outgoing);
+                continue;
+            }
             if !begun {
                 node.ghosts.push(Ghost { object: active.request.object, until: now + GHOST_LIFE });
                 if active.attempts_left > 0 {
                     active.attempts_left -= 1;
-                    active.deadline = None;
-                    let frame = active.first_frame();
-                    outgoing.push(frame, Some(active.ticket));
+                    out.push(active.machine.request());
+                    active.give(out, outgoing);
                     continue;
                 }
             }
             let Some(mut active) = node.active.take() else { continue };
-            let mut out = Vec::new();
-            active.abort(AbortCode::TIMEOUT, &mut out);
             for frame in out {
                 outgoing.push(frame, None);
+            }
+            if !begun && active.request.repeatable && active.request.falls_back() {
+                // Some servers do not even refuse what they do not know.
+                active.request.fall_back();
+                node.waiting.push_front((active.ticket, active.request));
+                continue;
             }
             let waited = active.waited(timing);
             let mut error = active.error(SdoFailure::NoAnswer { waited, begun });
@@ -401,7 +466,7 @@ impl SdoClient {
     pub(super) fn cancel(&mut self, out: &mut Vec<Frame>) {
         for node in self.nodes.values_mut() {
             if let Some(mut active) = node.active.take() {
-                active.abort(AbortCode::TIMEOUT, out);
+                active.machine.abort(AbortCode::TIMEOUT, out);
             }
             node.waiting.clear();
         }

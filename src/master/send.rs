@@ -3,6 +3,7 @@
 use super::Ticket;
 use crate::bus::{Bus, BusError, Mono};
 use crate::canopen::frame::Frame;
+use crate::canopen::wire_length::{bit_time, frame_time};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -13,12 +14,12 @@ const RETRY: Duration = Duration::from_millis(1);
 const AHEAD: u32 = 4;
 
 /// The longest classic frame with an 11-bit identifier: 8 bytes, every stuff bit, and the gap.
-const LONGEST_FRAME_BITS: u64 = 135;
+const LONGEST_FRAME_BITS: u32 = 135;
 
 /// The queue between the protocol machines and the bus.
 pub(super) struct Outgoing {
     queue: VecDeque<(Frame, Option<Ticket>)>,
-    frame_time: Option<Duration>,
+    bit_rate: Option<u32>,
     /// When the wire will have carried everything sent so far, if nobody else sends.
     wire_free_at: Mono,
     full_since: Option<Mono>,
@@ -26,10 +27,8 @@ pub(super) struct Outgoing {
 
 impl Outgoing {
     pub(super) fn new(bit_rate: Option<u32>) -> Outgoing {
-        let frame_time = bit_rate
-            .filter(|&rate| rate > 0)
-            .map(|rate| Duration::from_nanos(LONGEST_FRAME_BITS * 1_000_000_000 / u64::from(rate)));
-        Outgoing { queue: VecDeque::new(), frame_time, wire_free_at: Mono::START, full_since: None }
+        let bit_rate = bit_rate.filter(|&rate| rate > 0);
+        Outgoing { queue: VecDeque::new(), bit_rate, wire_free_at: Mono::START, full_since: None }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -67,10 +66,10 @@ impl Outgoing {
         sent: &mut dyn FnMut(Ticket, Mono),
     ) -> Result<Option<Mono>, BusError> {
         while let Some((frame, ticket)) = self.queue.front() {
-            if let Some(frame_time) = self.frame_time {
-                let ahead = self.wire_free_at.since(now);
-                if ahead > frame_time * AHEAD {
-                    return Ok(Some(now + frame_time));
+            if let Some(bit_rate) = self.bit_rate {
+                let longest = bit_time(LONGEST_FRAME_BITS, bit_rate);
+                if self.wire_free_at.since(now) > longest * AHEAD {
+                    return Ok(Some(now + longest));
                 }
             }
             match bus.send(frame) {
@@ -87,11 +86,12 @@ impl Outgoing {
             if let Some(ticket) = ticket {
                 sent(*ticket, now);
             }
+            // What this very frame takes: at the longest for each, a long burst would fall behind the wire.
+            if let Some(bit_rate) = self.bit_rate {
+                self.wire_free_at = self.wire_free_at.max(now) + frame_time(frame, bit_rate);
+            }
             self.queue.pop_front();
             self.full_since = None;
-            if let Some(frame_time) = self.frame_time {
-                self.wire_free_at = self.wire_free_at.max(now) + frame_time;
-            }
         }
         Ok(None)
     }

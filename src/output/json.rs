@@ -99,6 +99,29 @@ pub fn report(out: &mut dyn Write, report: &Report) -> io::Result<()> {
     line(out, &State { node: report.node.get(), state, by: report.by.as_str() })
 }
 
+/// Who starts a device after power on.
+pub fn startup(out: &mut dyn Write, node: NodeId, starts: &str, raw: u64) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Startup<'a> {
+        node: u8,
+        startup: &'a str,
+        raw: u64,
+    }
+    line(out, &Startup { node: node.get(), startup: starts, raw })
+}
+
+/// Something that `nmt watch` saw.
+pub fn seen(out: &mut dyn Write, time: &str, node: NodeId, event: &str, state: Option<&str>) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Seen<'a> {
+        time: &'a str,
+        node: u8,
+        event: &'a str,
+        state: Option<&'a str>,
+    }
+    line(out, &Seen { time, node: node.get(), event, state })
+}
+
 /// A number as JSON has them: decimals keep their digits, what is not finite is null.
 struct JsonNumber(Option<Number>);
 

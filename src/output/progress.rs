@@ -3,6 +3,7 @@
 use super::text;
 use crate::measure::sample::{Sample, Source};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::time::Duration;
@@ -107,6 +108,46 @@ impl Progress {
             let _ = self.multi.clear();
         }
         self.multi.set_draw_target(ProgressDrawTarget::hidden());
+    }
+}
+
+/// How far one transfer has come: shown once it takes longer than a blink.
+#[derive(Debug)]
+pub struct Transfer {
+    bar: Option<ProgressBar>,
+    /// How often it was told of bytes moved: it is told ten times a second.
+    told: Cell<u32>,
+}
+
+/// A blink: three tenths of a second.
+const BLINK: u32 = 3;
+
+impl Transfer {
+    /// A transfer that begins now; nothing is shown unless `show`.
+    pub fn new(show: bool) -> Transfer {
+        let bar = show.then(|| ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()));
+        Transfer { bar, told: Cell::new(0) }
+    }
+
+    /// Takes how many bytes have moved, and of how many.
+    pub fn moved(&self, (done, total): (usize, Option<usize>)) {
+        self.told.set(self.told.get().saturating_add(1));
+        let Some(bar) = self.bar.as_ref().filter(|_| self.told.get() >= BLINK) else { return };
+        if bar.is_hidden() {
+            bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(RATE));
+            bar.set_style(style("[{bar:27}] {bytes} of {total_bytes}, {binary_bytes_per_sec}").progress_chars("=> "));
+        }
+        if let Some(total) = total {
+            bar.set_length(total as u64);
+        }
+        bar.set_position(done as u64);
+    }
+
+    /// Removes the line.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
     }
 }
 

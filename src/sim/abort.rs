@@ -11,6 +11,12 @@ impl Abort {
     pub const TIMEOUT: Abort = Abort(0x0504_0000);
     /// Client command specifier not valid or unknown.
     pub const COMMAND: Abort = Abort(0x0504_0001);
+    /// No block size from 1 to 127.
+    pub const BLOCK_SIZE: Abort = Abort(0x0504_0002);
+    /// Segments acknowledged that were not sent.
+    pub const SEQUENCE: Abort = Abort(0x0504_0003);
+    /// The data is not what was sent.
+    pub const CRC: Abort = Abort(0x0504_0004);
     /// More data than the server takes.
     pub const MEMORY: Abort = Abort(0x0504_0005);
     /// Unsupported access to an object: the mapping cannot be changed while it is in use.

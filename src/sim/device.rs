@@ -216,11 +216,15 @@ impl Device {
     fn serve(&mut self, request: [u8; 8], now: Mono, out: &mut Outbox) {
         let pre_operational = self.phase == Phase::Running(State::PreOperational);
         let mut access = self.memory.at(now.since_start(), pre_operational);
-        let answer = self.sdo.request(now, request, &mut access);
+        let was_giving = self.sdo.is_giving();
+        let answers = self.sdo.request(now, request, &mut access);
         let written = access.written;
-        if let Some(answer) = answer {
-            out.send(Frame::full(CanId::sdo_response(self.memory.node), answer));
+        let id = CanId::sdo_response(self.memory.node);
+        if was_giving {
+            // The rest of a sub-block that the client has given up.
+            out.retain(|frame| frame.id() != id);
         }
+        answers.into_iter().for_each(|answer| out.send(Frame::full(id, answer)));
         match written {
             // "The heartbeat protocol begins immediately" (CiA 301, 7.5.2.14).
             Some(HEARTBEAT_TIME) => self.restart_heartbeat(now),
@@ -405,6 +409,9 @@ impl Station for Device {
     }
 
     fn sent(&mut self, now: Mono, frame: &Frame) {
+        if frame.id() == CanId::sdo_response(self.memory.node) {
+            self.sdo.sent(now);
+        }
         let Some(recorder) = &self.recorder else { return };
         if self.under_way.front().is_some_and(|(sent, _)| sent == frame)
             && let Some((_, lines)) = self.under_way.pop_front()

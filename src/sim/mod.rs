@@ -20,6 +20,7 @@ mod nmt;
 mod number;
 mod objects;
 mod record;
+mod sdo_block;
 mod sdo_server;
 mod setup;
 mod tpdo;

@@ -1,6 +1,8 @@
-//! The SDO server of a simulated device (CiA 301, 7.2.4): expedited and segmented transfers, one at a time.
+//! The SDO server of a simulated device (CiA 301, 7.2.4): expedited and segmented transfers, where described
+//! block transfers too, one at a time.
 
 use super::abort::Abort;
+use super::sdo_block::{self, Block, Step};
 use crate::bus::time::Mono;
 use crate::canopen::object::ObjectId;
 use crate::device::description::{SdoStyle, SizeIndication};
@@ -10,7 +12,7 @@ use std::time::Duration;
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The longest value that can be written.
-const LONGEST: usize = 1024;
+const LONGEST: usize = 1 << 20;
 
 /// The answer to an upload of 1 to 4 bytes.
 const SIZED: [u8; 5] = [0x43, 0x4f, 0x4b, 0x47, 0x43];
@@ -54,6 +56,12 @@ enum Transfer {
         toggle: bool,
         until: Mono,
     },
+    /// In blocks, either way.
+    Block {
+        object: ObjectId,
+        block: Block,
+        until: Mono,
+    },
 }
 
 impl SdoServer {
@@ -71,7 +79,9 @@ impl SdoServer {
     pub(super) fn deadline(&self) -> Option<Mono> {
         match &self.transfer {
             Transfer::None => None,
-            Transfer::Upload { until, .. } | Transfer::Download { until, .. } => Some(*until),
+            Transfer::Upload { until, .. } | Transfer::Download { until, .. } | Transfer::Block { until, .. } => {
+                Some(*until)
+            }
         }
     }
 
@@ -85,16 +95,38 @@ impl SdoServer {
     fn object(&self) -> Option<ObjectId> {
         match &self.transfer {
             Transfer::None => None,
-            Transfer::Upload { object, .. } | Transfer::Download { object, .. } => Some(*object),
+            Transfer::Upload { object, .. } | Transfer::Download { object, .. } | Transfer::Block { object, .. } => {
+                Some(*object)
+            }
         }
     }
 
-    /// A request, and the answer to it if there is one.
-    pub(super) fn request(&mut self, now: Mono, request: [u8; 8], memory: &mut dyn Dictionary) -> Option<[u8; 8]> {
+    /// A frame of this server is on the wire: the client's time begins with the last one.
+    pub(super) fn sent(&mut self, now: Mono) {
+        if let Transfer::Block { until, .. } = &mut self.transfer {
+            *until = now + PATIENCE;
+        }
+    }
+
+    /// Whether a sub-block is on its way to the client: whatever the client sends now, the rest of it is void.
+    pub(super) fn is_giving(&self) -> bool {
+        matches!(self.transfer, Transfer::Block { block: Block::Giving { .. }, .. })
+    }
+
+    /// A request, and the answers to it if there are any.
+    pub(super) fn request(&mut self, now: Mono, request: [u8; 8], memory: &mut dyn Dictionary) -> Vec<[u8; 8]> {
         let [command, low, high, sub, ..] = request;
         let addressed = ObjectId { index: u16::from(high) << 8 | u16::from(low), sub };
         // Segments carry no address: an abort names the object of the transfer, or none.
         let in_transfer = self.object().unwrap_or(ObjectId::new(0, 0));
+        // Within a block transfer a segment can look like any other request.
+        if command != 0x80 && matches!(self.transfer, Transfer::Block { .. }) {
+            match self.block(now, request, memory) {
+                Ok(Some(answers)) => return answers,
+                Ok(None) => {}
+                Err(code) => return vec![abort(in_transfer, code)],
+            }
+        }
         let (answer, object) = match command >> 5 {
             0 => (self.download_segment(now, request, memory), in_transfer),
             1 => (self.download(now, request, addressed, memory), addressed),
@@ -102,17 +134,75 @@ impl SdoServer {
             3 => (self.upload_segment(now, command), in_transfer),
             4 => {
                 self.transfer = Transfer::None;
-                return None;
+                return Vec::new();
+            }
+            5 if self.style.block && command & 0b11 == 0 => {
+                (self.upload_block(now, request, addressed, memory), addressed)
+            }
+            6 if self.style.block && command & 0b1 == 0 => {
+                (self.download_block(now, request, addressed, memory), addressed)
             }
             _ => (Err(Abort::COMMAND), addressed),
         };
         match answer {
-            Ok(answer) => Some(answer),
+            Ok(answer) => vec![answer],
             Err(code) => {
                 self.transfer = Transfer::None;
-                Some(abort(object, code))
+                vec![abort(object, code)]
             }
         }
+    }
+
+    /// A frame within a block transfer; `None` if it has no place there.
+    fn block(&mut self, now: Mono, frame: [u8; 8], memory: &mut dyn Dictionary) -> Result<Option<Vec<[u8; 8]>>, Abort> {
+        let Transfer::Block { object, block, .. } = std::mem::replace(&mut self.transfer, Transfer::None) else {
+            return Ok(None);
+        };
+        Ok(match block.step(frame, LONGEST)? {
+            Step::On(block, answers) => {
+                self.transfer = Transfer::Block { object, block, until: now + PATIENCE };
+                Some(answers)
+            }
+            Step::Arrived(bytes, answer) => {
+                memory.download(object, &bytes)?;
+                Some(vec![answer])
+            }
+            Step::Over => Some(Vec::new()),
+            Step::Foreign => None,
+        })
+    }
+
+    fn upload_block(
+        &mut self,
+        now: Mono,
+        request: [u8; 8],
+        object: ObjectId,
+        memory: &mut dyn Dictionary,
+    ) -> Result<[u8; 8], Abort> {
+        self.transfer = Transfer::None;
+        let bytes = memory.upload(object)?;
+        let threshold = usize::from(request[5]);
+        if threshold > 0 && bytes.len() <= threshold {
+            return self.upload(now, object, memory);
+        }
+        let (block, answer) = sdo_block::offer(request, bytes)?;
+        self.transfer = Transfer::Block { object, block, until: now + PATIENCE };
+        Ok(answer)
+    }
+
+    fn download_block(
+        &mut self,
+        now: Mono,
+        request: [u8; 8],
+        object: ObjectId,
+        memory: &mut dyn Dictionary,
+    ) -> Result<[u8; 8], Abort> {
+        self.transfer = Transfer::None;
+        let data = [request[4], request[5], request[6], request[7]];
+        let announced = announced(request[0] & 0b10 != 0, data, memory.width(object)?)?;
+        let (block, answer) = sdo_block::accept(request, announced);
+        self.transfer = Transfer::Block { object, block, until: now + PATIENCE };
+        Ok(answer)
     }
 
     fn upload(&mut self, now: Mono, object: ObjectId, memory: &mut dyn Dictionary) -> Result<[u8; 8], Abort> {
@@ -190,18 +280,7 @@ impl SdoServer {
         if self.style.expedited_only {
             return Err(Abort::COMMAND);
         }
-        let announced = if sized {
-            let size = usize::try_from(u32::from_le_bytes(data)).map_err(|_| Abort::MEMORY)?;
-            if size > LONGEST {
-                return Err(Abort::MEMORY);
-            }
-            if width.is_some_and(|width| width != size) {
-                return Err(Abort::LENGTH);
-            }
-            Some(size)
-        } else {
-            None
-        };
+        let announced = announced(sized, data, width)?;
         self.transfer =
             Transfer::Download { object, announced, bytes: Vec::new(), toggle: false, until: now + PATIENCE };
         Ok(frame(0x60, object, [0; 4]))
@@ -236,6 +315,21 @@ impl SdoServer {
     }
 }
 
+/// The announced size, if there is one and it makes sense.
+fn announced(sized: bool, data: [u8; 4], width: Option<usize>) -> Result<Option<usize>, Abort> {
+    if !sized {
+        return Ok(None);
+    }
+    let size = usize::try_from(u32::from_le_bytes(data)).map_err(|_| Abort::MEMORY)?;
+    if size > LONGEST {
+        return Err(Abort::MEMORY);
+    }
+    if width.is_some_and(|width| width != size) {
+        return Err(Abort::LENGTH);
+    }
+    Ok(Some(size))
+}
+
 fn frame(command: u8, object: ObjectId, data: [u8; 4]) -> [u8; 8] {
     let [low, high] = object.index.to_le_bytes();
     [command, low, high, object.sub, data[0], data[1], data[2], data[3]]
@@ -246,223 +340,4 @@ fn abort(object: ObjectId, Abort(code): Abort) -> [u8; 8] {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::canopen::value::parse_hex;
-    use proptest::prelude::*;
-    use std::collections::BTreeMap;
-
-    /// Entries with their values; 2000h is a text of any length, 2001h cannot be written.
-    #[derive(Default)]
-    struct Memory(BTreeMap<ObjectId, Vec<u8>>);
-
-    impl Dictionary for Memory {
-        fn upload(&mut self, object: ObjectId) -> Result<Vec<u8>, Abort> {
-            self.0.get(&object).cloned().ok_or(Abort::NO_OBJECT)
-        }
-
-        fn width(&self, object: ObjectId) -> Result<Option<usize>, Abort> {
-            match object.index {
-                0x2000 => Ok(None),
-                0x2001 => Err(Abort::READ_ONLY),
-                _ => self.0.get(&object).map(|value| Some(value.len())).ok_or(Abort::NO_OBJECT),
-            }
-        }
-
-        fn download(&mut self, object: ObjectId, bytes: &[u8]) -> Result<(), Abort> {
-            match self.width(object)? {
-                Some(width) if width != bytes.len() => Err(Abort::LENGTH),
-                _ => {
-                    self.0.insert(object, bytes.to_vec());
-                    Ok(())
-                }
-            }
-        }
-    }
-
-    fn memory() -> Memory {
-        Memory(BTreeMap::from([
-            (ObjectId::new(0x1000, 0), vec![0x94, 0x01, 0x82, 0x00]),
-            (ObjectId::new(0x1001, 0), vec![0x11]),
-            (ObjectId::new(0x1017, 0), vec![0, 0]),
-            (ObjectId::new(0x1008, 0), b"MH-4-CAN".to_vec()),
-            (ObjectId::new(0x1009, 0), b"1.0".to_vec()),
-            (ObjectId::new(0x2000, 0), Vec::new()),
-            (ObjectId::new(0x2001, 0), vec![0]),
-        ]))
-    }
-
-    fn style(text: &str) -> SdoStyle {
-        toml::from_str(text).expect("a style")
-    }
-
-    /// Plays request and answer lines; `-` is silence.
-    fn transcript(server: &mut SdoServer, memory: &mut Memory, lines: &[(&str, &str)]) {
-        for (request, answer) in lines {
-            let bytes: [u8; 8] = parse_hex(request).expect("bytes").try_into().expect("eight");
-            let found = server.request(Mono::START, bytes, memory);
-            let found = found.map_or("-".to_owned(), |bytes| bytes.iter().map(|byte| format!("{byte:02X}")).collect());
-            assert_eq!(found, *answer, "after {request}");
-        }
-    }
-
-    #[test]
-    fn expedited() {
-        let mut memory = memory();
-        let mut server = SdoServer::new(SdoStyle::default(), false);
-        transcript(
-            &mut server,
-            &mut memory,
-            &[
-                ("4000100000000000", "4300100094018200"),
-                ("4001100000000000", "4F01100011000000"),
-                ("4017100000000000", "4B17100000000000"),
-                ("4009100000000000", "47091000312E3000"),
-                ("2B171000E8030000", "6017100000000000"),
-                ("4017100000000000", "4B171000E8030000"),
-                // Size not indicated: as much as the type has.
-                ("2217100064000000", "6017100000000000"),
-                ("4017100000000000", "4B17100064000000"),
-                ("2217100000000100", "8017100010000706"),
-                // Wrong length, no such object, read only.
-                ("2F17100001000000", "8017100010000706"),
-                ("2317100001000000", "8017100010000706"),
-                ("2F99290001000000", "8099290000000206"),
-                ("4099290000000000", "8099290000000206"),
-                ("2F01200001000000", "8001200002000106"),
-                ("4017100000000000", "4B17100064000000"),
-            ],
-        );
-    }
-
-    #[test]
-    fn sizes_omitted_as_d20_and_dps_do() {
-        let mut memory = memory();
-        let mut server = SdoServer::new(style("size = \"omitted\"\nexpedited_only = true"), false);
-        transcript(
-            &mut server,
-            &mut memory,
-            &[
-                ("4000100000000000", "4200100094018200"),
-                ("4001100000000000", "4201100011000000"),
-                ("4009100000000000", "42091000312E3000"),
-                ("2217100064000000", "6017100000000000"),
-                ("2B17100065000000", "6017100000000000"),
-                ("4017100000000000", "4217100065000000"),
-                // No segmented transfer, in neither direction.
-                ("4008100000000000", "8008100000000008"),
-                ("2100200005000000", "8000200001000405"),
-                ("6000000000000000", "8000000001000405"),
-            ],
-        );
-        let mut quirky = SdoServer::new(style("size = \"omitted\""), true);
-        transcript(&mut quirky, &mut memory, &[("4000100000000000", "6000100094018200")]);
-    }
-
-    #[test]
-    fn segmented_upload() {
-        let mut memory = memory();
-        let mut server = SdoServer::new(SdoStyle::default(), false);
-        transcript(
-            &mut server,
-            &mut memory,
-            &[
-                ("4008100000000000", "4108100008000000"),
-                ("6000000000000000", "004D482D342D4341"),
-                ("7000000000000000", "1D4E000000000000"),
-                // Over: another segment is a wrong command.
-                ("6000000000000000", "8000000001000405"),
-                // Toggle wrong: the transfer is over and the abort names the object.
-                ("4008100000000000", "4108100008000000"),
-                ("7000000000000000", "8008100000000305"),
-                ("6000000000000000", "8000000001000405"),
-                // Nothing at all cannot be expedited.
-                ("4000200000000000", "4100200000000000"),
-                ("6000000000000000", "0F00000000000000"),
-                // A new request replaces the transfer; an abort of the client ends it without an answer.
-                ("4008100000000000", "4108100008000000"),
-                ("4001100000000000", "4F01100011000000"),
-                ("7000000000000000", "8000000001000405"),
-                ("4008100000000000", "4108100008000000"),
-                ("8008100000000405", "-"),
-                ("6000000000000000", "8000000001000405"),
-            ],
-        );
-    }
-
-    #[test]
-    fn segmented_download() {
-        let mut memory = memory();
-        let mut server = SdoServer::new(SdoStyle::default(), false);
-        transcript(
-            &mut server,
-            &mut memory,
-            &[
-                ("2100200009000000", "6000200000000000"),
-                ("0041424344454647", "2000000000000000"),
-                ("1B48490000000000", "3000000000000000"),
-            ],
-        );
-        assert_eq!(memory.0[&ObjectId::new(0x2000, 0)], b"ABCDEFGHI");
-        transcript(
-            &mut server,
-            &mut memory,
-            &[
-                // Without a size; a small number may come in segments, too.
-                ("2017100000000000", "6017100000000000"),
-                ("0B01020000000000", "2000000000000000"),
-                ("4017100000000000", "4B17100001020000"),
-                // Announced and delivered differ.
-                ("2100200009000000", "6000200000000000"),
-                ("0B41420000000000", "8000200010000706"),
-                // Announced does not fit the type.
-                ("2117100004000000", "8017100010000706"),
-                // Toggle wrong.
-                ("2100200009000000", "6000200000000000"),
-                ("1041424344454647", "8000200000000305"),
-                ("0041424344454647", "8000000001000405"),
-                // Too long, read only.
-                ("2100200001040000", "8000200005000405"),
-                ("2101200009000000", "8001200002000106"),
-            ],
-        );
-        assert_eq!(memory.0[&ObjectId::new(0x2000, 0)], b"ABCDEFGHI", "a failed transfer changes nothing");
-    }
-
-    #[test]
-    fn block_transfer_is_not_offered() {
-        let mut server = SdoServer::new(SdoStyle::default(), false);
-        transcript(
-            &mut server,
-            &mut memory(),
-            &[
-                ("A008100020000000", "8008100001000405"),
-                ("C200200009000000", "8000200001000405"),
-                ("E000000000000000", "8000000001000405"),
-            ],
-        );
-    }
-
-    #[test]
-    fn a_client_that_stays_away_is_given_up() {
-        let mut server = SdoServer::new(SdoStyle::default(), false);
-        assert_eq!(server.deadline(), None);
-        transcript(&mut server, &mut memory(), &[("4008100000000000", "4108100008000000")]);
-        assert_eq!(server.deadline(), Some(Mono::at(PATIENCE)));
-        assert_eq!(server.give_up(), Some([0x80, 0x08, 0x10, 0, 0, 0, 0x04, 0x05]));
-        assert_eq!(server.deadline(), None);
-        assert_eq!(server.give_up(), None);
-    }
-
-    proptest! {
-        #[test]
-        fn any_request_is_answered_or_dropped(requests in proptest::collection::vec(any::<[u8; 8]>(), 1..40)) {
-            let mut memory = memory();
-            let mut server = SdoServer::new(SdoStyle::default(), false);
-            for request in requests {
-                let answer = server.request(Mono::START, request, &mut memory);
-                prop_assert_eq!(answer.is_none(), request[0] >> 5 == 4);
-            }
-        }
-    }
-}
+mod tests;

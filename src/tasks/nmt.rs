@@ -4,6 +4,14 @@
 //! has no SDO, so its silence after an answer proves `stopped`, and an answer proves no more than the
 //! contrary.
 
+mod probe;
+mod startup;
+mod watch;
+
+pub use probe::{Probe, probe};
+pub use startup::{Starts, StartupReport, startup};
+pub use watch::{Change, Seen, watch};
+
 use crate::bus::{BusError, Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};

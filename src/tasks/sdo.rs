@@ -7,6 +7,7 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::catalog::{Model, standard};
 use crate::device::description::SizeIndication;
 use crate::device::dictionary::Entry;
+use crate::master::transfer::{BlockMode, Moved, read_object};
 use crate::master::{Error, Master, Request, SdoError, SdoFailure};
 use crate::measure::survey::{Overrides, recognised};
 use crate::tasks::{Failure, Kind};
@@ -19,6 +20,16 @@ pub struct Knowledge {
     overrides: Overrides,
     /// Looked for once; `None` inside: not a device that is known.
     model: Option<Option<Arc<Model>>>,
+}
+
+/// How bytes travel, and who hears of it.
+pub struct Options<'a> {
+    /// When block transfer is used.
+    pub blocks: BlockMode,
+    /// Whether writes say how many bytes they carry.
+    pub size: SizeMode,
+    /// Hears every 100 ms of bytes moved, and of how many there are where that is known.
+    pub progress: &'a mut dyn FnMut(Moved),
 }
 
 /// A value read.
@@ -80,6 +91,15 @@ impl Knowledge {
         Ok(self.model(master)?.and_then(|model| model.dictionary.get(object).cloned()))
     }
 
+    /// The type of an entry, where its description does not leave it open.
+    fn type_of(&self, entry: Option<&Entry>) -> Option<DataType> {
+        let open = |entry: &&Entry| match &self.model {
+            Some(Some(model)) => model.untyped.contains(&entry.object),
+            _ => false,
+        };
+        entry.filter(|entry| !open(entry)).map(|entry| entry.data_type)
+    }
+
     /// The object of a name.
     ///
     /// # Errors
@@ -132,14 +152,16 @@ pub fn read(
     knowledge: &mut Knowledge,
     object: ObjectId,
     data_type: Option<DataType>,
+    options: &mut Options<'_>,
 ) -> Result<ReadValue, Failure> {
     let node = knowledge.node;
-    let answer = master.transfer_one(Request::read(node, object))??;
+    let expected = data_type.or_else(|| knowledge.type_of(knowledge.offline(object)));
+    let answer = read_object(master, (node, object), expected, options.blocks, options.progress)??;
     let entry = match data_type {
         Some(_) => knowledge.offline(object).cloned(),
         None => knowledge.entry(master, object)?,
     };
-    let data_type = data_type.or(entry.as_ref().map(|entry| entry.data_type));
+    let data_type = data_type.or(knowledge.type_of(entry.as_ref()));
     let (value, note) = answer.value(node, object, data_type)?;
     let raw = answer.uploaded.map(|uploaded| uploaded.bytes).unwrap_or_default();
     let raw = match data_type.and_then(DataType::width) {
@@ -161,10 +183,14 @@ pub fn encode(
     data_type: Option<DataType>,
     text: &str,
 ) -> Result<(Vec<u8>, DataType), Failure> {
-    let usage = |error: String| Failure::of_node(Kind::Usage, knowledge.node, format!("write {object}: {error}"));
+    let node = knowledge.node;
+    let usage = |error: String| Failure::of_node(Kind::Usage, node, format!("write {object}: {error}"));
     let known = match data_type {
         Some(data_type) => Some(data_type),
-        None => knowledge.clone().entry(master, object)?.map(|entry| entry.data_type),
+        None => {
+            let entry = knowledge.entry(master, object)?;
+            knowledge.type_of(entry.as_ref())
+        }
     };
     if let Some(data_type) = known {
         return Ok((data_type.encode_text(text).map_err(|error| usage(error.to_string()))?, data_type));
@@ -193,28 +219,47 @@ pub fn encode(
     }
 }
 
-/// Writes bytes to an object. Sizes are indicated unless the description says that the device omits them;
+/// Whether writes say how many bytes they carry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SizeMode {
+    /// They do.
+    Indicated,
+    /// They do not (22h).
+    Omitted,
+    /// As the description says, else they do; and once the other way where the device takes that amiss.
+    #[default]
+    Auto,
+}
+
+/// Writes bytes to an object. With [`SizeMode::Auto`] sizes are indicated unless the description says that the device omits them;
 /// a device that takes the command specifier or the length amiss is asked once more the other way.
 ///
 /// # Errors
 /// The device's refusal, silence or breach of the protocol.
-pub fn write(master: &mut Master<'_>, knowledge: &Knowledge, object: ObjectId, data: &[u8]) -> Result<(), Failure> {
+pub fn write(
+    master: &mut Master<'_>,
+    knowledge: &Knowledge,
+    object: ObjectId,
+    data: &[u8],
+    options: &mut Options<'_>,
+) -> Result<(), Failure> {
+    let mode = options.size;
     let omits = matches!(&knowledge.model, Some(Some(model)) if model.description.sdo.size == SizeIndication::Omitted);
-    let sizes = if omits {
+    let sizes = if omits && mode == SizeMode::Auto || mode == SizeMode::Omitted {
         [DownloadSize::Omitted, DownloadSize::Indicated]
     } else {
         [DownloadSize::Indicated, DownloadSize::Omitted]
     };
     let node = knowledge.node;
     let request = |size| {
-        let request = Request::write(node, object, data.to_vec(), size);
+        let request = Request::write(node, object, data.to_vec(), size).blocks(options.blocks.for_write(data.len()));
         // A signature acts: sent twice it may act twice.
         if is_signature(data) { request.once() } else { request }
     };
-    let first = master.transfer_one(request(sizes[0]))?;
+    let first = master.carry_out(request(sizes[0]), options.progress)?;
     match first {
         Err(SdoError { failure: SdoFailure::Refused(AbortCode::COMMAND_SPECIFIER | AbortCode::LENGTH), .. })
-            if (1..=4).contains(&data.len()) =>
+            if mode == SizeMode::Auto && (1..=4).contains(&data.len()) =>
         {
             // If the other way is refused too, the first refusal is the one that counts.
             match master.transfer_one(request(sizes[1]))? {
@@ -227,7 +272,9 @@ pub fn write(master: &mut Master<'_>, knowledge: &Knowledge, object: ObjectId, d
     }
 }
 
-fn is_signature(data: &[u8]) -> bool {
+/// Whether these bytes are a signature (save, load, zero, or a number with "set"): it acts, and what is
+/// read back is something else (2321h, for example, the detected bit rate).
+pub fn is_signature(data: &[u8]) -> bool {
     data == b"save" || data == b"load" || data == b"zero" || data.len() == 4 && data[1..] == *b"set"
 }
 

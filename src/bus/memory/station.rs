@@ -49,6 +49,11 @@ impl Outbox {
         self.frames.pop_front()
     }
 
+    /// Forgets the waiting frames that `keep` does not want.
+    pub fn retain(&mut self, keep: impl FnMut(&Frame) -> bool) {
+        self.frames.retain(keep);
+    }
+
     /// Forgets every waiting frame, as a reset does.
     pub fn clear(&mut self) {
         self.frames.clear();

@@ -13,6 +13,12 @@ impl AbortCode {
     pub const TIMEOUT: AbortCode = AbortCode(0x0504_0000);
     /// Command specifier not valid or unknown.
     pub const COMMAND_SPECIFIER: AbortCode = AbortCode(0x0504_0001);
+    /// Invalid block size.
+    pub const BLOCK_SIZE: AbortCode = AbortCode(0x0504_0002);
+    /// Invalid sequence number.
+    pub const SEQUENCE: AbortCode = AbortCode(0x0504_0003);
+    /// CRC error.
+    pub const CRC: AbortCode = AbortCode(0x0504_0004);
     /// Out of memory.
     pub const OUT_OF_MEMORY: AbortCode = AbortCode(0x0504_0005);
     /// Object does not exist.
@@ -27,6 +33,10 @@ impl AbortCode {
     pub const NO_SUB_INDEX: AbortCode = AbortCode(0x0609_0011);
     /// Read of a write-only object.
     pub const WRITE_ONLY: AbortCode = AbortCode(0x0601_0001);
+    /// Write of a read-only object.
+    pub const READ_ONLY: AbortCode = AbortCode(0x0601_0002);
+    /// General error.
+    pub const GENERAL: AbortCode = AbortCode(0x0800_0000);
 
     /// What the standard says the code means; `None` for codes that it does not know.
     pub fn meaning(self) -> Option<&'static str> {

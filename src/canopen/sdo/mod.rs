@@ -4,11 +4,19 @@
 //! how the transfer ended. It never waits: time-outs are told to it.
 
 mod abort;
+mod block_download;
+mod block_size;
+mod block_upload;
+mod crc;
 mod download;
 mod fit;
 mod upload;
 
 pub use abort::AbortCode;
+pub use block_download::BlockDownload;
+pub use block_size::BlockSize;
+pub use block_upload::BlockUpload;
+pub use crc::crc16;
 pub use download::{Download, DownloadSize};
 pub use fit::{FitError, Fitted, Note, fit};
 pub use upload::{Upload, Uploaded};
@@ -20,7 +28,7 @@ use super::object::ObjectId;
 /// How a machine took a frame or a time-out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Progress<T> {
-    /// The frame is no part of this transfer; nothing has changed.
+    /// The frame is no part of this transfer, or a part that has come before; nothing has changed.
     NotOurs,
     /// The transfer goes on.
     Continue,
@@ -28,6 +36,18 @@ pub enum Progress<T> {
     Done(T),
     /// The transfer is over without a result.
     Failed(TransferError),
+}
+
+impl<T> Progress<T> {
+    /// The same with another result.
+    pub fn map<U>(self, result: impl FnOnce(T) -> U) -> Progress<U> {
+        match self {
+            Progress::NotOurs => Progress::NotOurs,
+            Progress::Continue => Progress::Continue,
+            Progress::Done(done) => Progress::Done(result(done)),
+            Progress::Failed(error) => Progress::Failed(error),
+        }
+    }
 }
 
 /// Why a transfer has no result.
@@ -56,7 +76,28 @@ pub enum Violation {
     /// More bytes than any object of a measuring device has.
     #[error("transfer without end")]
     TooLong,
+    /// Too few bytes to say what it must say.
+    #[error("frame too short")]
+    Short,
+    /// No block size from 1 to 127.
+    #[error("invalid block size")]
+    BlockSize,
+    /// The acknowledge of segments that have not been sent.
+    #[error("acknowledge of segments that were not sent")]
+    Sequence,
+    /// One sub-block after the other of which nothing arrives.
+    #[error("no segment gets through")]
+    Stuck,
+    /// The data of a block transfer and its CRC do not fit together.
+    #[error("CRC does not match the data")]
+    Crc,
+    /// Another size than announced, and segments had to be sent again: something was mixed up.
+    #[error("another size than announced after lost segments")]
+    Size,
 }
+
+/// How many sub-blocks in a row may bring nothing before a block transfer is given up.
+const PATIENCE: u8 = 3;
 
 impl Violation {
     /// The abort code that tells the server.
@@ -65,6 +106,11 @@ impl Violation {
             Violation::WriteAcknowledgeToRead | Violation::Command => AbortCode::COMMAND_SPECIFIER,
             Violation::Toggle => AbortCode::TOGGLE,
             Violation::TooLong => AbortCode::OUT_OF_MEMORY,
+            Violation::Short => AbortCode::GENERAL,
+            Violation::BlockSize => AbortCode::BLOCK_SIZE,
+            Violation::Sequence | Violation::Stuck => AbortCode::SEQUENCE,
+            Violation::Crc => AbortCode::CRC,
+            Violation::Size => AbortCode::LENGTH,
         }
     }
 }

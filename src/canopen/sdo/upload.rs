@@ -6,7 +6,7 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 
 /// More than this no object has; it bounds what a server that never ends can make us keep.
-const LONGEST: usize = 64 << 20;
+pub(super) const LONGEST: usize = 64 << 20;
 
 /// What a device answered to a read.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,0 +1,330 @@
+//! The client's block transfer against a server of its own, over a line that loses, doubles and swaps frames:
+//! what is reported as done is done, everything ends, and no server is left in the middle of a transfer.
+
+mod server;
+mod through_master;
+
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::sdo::{BlockDownload, BlockSize, BlockUpload, DownloadSize, Progress, TransferError};
+use proptest::prelude::*;
+use server::{Manner, Server};
+use std::collections::VecDeque;
+
+const OBJECT: ObjectId = ObjectId::new(0x2000, 1);
+
+fn node() -> NodeId {
+    NodeId::new(5).unwrap()
+}
+
+/// What happens to one frame on its way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fate {
+    Arrives,
+    Lost,
+    Doubled,
+    /// Arrives behind the next one.
+    Swapped,
+}
+
+/// A line on which the n-th frame meets the n-th fate, and every frame after the last fate arrives.
+struct Line {
+    fates: VecDeque<Fate>,
+    spare_aborts: bool,
+    swapped: Option<Frame>,
+    at_server: VecDeque<Frame>,
+    at_client: VecDeque<Frame>,
+}
+
+impl Line {
+    fn new(fates: Vec<Fate>, spare_aborts: bool) -> Line {
+        let fates = fates.into();
+        Line { fates, spare_aborts, swapped: None, at_server: VecDeque::new(), at_client: VecDeque::new() }
+    }
+
+    fn carry(&mut self, frame: Frame, to_server: bool) {
+        let is_abort = frame.data()[0] == 0x80;
+        let fate = match self.fates.pop_front() {
+            Some(fate) if !(is_abort && self.spare_aborts) => fate,
+            _ => Fate::Arrives,
+        };
+        let end = if to_server { &mut self.at_server } else { &mut self.at_client };
+        match fate {
+            Fate::Lost => {}
+            Fate::Arrives => end.push_back(frame),
+            Fate::Doubled => end.extend([frame, frame]),
+            Fate::Swapped => {
+                if let Some(earlier) = self.swapped.replace(frame) {
+                    end.push_back(earlier);
+                }
+                return;
+            }
+        }
+        // Swapped frames are only overtaken by those of the same sender.
+        if self.swapped.is_some_and(|swapped| swapped.id() == frame.id())
+            && let Some(swapped) = self.swapped.take()
+        {
+            end.push_back(swapped);
+        }
+    }
+
+    /// Nothing moves any more: what was to be overtaken comes now.
+    fn settle(&mut self) {
+        if let Some(frame) = self.swapped.take() {
+            let to_server = frame.id().sdo_request_node().is_some();
+            if to_server { self.at_server.push_back(frame) } else { self.at_client.push_back(frame) }
+        }
+    }
+}
+
+trait Client {
+    type Result;
+    fn request(&self) -> Frame;
+    fn take(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Self::Result>;
+    fn on_sent(&mut self);
+    fn time_out(&mut self, out: &mut Vec<Frame>) -> Option<TransferError>;
+}
+
+impl Client for BlockDownload {
+    type Result = ();
+    fn request(&self) -> Frame {
+        BlockDownload::request(self)
+    }
+    fn take(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<()> {
+        self.on_frame(frame, out)
+    }
+    fn on_sent(&mut self) {
+        BlockDownload::on_sent(self);
+    }
+    fn time_out(&mut self, out: &mut Vec<Frame>) -> Option<TransferError> {
+        Some(self.on_timeout(out))
+    }
+}
+
+impl Client for BlockUpload {
+    type Result = Vec<u8>;
+    fn request(&self) -> Frame {
+        BlockUpload::request(self)
+    }
+    fn take(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Vec<u8>> {
+        self.on_frame(frame, out).map(|uploaded| uploaded.bytes)
+    }
+    fn on_sent(&mut self) {}
+    fn time_out(&mut self, out: &mut Vec<Frame>) -> Option<TransferError> {
+        self.on_timeout(out)
+    }
+}
+
+/// Lets both talk until the client has a result and the line is quiet. The client's frames go out one at a
+/// time; what the server has said by then is heard in between.
+fn run<C: Client>(client: &mut C, server: &mut Server, mut line: Line) -> Result<C::Result, TransferError> {
+    let mut waiting = VecDeque::from([client.request()]);
+    let mut result = None;
+    for _ in 0..100_000 {
+        let mut out = Vec::new();
+        if let Some(frame) = line.at_client.pop_front() {
+            if result.is_some() {
+                continue;
+            }
+            match client.take(&frame, &mut out) {
+                Progress::NotOurs => {}
+                Progress::Continue if out.is_empty() => {}
+                Progress::Continue => waiting.clear(),
+                Progress::Done(done) => {
+                    waiting.clear();
+                    result = Some(Ok(done));
+                }
+                Progress::Failed(error) => {
+                    waiting.clear();
+                    result = Some(Err(error));
+                }
+            }
+            waiting.extend(out);
+        } else if let Some(frame) = line.at_server.pop_front() {
+            for answer in server.on_frame(&frame) {
+                line.carry(answer, false);
+            }
+        } else if let Some(frame) = waiting.pop_front() {
+            client.on_sent();
+            line.carry(frame, true);
+        } else if line.swapped.is_some() {
+            line.settle();
+        } else if let Some(result) = result {
+            return result;
+        } else {
+            let error = client.time_out(&mut out);
+            result = error.map(Err);
+            waiting.extend(out);
+        }
+    }
+    panic!("no end");
+}
+
+fn data() -> impl Strategy<Value = Vec<u8>> {
+    // Sizes around the ends of segments and sub-blocks, and contents that repeat.
+    let sizes = prop_oneof![0..40usize, 880..900usize, 1770..1790usize, 0..3000usize];
+    (sizes, any::<u8>(), any::<bool>()).prop_map(|(size, first, constant)| {
+        (0..size).map(|at| if constant { first } else { first.wrapping_add((at % 251).to_le_bytes()[0]) }).collect()
+    })
+}
+
+fn manner(crc: impl Strategy<Value = bool>) -> impl Strategy<Value = Manner> {
+    let block_size = prop_oneof![1..=8u8, Just(127), 1..=127u8];
+    (crc, any::<bool>(), prop::collection::vec(block_size, 1..4), any::<bool>())
+        .prop_map(|(crc, announces, block_sizes, hasty)| Manner { crc, announces, block_sizes, hasty })
+}
+
+fn fates(kinds: &'static [Fate]) -> impl Strategy<Value = Vec<Fate>> {
+    let fate = prop_oneof![12 => Just(Fate::Arrives), 1 => prop::sample::select(kinds)];
+    // Now and then a long quiet start, so that the end of the transfer gets its share.
+    (0..400usize, prop::collection::vec(fate, 0..80))
+        .prop_map(|(quiet, fates)| std::iter::repeat_n(Fate::Arrives, quiet / 2).chain(fates).collect())
+}
+
+const LOSSES: &[Fate] = &[Fate::Lost];
+const EVERYTHING: &[Fate] = &[Fate::Lost, Fate::Doubled, Fate::Swapped];
+
+fn download(data: &[u8], size: DownloadSize, manner: Manner, line: Line) -> (Result<(), TransferError>, Server) {
+    let mut server = Server::new(node(), b"before".to_vec(), manner);
+    let mut client = BlockDownload::new(node(), OBJECT, data.to_vec(), size);
+    let result = run(&mut client, &mut server, line);
+    (result, server)
+}
+
+fn upload(data: &[u8], block_size: u8, manner: Manner, line: Line) -> (Result<Vec<u8>, TransferError>, Server) {
+    let mut server = Server::new(node(), data.to_vec(), manner);
+    let mut client = BlockUpload::new(node(), OBJECT, 0, false);
+    client = client.with_block_size(BlockSize::new(block_size).unwrap());
+    let result = run(&mut client, &mut server, line);
+    (result, server)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_good_line_carries_everything(data in data(), manner in manner(any::<bool>()), block_size in 1..=127u8) {
+        for size in [DownloadSize::Indicated, DownloadSize::Omitted] {
+            let (result, server) = download(&data, size, manner.clone(), Line::new(Vec::new(), false));
+            prop_assert_eq!(result, Ok(()));
+            prop_assert!(server.is_idle());
+            prop_assert!(server.object == data);
+        }
+        let (result, server) = upload(&data, block_size, manner, Line::new(Vec::new(), false));
+        prop_assert!(result == Ok(data));
+        prop_assert!(server.is_idle());
+    }
+
+    /// Without any proof by CRC or size: lost frames alone never make a wrong success. (A hasty server does
+    /// not know which sub-block a segment is of when its acknowledge was lost; it needs the size.)
+    #[test]
+    fn a_download_that_loses_frames_is_right_or_fails(
+        data in data(), mut manner in manner(any::<bool>()), omit in any::<bool>(), fates in fates(LOSSES)
+    ) {
+        manner.hasty &= !omit;
+        let size = if omit { DownloadSize::Omitted } else { DownloadSize::Indicated };
+        let (result, server) = download(&data, size, manner, Line::new(fates, true));
+        match result {
+            Ok(()) => prop_assert!(server.object == data),
+            // The answer to the very last frame may be the one that was lost.
+            Err(TransferError::NoAnswer) => prop_assert!(server.object == b"before" || server.object == data),
+            Err(_) => prop_assert!(server.object == b"before"),
+        }
+    }
+
+    #[test]
+    fn an_upload_that_loses_frames_is_right_or_fails(
+        data in data(), manner in manner(any::<bool>()), block_size in 1..=127u8, fates in fates(LOSSES)
+    ) {
+        let (result, _) = upload(&data, block_size, manner, Line::new(fates, true));
+        if let Ok(bytes) = result {
+            prop_assert!(bytes == data);
+        }
+    }
+
+    /// Whatever the line does, with the CRC. It does not see how many zeros come first; the size does.
+    #[test]
+    fn a_download_over_a_bad_line_is_right_or_fails(
+        data in data(), manner in manner(Just(true)), fates in fates(EVERYTHING)
+    ) {
+        let (result, server) = download(&data, DownloadSize::Indicated, manner, Line::new(fates, true));
+        if result.is_ok() {
+            prop_assert!(server.object == data);
+        } else {
+            prop_assert!(server.object == b"before" || server.object == data);
+        }
+    }
+
+    #[test]
+    fn an_upload_over_a_bad_line_is_right_or_fails(
+        data in data(), manner in manner(Just(true)), block_size in 2..=127u8, fates in fates(EVERYTHING)
+    ) {
+        prop_assume!(manner.announces || data.first() != Some(&0));
+        let (result, _) = upload(&data, block_size, manner, Line::new(fates, true));
+        if let Ok(bytes) = result {
+            prop_assert!(bytes == data);
+        }
+    }
+
+    /// Segments lost in the midst of a sub-block cost nothing but time.
+    #[test]
+    fn segments_lost_within_a_sub_block_come_again(
+        segments in 3..500usize, crc in any::<bool>(), hasty in any::<bool>(), lost in 0..126usize
+    ) {
+        let data: Vec<u8> = (0..7 * segments).map(|at| (at % 251).to_le_bytes()[0]).collect();
+        let lost = lost % (segments.min(127) - 1);
+        let manner = Manner { crc, announces: true, block_sizes: vec![127], hasty };
+        let fates = |before: usize| {
+            let mut fates = vec![Fate::Arrives; before + lost];
+            fates.push(Fate::Lost);
+            fates
+        };
+        // Two frames before the first segment of a download, three before that of an upload.
+        let (result, server) = download(&data, DownloadSize::Indicated, manner.clone(), Line::new(fates(2), false));
+        prop_assert_eq!(result, Ok(()));
+        prop_assert!(server.object == data);
+        let (result, server) = upload(&data, 127, manner, Line::new(fates(3), false));
+        prop_assert!(result == Ok(data));
+        prop_assert!(server.is_idle());
+    }
+
+    /// Any bytes at any moment: the machines neither panic nor go on for ever.
+    #[test]
+    fn decoding_is_total(
+        frames in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..=8), 0..60),
+        heads in prop::collection::vec(prop::sample::select(&[
+            0xc6, 0xc4, 0xa4, 0xa0, 0xa2, 0xa1, 0xc1, 0xd9, 0x01, 0x02, 0x81, 0x82, 0x83, 0x80, 0x43, 0x41u8,
+        ][..]), 60),
+        length in 0..2000usize,
+    ) {
+        let mut upload = BlockUpload::new(node(), OBJECT, 28, true);
+        let mut write = BlockDownload::new(node(), OBJECT, vec![7; length], DownloadSize::Indicated);
+        let (mut reads, mut writes) = (true, true);
+        for (mut bytes, head) in frames.into_iter().zip(heads) {
+            if let Some(first) = bytes.first_mut() && *first % 4 != 0 {
+                *first = head;
+            }
+            if bytes.len() >= 4 && bytes[0] % 3 != 0 {
+                bytes[1..4].copy_from_slice(&OBJECT.multiplexer());
+            }
+            let frame = Frame::new(cangauge::canopen::id::CanId::sdo_response(node()), &bytes).unwrap();
+            let mut out = Vec::new();
+            if reads {
+                reads = !matches!(upload.on_frame(&frame, &mut out), Progress::Done(_) | Progress::Failed(_));
+                prop_assert!(out.len() <= 1);
+            }
+            out.clear();
+            if writes {
+                writes = !matches!(write.on_frame(&frame, &mut out), Progress::Done(()) | Progress::Failed(_));
+                out.iter().for_each(|_| write.on_sent());
+                prop_assert!(out.len() <= 127);
+            }
+        }
+        let mut silences = 0;
+        while upload.on_timeout(&mut Vec::new()).is_none() {
+            silences += 1;
+            prop_assert!(silences <= 3);
+        }
+    }
+}
