@@ -7,7 +7,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => return ExitCode::from(exit::usage(&error, std::env::args())),
+        Err(error) => return ExitCode::from(exit::usage(&error, std::env::args_os())),
     };
     match run(&cli) {
         Ok(()) => ExitCode::SUCCESS,

@@ -5,7 +5,10 @@ use crate::bus::BusError;
 use crate::master::{Error, SdoError};
 use crate::output::console::Console;
 use crate::tasks::{Failure, Kind};
-use clap::error::ErrorKind;
+use anstream::ColorChoice;
+use clap::CommandFactory;
+use clap::error::{ContextKind, ErrorKind};
+use std::ffi::OsString;
 use std::io;
 
 /// Several nodes that failed; the first one's kind is that of all.
@@ -45,36 +48,72 @@ fn code(kind: Kind) -> u8 {
 
 /// What the parser says, in the contract's form: help and version as they are, and an error on one line
 /// with a hint. `words` are those of the command line. Returns the exit code.
-pub fn usage(error: &clap::Error, mut words: impl Iterator<Item = String>) -> u8 {
+pub fn usage(error: &clap::Error, words: impl Iterator<Item = OsString>) -> u8 {
     if !error.use_stderr() || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         // A reader of the help that has gone has seen enough.
         let _ = error.print();
         return if error.use_stderr() { code(Kind::Usage) } else { 0 };
     }
+    let words: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
     let text = error.render().to_string();
     let paragraphs: Vec<&str> = text.split("\n\n").map(str::trim).collect();
-    let one_line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
     let first = paragraphs.first().map_or("", |first| first.trim_start_matches("error: "));
-    // What a value is wrong for says its own parser best.
-    let message = std::error::Error::source(error).map_or_else(|| first.to_owned(), |inner| inner.to_string());
     let tip = paragraphs.iter().find_map(|paragraph| paragraph.strip_prefix("tip: "));
-    let help = paragraphs
-        .iter()
-        .find_map(|paragraph| paragraph.strip_prefix("Usage: "))
-        .map(|usage| format!("usage: {}", one_line(usage)));
-    let failure = Failure {
-        hint: Some(tip.map(one_line).or(help).unwrap_or_else(|| "cangauge --help".to_owned())),
-        ..Failure::new(Kind::Usage, one_line(&message))
+    let usage = paragraphs.iter().find_map(|paragraph| paragraph.strip_prefix("Usage: "));
+    let hint = match (tip, usage) {
+        (Some(tip), _) => one_line(tip),
+        (None, Some(usage)) => format!("usage: {}", one_line(usage)),
+        (None, None) => help_for(&words),
     };
-    // Parsing has failed, so the option has to be looked for by hand.
-    let mut json = false;
-    while let Some(word) = words.next() {
-        json |= word == "--format=json" || word == "-fjson";
-        json |= (word == "--format" || word == "-f") && words.next().is_some_and(|form| form == "json");
-    }
-    let console = Console { quiet: false, verbose: 0, json, color: anstream::ColorChoice::Auto, progress: None };
+    let message = wrong_value(error).unwrap_or_else(|| one_line(first));
+    let failure = Failure::new(Kind::Usage, message).hint(hint);
+    let console =
+        Console { quiet: false, verbose: 0, json: wants_json(&words), color: ColorChoice::Auto, progress: None };
     console.fail(&failure, code(Kind::Usage));
     code(Kind::Usage)
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// What a value is wrong for says its own parser best; a parser that does not name the value is helped out.
+fn wrong_value(error: &clap::Error) -> Option<String> {
+    let inner = std::error::Error::source(error)?.to_string();
+    let (argument, value) = (error.get(ContextKind::InvalidArg)?, error.get(ContextKind::InvalidValue)?);
+    let named = inner.contains(&format!("\"{value}\""));
+    Some(if named { inner } else { format!("\"{value}\" for {argument}: {inner}") })
+}
+
+/// Parsing has failed, so the option has to be looked for by hand.
+fn wants_json(words: &[String]) -> bool {
+    let apart = words.windows(2).any(|pair| matches!(pair[0].as_str(), "-f" | "--format") && pair[1] == "json");
+    apart || words.iter().any(|word| word == "-fjson" || word == "--format=json")
+}
+
+/// The command line that shows the help of the command that was begun.
+fn help_for(words: &[String]) -> String {
+    let mut root = Cli::command();
+    root.build();
+    let (mut command, mut line) = (&root, root.get_name().to_owned());
+    let mut words = words.iter().skip(1);
+    while let Some(word) = words.next() {
+        if word.starts_with('-') {
+            let mut arguments = command.get_arguments().filter(|argument| argument.get_action().takes_values());
+            if arguments.any(|argument| {
+                argument.get_long().is_some_and(|long| *word == format!("--{long}"))
+                    || argument.get_short().is_some_and(|short| *word == format!("-{short}"))
+            }) {
+                words.next();
+            }
+        } else if let Some(below) = command.find_subcommand(word) {
+            command = below;
+            line = format!("{line} {word}");
+        } else {
+            break;
+        }
+    }
+    line + " --help"
 }
 
 /// Says what went wrong and returns the exit code.
