@@ -1613,7 +1613,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo__subcmd__read)
-            opts="-b -t -f -q -v -h -V --type --hex --output --block --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --type --hex --output --force --block --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0

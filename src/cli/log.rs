@@ -1,7 +1,8 @@
 //! `cangauge log`.
 
 use super::args::{Duration, Nodes, SignalArg};
-use super::exit::{FileError, stdout};
+use super::exit::stdout;
+use super::file::OutFile;
 use super::{Format, Global, When, open};
 use crate::bus::Stamp;
 use crate::bus::time::spoken;
@@ -15,7 +16,6 @@ use crate::output::summary;
 use crate::tasks::log::{Mode, Note, Observer, Outcome, Plan, log};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
-use std::fs::{File, OpenOptions};
 use std::io::{self, IsTerminal, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -43,10 +43,10 @@ pub(crate) struct Log {
     #[arg(short, long, value_name = "DUR")]
     duration: Option<Duration>,
     /// End after this many rows
-    #[arg(short = 'n', long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(short = 'n', long, value_name = "N", value_parser = positive)]
     count: Option<u64>,
     /// Send SYNC at this interval
-    #[arg(long, value_name = "DUR", conflicts_with_all = ["poll", "passive"])]
+    #[arg(long, value_name = "DUR", conflicts_with_all = ["poll", "passive"], value_parser = sync_period)]
     sync: Option<Duration>,
     /// Read by SDO at this interval
     #[arg(long, value_name = "DUR", conflicts_with = "passive")]
@@ -60,46 +60,39 @@ pub(crate) struct Log {
     /// Write to a file instead of stdout
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Overwrite the file
-    #[arg(long, requires = "output")]
+    /// Overwrite files that exist
+    #[arg(long)]
     force: bool,
     /// Write the summary as JSON to a file; - for stdout
     #[arg(long, value_name = "FILE")]
     summary: Option<PathBuf>,
 }
 
+fn positive(text: &str) -> Result<u64, String> {
+    text.parse()
+        .ok()
+        .filter(|&count| count > 0)
+        .ok_or_else(|| format!("\"{text}\" is not a number of rows (1 or more)"))
+}
+
+/// The shortest interval of SYNC.
+const SHORTEST_SYNC: std::time::Duration = std::time::Duration::from_millis(1);
+
+fn sync_period(text: &str) -> Result<Duration, String> {
+    let period: Duration = text.parse()?;
+    if period.0 < SHORTEST_SYNC { Err(format!("\"{text}\" is too short for SYNC (1ms or more)")) } else { Ok(period) }
+}
+
 impl Log {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let file = self.output.as_deref().map(|path| self.create(path)).transpose()?;
-        let result = self.record(global, file.as_ref());
-        if let (Some(path), Ok(None) | Err(_)) = (&self.output, &result) {
-            remove_if_empty(path, file.as_ref());
-        }
-        let Some(outcome) = result? else { return Ok(()) };
-        self.finish(&outcome)
+        let create = |path: &Path| OutFile::create(path, self.force);
+        let file = self.output.as_deref().map(create).transpose()?;
+        let summary = self.summary.as_deref().filter(|path| *path != Path::new("-")).map(create).transpose()?;
+        let outcome = self.record(global, file.as_ref())?;
+        self.finish(&outcome, summary)
     }
 
-    fn create(&self, path: &Path) -> anyhow::Result<File> {
-        let mut options = OpenOptions::new();
-        options.write(true);
-        let is_file = path.symlink_metadata().is_ok_and(|metadata| metadata.is_file());
-        let result = if self.force && is_file {
-            options.truncate(true).open(path)
-        } else if path.exists() && !is_file {
-            // A FIFO, a device, a link: opened as it is, as other programs do.
-            options.open(path)
-        } else {
-            options.create_new(true).open(path)
-        };
-        result.map_err(|source| match source.kind() {
-            io::ErrorKind::AlreadyExists => Failure::new(Kind::Usage, format!("{} exists", path.display()))
-                .hint("overwrite it with --force, or name another file")
-                .into(),
-            _ => FileError { what: format!("create {}", path.display()), source }.into(),
-        })
-    }
-
-    fn record(&self, global: &Global, file: Option<&File>) -> anyhow::Result<Option<Outcome>> {
+    fn record(&self, global: &Global, file: Option<&OutFile>) -> anyhow::Result<Outcome> {
         // Rows and live lines on one terminal would tear each other.
         let torn = global.progress == When::Auto && file.is_none() && io::stdout().is_terminal();
         let show = global.shows_progress() && !torn;
@@ -122,7 +115,7 @@ impl Log {
                 nmt: !self.no_nmt,
             };
             let target = match file {
-                Some(file) => Target::File(file.try_clone().map_err(|source| self.file_error(source))?),
+                Some(file) => Target::File(file.handle()?),
                 None => Target::Stream(Box::new(io::stdout())),
             };
             let mut screen = Screen { rows: Rows::new(target, form), progress, console, error: None, begun: None };
@@ -138,16 +131,20 @@ impl Log {
         let flushed = rows.flush();
         if let Some(error) = error.or(flushed.err()) {
             if rows.lost() > 0 && error.kind() != io::ErrorKind::BrokenPipe {
-                console.warn(&format!("{} rows could not be written", rows.lost()));
+                let word = if rows.lost() == 1 { "row" } else { "rows" };
+                console.warn(&format!("{} {word} could not be written", rows.lost()));
             }
-            return Err(self.row_error(error));
+            return Err(match file {
+                Some(file) => file.error(error),
+                None => stdout(error),
+            });
         }
         let outcome = outcome?;
         if let Some(failure) = outcome.nothing {
             return Err(failure.into());
         }
         summary::lines(&outcome).iter().for_each(|line| console.note(line));
-        Ok(Some(outcome))
+        Ok(outcome)
     }
 
     fn mode(&self) -> Mode {
@@ -159,26 +156,13 @@ impl Log {
         }
     }
 
-    fn file_error(&self, source: io::Error) -> anyhow::Error {
-        let name = self.output.as_ref().map_or_else(|| "stdout".to_owned(), |path| path.display().to_string());
-        FileError { what: format!("write {name}"), source }.into()
-    }
-
-    fn row_error(&self, error: io::Error) -> anyhow::Error {
-        if self.output.is_none() { stdout(error) } else { self.file_error(error) }
-    }
-
-    fn finish(&self, outcome: &Outcome) -> anyhow::Result<()> {
-        match self.summary.as_deref() {
-            None => {}
-            Some(path) if path == Path::new("-") => {
-                summary::json(&mut io::stdout().lock(), outcome).map_err(stdout)?;
-            }
-            Some(path) => {
-                let what = format!("write {}", path.display());
-                let wrap = |source| FileError { what: what.clone(), source };
-                let mut file = File::create(path).map_err(wrap)?;
-                summary::json(&mut file, outcome).and_then(|()| file.flush()).map_err(wrap)?;
+    fn finish(&self, outcome: &Outcome, file: Option<OutFile>) -> anyhow::Result<()> {
+        if self.summary.is_some() {
+            let mut text = Vec::new();
+            summary::json(&mut text, outcome)?;
+            match file {
+                Some(mut file) => file.write(&text)?,
+                None => io::stdout().lock().write_all(&text).map_err(stdout)?,
             }
         }
         match outcome.lost.as_slice() {
@@ -195,16 +179,6 @@ impl Log {
 
     fn all_lost(&self, outcome: &Outcome) -> bool {
         outcome.statistics.iter().all(|(source, _)| outcome.lost.contains(&source.node))
-    }
-}
-
-/// A file in which not one row came to stand was not there before and shall not be there now.
-fn remove_if_empty(path: &Path, file: Option<&File>) {
-    let length =
-        file.and_then(|file| file.metadata().ok()).filter(|metadata| metadata.is_file()).map(|metadata| metadata.len());
-    if length == Some(0) {
-        // What cannot be removed stays, with its header: nothing is lost by it.
-        let _ = std::fs::remove_file(path);
     }
 }
 

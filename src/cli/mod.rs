@@ -4,6 +4,7 @@
 pub mod args;
 mod completions;
 pub mod exit;
+mod file;
 mod log;
 mod nmt;
 mod open;

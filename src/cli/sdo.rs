@@ -2,6 +2,7 @@
 
 use super::args::ObjectArg;
 use super::exit::{FileError, stdout};
+use super::file::OutFile;
 use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -54,6 +55,9 @@ struct ReadArgs {
     /// Write the bytes to a file; - for stdout
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Overwrite the file
+    #[arg(long, requires = "output")]
+    force: bool,
     /// Whether to use block transfer: auto where it pays and the device offers it
     #[arg(long, value_name = "HOW", default_value = "auto")]
     block: Block,
@@ -151,6 +155,8 @@ impl ReadArgs {
         }
         let overrides = open::overrides(global, &[self.node])?;
         let mut knowledge = Knowledge::new(self.node, &overrides);
+        let target = self.output.as_deref().filter(|path| *path != Path::new("-"));
+        let mut file = target.map(|path| OutFile::create(path, self.force)).transpose()?;
         let bar = Transfer::new(global.shows_progress());
         let mut progress = |moved| bar.moved(moved);
         let mut options = Options { blocks: self.block.into(), size: SizeMode::Auto, progress: &mut progress };
@@ -162,8 +168,9 @@ impl ReadArgs {
                 if let Some(note) = value.note {
                     global.console().warn(&format!("node {}: {at}: {note}", self.node));
                 }
-                match &self.output {
-                    Some(path) => save(path, &value.raw)?,
+                match &mut file {
+                    Some(file) => file.write(&value.raw)?,
+                    None if self.output.is_some() => io::stdout().lock().write_all(&value.raw).map_err(stdout)?,
                     None => self.print(&value, object, global.format).map_err(stdout)?,
                 }
             }
@@ -204,14 +211,6 @@ impl ReadArgs {
             Format::Text => writeln!(out, "{object} {shown}"),
         }
     }
-}
-
-fn save(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    if path == Path::new("-") {
-        return io::stdout().lock().write_all(bytes).map_err(stdout);
-    }
-    let what = format!("write {}", path.display());
-    std::fs::write(path, bytes).map_err(|source| FileError { what, source }.into())
 }
 
 impl WriteArgs {

@@ -23,7 +23,8 @@ pub enum Form {
 /// Where rows go.
 #[derive(Debug)]
 pub enum Target {
-    /// A regular file: a row that could not be written whole is cut off again.
+    /// A regular file: what stood in it goes with the first row, and a row that could not be written whole is
+    /// cut off again.
     File(File),
     /// stdout, a pipe, a device.
     Stream(Box<dyn WriteDebug>),
@@ -46,7 +47,7 @@ pub struct Rows {
     target: Target,
     form: Form,
     block: Vec<u8>,
-    /// Lines in the block.
+    /// Rows in the block.
     waiting: u64,
     /// When the first of them was put there.
     since: Option<Mono>,
@@ -75,6 +76,12 @@ impl Rows {
 
     /// Adds a row.
     pub fn add(&mut self, sample: &Sample, source: &Source) -> io::Result<()> {
+        if self.first.is_none()
+            && let Target::File(file) = &self.target
+            && file.metadata()?.is_file()
+        {
+            file.set_len(0)?;
+        }
         let first = *self.first.get_or_insert(sample.at.mono);
         let elapsed = sample.at.mono.since(first);
         if std::mem::take(&mut self.header) {
@@ -119,7 +126,8 @@ impl Rows {
         let result = write_whole(&mut self.target, &self.block);
         if let Err((_, kept)) = &result {
             let lines = |bytes: &[u8]| bytes.iter().filter(|&&byte| byte == b'\n').count() as u64;
-            self.lost += lines(&self.block[*kept..]);
+            // The header is no row.
+            self.lost += lines(&self.block[*kept..]).min(self.waiting);
         }
         self.block.clear();
         self.waiting = 0;
