@@ -132,7 +132,6 @@ impl Targets {
     /// What is wrong with a node after a command. What cannot be confirmed is a failure only when asked to be.
     fn judge(&self, kind: NmtCommand, report: &Report, global: &Global) -> Option<Failure> {
         let wanted = kind.target();
-        let timeout = spoken(global.timing(crate::master::Timing::default().timeout).timeout);
         match (report.state, report.by) {
             // A device that starts by itself leaves PRE-OPERATIONAL at once after a reset.
             (Some(_), _) if kind.is_reset() => None,
@@ -142,18 +141,22 @@ impl Targets {
                 Some(Failure::of_node(Kind::Unexpected, report.node, message))
             }
             (None, _) => {
-                let why = if report.present {
-                    "sent, and nothing confirms it: no heartbeat (1017h is 0)".to_owned()
+                let (why, hint) = if !report.present {
+                    (
+                        "sent, and nothing came back: no heartbeat, no boot-up, no SDO answer",
+                        "who is there: cangauge scan".to_owned(),
+                    )
+                } else if kind.is_reset() {
+                    ("sent, and no boot-up came", format!("is it there? cangauge nmt state {}", report.node))
                 } else {
-                    format!("sent, and nothing came back within {timeout}: no heartbeat, no SDO answer")
+                    (
+                        "sent, and nothing confirms it: no heartbeat (1017h is 0)",
+                        format!("set a heartbeat: cangauge sdo write {} producer-heartbeat-time 1000", report.node),
+                    )
                 };
-                let why = if kind.is_reset() && report.present { "sent, and no boot-up came".to_owned() } else { why };
                 let failure = Failure::of_node(Kind::NoAnswer, report.node, why);
                 if self.confirm {
-                    return Some(failure.hint(format!(
-                        "set a heartbeat: cangauge sdo write {} producer-heartbeat-time 1000",
-                        report.node
-                    )));
+                    return Some(failure.hint(hint));
                 }
                 global.console().note(&failure.message);
                 None

@@ -30,22 +30,29 @@ pub(super) fn check_wanted(instruments: &[Instrument], plan: &Plan) -> Result<()
             }
         };
         if !instruments.iter().any(carried) {
-            let (known, name) = match item {
-                Wanted::Signal(name) | Wanted::Status(name) => (
-                    instruments.iter().any(|instrument| instrument.signals.iter().any(|signal| signal.name == *name)),
-                    name.clone(),
-                ),
-                Wanted::Object(object) => (true, object.to_string()),
+            let has = |name: &str, told: bool| {
+                let signals = instruments.iter().flat_map(|instrument| &instrument.signals);
+                signals.filter(|signal| signal.name == name).any(|signal| !told || signal.status.is_some())
             };
-            if !known {
-                let mut names: Vec<&str> = instruments
-                    .iter()
-                    .flat_map(|instrument| instrument.signals.iter().map(|signal| signal.name.as_str()))
-                    .collect();
-                names.dedup();
-                return Err(Failure::new(Kind::Usage, format!("no node has a signal \"{name}\""))
-                    .hint(format!("there are: {}", names.join(", "))));
-            }
+            let name = match item {
+                Wanted::Signal(name) | Wanted::Status(name) if !has(name, false) => {
+                    let mut names: Vec<&str> = Vec::new();
+                    for signal in instruments.iter().flat_map(|instrument| &instrument.signals) {
+                        if !names.contains(&signal.name.as_str()) {
+                            names.push(&signal.name);
+                        }
+                    }
+                    return Err(Failure::new(Kind::Usage, format!("no node has a signal \"{name}\""))
+                        .hint(format!("there are: {}", names.join(", "))));
+                }
+                Wanted::Status(name) if !has(name, true) => {
+                    let message = format!("no node has an object that tells the status of {name}");
+                    return Err(Failure::new(Kind::Usage, message));
+                }
+                Wanted::Signal(name) => name.clone(),
+                Wanted::Status(name) => format!("{name}.status"),
+                Wanted::Object(object) => object.to_string(),
+            };
             if polled {
                 continue;
             }

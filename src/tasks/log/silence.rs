@@ -17,8 +17,13 @@ pub(super) fn why_nothing(instruments: &[Instrument], plan: &Plan, recording: &R
         ));
     }
     let Some(first) = instruments.first() else {
-        return Failure::new(Kind::NoAnswer, format!("no measurements within {within}: no TPDO came"))
-            .hint("who only listens starts nobody: leave --passive out, or start them: cangauge nmt start 1");
+        return Failure::new(Kind::NoAnswer, format!("no measurements within {within}: no TPDO came")).hint(match plan
+            .nodes
+            .as_slice()
+        {
+            [only] => format!("who only listens starts nobody: leave --passive out, or: cangauge nmt start {only}"),
+            _ => "who only listens starts nobody: leave --passive out, or: cangauge nmt start all".to_owned(),
+        });
     };
     let (why, hint) = match recording.decoder.wrong_lengths(first.node) {
         0 => why_silent(first, plan.mode),
