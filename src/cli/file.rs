@@ -44,6 +44,8 @@ impl OutFile {
     pub(super) fn write(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
         let regular = self.file.metadata().is_ok_and(|metadata| metadata.is_file());
         let emptied = if regular { self.file.set_len(0) } else { Ok(()) };
+        // An object of no bytes makes a file of no bytes, which stays.
+        self.new = false;
         emptied.and_then(|()| self.file.write_all(bytes)).map_err(|source| self.error(source))
     }
 

@@ -155,8 +155,9 @@ impl ReadArgs {
         }
         let overrides = open::overrides(global, &[self.node])?;
         let mut knowledge = Knowledge::new(self.node, &overrides);
-        let target = self.output.as_deref().filter(|path| *path != Path::new("-"));
-        let mut file = target.map(|path| OutFile::create(path, self.force)).transpose()?;
+        let to_stdout = self.output.as_deref() == Some(Path::new("-"));
+        let path = self.output.as_deref().filter(|_| !to_stdout);
+        let mut file = path.map(|path| OutFile::create(path, self.force)).transpose()?;
         let bar = Transfer::new(global.shows_progress());
         let mut progress = |moved| bar.moved(moved);
         let mut options = Options { blocks: self.block.into(), size: SizeMode::Auto, progress: &mut progress };
@@ -170,7 +171,7 @@ impl ReadArgs {
                 }
                 match &mut file {
                     Some(file) => file.write(&value.raw)?,
-                    None if self.output.is_some() => io::stdout().lock().write_all(&value.raw).map_err(stdout)?,
+                    None if to_stdout => io::stdout().lock().write_all(&value.raw).map_err(stdout)?,
                     None => self.print(&value, object, global.format).map_err(stdout)?,
                 }
             }

@@ -49,7 +49,7 @@ def check(answer, sent, expected, sync):
     tpdo = tpdos[0]
     assert tpdo["mapping"] == expected["mapping"] and tpdo["cob_id"] == 0x180 + node, tpdo
     assert tpdo["transmission"] == (sync or 254), tpdo
-    record = [float(value) for number, _, value in sent if int(number) == node]
+    record = [float(value) for number, _, value, _ in sent if int(number) == node]
     values = [value for value, *_ in tpdo["values"]]
     assert len(values) == 3 and values[0] < values[1] < values[2], values
     assert set(values) <= set(record), (values, record)

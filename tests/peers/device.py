@@ -2,17 +2,22 @@
 
     device.py [--record FILE] [--period MS] [--sync N] [--heartbeat MS] IFACE NODE:KIND...
 
-KIND is real32 (pressure in bar as REAL32 with a status byte) or integer (pressure in psi as
-INTEGER32 with three digits). Each sends TPDO 1 while OPERATIONAL, every --period ms (50), or with
---sync N on every N-th SYNC. Prints "ready" once all have booted, and ends on SIGTERM.
+KIND is real32 (pressure in bar as REAL32 with a status byte), overload (the same, out of its range
+now and then) or integer (pressure in psi as INTEGER32 with three digits). Each sends TPDO 1 while
+OPERATIONAL, every --period ms (50), or with --sync N on every N-th SYNC. Prints "ready" once all
+have booted, and ends on SIGTERM.
 
 The n-th value that a node sends is known beforehand: n counts from 0 since the start of this
 program and wraps at 4096; real32 sends n * 0.25 - 100 bar, integer sends n * 7 - 5000 (thousandths
-of psi). --record writes "NODE,N,VALUE" for every TPDO, the value as it stands in the PDO, just
-before it is sent.
+of psi). Of every eight values of overload the 5th is NaN and too high by its status, the 6th NaN and
+too low, and the 7th a number with the status "invalid". --record writes "NODE,N,VALUE,STATUS" for
+every TPDO, value and status as they stand in the PDO, just before it is sent.
+
+2000h and 2001h are a maker's own objects, of types that no standard tells: UNSIGNED16 and a text.
 """
 
 import argparse
+import math
 import signal
 import sys
 import threading
@@ -30,9 +35,9 @@ WRAP = 4096
 class Kind:
     """What distinguishes the kinds of devices."""
 
-    def __init__(self, name, index, bits, product, unit, digits, value):
+    def __init__(self, name, index, bits, product, unit, digits, value, status=lambda n: 0):
         self.name, self.index, self.bits, self.product = name, index, bits, product
-        self.unit, self.digits, self.value = unit, digits, value
+        self.unit, self.digits, self.value, self.status = unit, digits, value, status
 
     def physical(self, number):
         """The value in the unit of the device."""
@@ -43,6 +48,12 @@ class Kind:
 KINDS = {
     "real32": Kind("python-canopen pressure transmitter", 0x6130, 32, 1, BAR, 2, lambda n: n * 0.25 - 100),
     "integer": Kind("python-canopen pressure switch", 0x9130, 32, 2, PSI, 3, lambda n: n * 7 - 5000),
+    "overload": Kind(
+        "python-canopen overloaded transmitter", 0x6130, 32, 3, BAR, 2,
+        lambda n: math.nan if n % 8 in (5, 6) else n * 0.25 - 100,
+        # CiA 404: bit 0 not valid, bit 1 positive overload, bit 2 negative overload.
+        lambda n: {5: 0b011, 6: 0b101, 7: 0b001}.get(n % 8, 0),
+    ),
 }
 
 
@@ -75,8 +86,10 @@ def dictionary(kind, node, arguments):
         channels("AI input PV REAL32", 0x6130, od.REAL32, [kind.physical(0)]),
         channels("AI physical unit", 0x6131, od.UNSIGNED32, [kind.unit]),
         channels("AI decimal digits", 0x6132, od.UNSIGNED8, [kind.digits], "rw"),
-        channels("AI status", 0x6150, od.UNSIGNED8, [0]),
+        channels("AI status", 0x6150, od.UNSIGNED8, [kind.status(0)]),
         channels("AI input PV INTEGER32", 0x9130, od.INTEGER32, [round(kind.physical(0) * 10**kind.digits)]),
+        variable("A maker's number", 0x2000, 0, od.UNSIGNED16, 0xBEEF),
+        variable("A maker's text", 0x2001, 0, od.VISIBLE_STRING, "as delivered"),
     ]:
         result.add_object(entry)
     return result
@@ -116,6 +129,8 @@ class Device:
         with self.lock:
             if subindex == 1 and index == 0x6130:
                 return self.kind.physical(self.number)
+            if subindex == 1 and index == 0x6150:
+                return self.kind.status(self.number)
             if subindex == 1 and index == 0x9130:
                 return round(self.kind.physical(self.number) * 10**self.kind.digits)
         return None
@@ -136,13 +151,14 @@ class Device:
 
     def transmit(self, tpdo):
         """Sends TPDO 1 with the next value."""
+        value, status = self.kind.value(self.number), ""
         for entry in tpdo.map:
             if entry.index == self.kind.index:
-                entry.raw = self.kind.value(self.number)
+                entry.raw = value
             else:
-                entry.raw = self.node.sdo[entry.index][entry.subindex].raw
+                entry.raw = status = self.node.sdo[entry.index][entry.subindex].raw
         if self.log:
-            print(self.node.id, self.number, self.kind.value(self.number), sep=",", file=self.log, flush=True)
+            print(self.node.id, self.number, value, status, sep=",", file=self.log, flush=True)
         tpdo.transmit()
         self.number = (self.number + 1) % WRAP
 

@@ -1,0 +1,235 @@
+"""What the checks of cangauge against foreign peers have in common: the program, the devices, the wire.
+
+Nothing here or in the checks waits for a length of time that a slow machine could outlast: what has to
+come is waited for until it comes, within GIVE_UP.
+"""
+
+import contextlib
+import csv
+import json
+import math
+import os
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+# A machine that needs longer is taken for hung.
+GIVE_UP = 120
+# The patience of cangauge where an answer has to come, however slow the machine.
+PATIENT = ["--timeout", "20s"]
+
+# Columns of layout "long" that say what was measured, without when.
+MEASURED = ["node", "signal", "value", "unit", "status", "raw"]
+
+
+class Result:
+    """How a run of cangauge ended."""
+
+    def __init__(self, command, exit_code, out, err, seconds):
+        self.command, self.exit, self.out, self.err, self.seconds = command, exit_code, out, err, seconds
+
+    def __str__(self):
+        return f"{' '.join(self.command)}\nexit {self.exit} after {self.seconds:.2f} s\n--- stdout\n{self.out}--- stderr\n{self.err}---"
+
+    def json(self):
+        return [json.loads(line) for line in self.out.splitlines()]
+
+    def rows(self):
+        return rows_of(self.out)
+
+
+class Cangauge:
+    """The program under test, on one interface."""
+
+    def __init__(self, binary, interface):
+        self.binary, self.interface = binary, interface
+
+    def command(self, *arguments, bus=None):
+        return [self.binary, "--bus", bus or self.interface, *map(str, arguments)]
+
+    def run(self, *arguments, exit=0, bus=None):
+        """Runs it to its end; `exit` is the exit code that it must have, None for any."""
+        command = self.command(*arguments, bus=bus)
+        begun = time.monotonic()
+        done = subprocess.run(command, capture_output=True, text=True, timeout=GIVE_UP, stdin=subprocess.DEVNULL)
+        result = Result(command, done.returncode, done.stdout, done.stderr, time.monotonic() - begun)
+        assert exit is None or result.exit == exit, f"exit code {exit} expected\n{result}"
+        return result
+
+    @contextlib.contextmanager
+    def running(self, *arguments, directory, bus=None):
+        """Runs it beside the caller, who may end it with Recording.finish()."""
+        recording = Recording(self.command(*arguments, bus=bus), directory)
+        try:
+            yield recording
+        finally:
+            recording.kill()
+
+    @contextlib.contextmanager
+    def simulator(self, bench, directory, bus=None):
+        """Simulated devices in a process of their own, on the interface as anybody else."""
+        with self.running("sim", bench, directory=directory, bus=bus) as simulator:
+            wait_for(lambda: "simulating" in simulator.text("err"), lambda: f"no simulator: {simulator.text('err')}")
+            yield simulator
+
+
+class Recording:
+    """A run of cangauge that goes on; what it writes lies in files."""
+
+    def __init__(self, command, directory):
+        self.command = command
+        self.paths = {name: os.path.join(directory, f"{time.monotonic_ns()}.{name}") for name in ("out", "err")}
+        self.begun = time.monotonic()
+        with open(self.paths["out"], "w") as out, open(self.paths["err"], "w") as err:
+            self.process = subprocess.Popen(command, stdout=out, stderr=err, stdin=subprocess.DEVNULL)
+
+    def text(self, name):
+        with open(self.paths[name], encoding="utf-8") as file:
+            return file.read()
+
+    def rows(self):
+        """The rows written so far."""
+        text = self.text("out")
+        return rows_of(text[: text.rfind("\n") + 1])
+
+    def await_rows(self, count):
+        """Waits until so many rows stand there."""
+        wait_for(lambda: len(self.rows()) >= count, lambda: f"{len(self.rows())} of {count} rows\n{self.text('err')}", self.process)
+
+    def await_words(self, words):
+        """Waits until it has said this on stderr."""
+        wait_for(lambda: words in self.text("err"), lambda: f"never said: {words}\n{self.text('err')}", self.process)
+
+    def is_running(self):
+        return self.process.poll() is None
+
+    def finish(self, exit=0, end=signal.SIGINT):
+        """Ends it as Ctrl-C does (None: waits for its own end) and takes the result."""
+        if end:
+            self.process.send_signal(end)
+        self.process.wait(GIVE_UP)
+        seconds = time.monotonic() - self.begun
+        result = Result(self.command, self.process.returncode, self.text("out"), self.text("err"), seconds)
+        assert exit is None or result.exit == exit, f"exit code {exit} expected\n{result}"
+        return result
+
+    def kill(self):
+        if self.process.poll() is None:
+            self.process.terminate()
+            try:
+                self.process.wait(GIVE_UP)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                raise
+
+
+def wait_for(condition, complaint, process=None):
+    """Waits until something is so. `process` has to do it: when it has ended, it never will."""
+    until = time.monotonic() + GIVE_UP
+    while not condition():
+        ended = process is not None and process.poll() is not None
+        assert time.monotonic() < until and not (ended and not condition()), complaint()
+        time.sleep(0.02)
+
+
+def rows_of(text):
+    """The rows of a CSV, as dictionaries."""
+    return list(csv.DictReader(text.splitlines()))
+
+
+def measured(rows, *nodes):
+    """What was measured, in order: tuples of MEASURED. With `nodes` only theirs."""
+    return [tuple(row[name] for name in MEASURED) for row in rows if not nodes or int(row["node"]) in nodes]
+
+
+@contextlib.contextmanager
+def devices(interface, directory, *nodes, period=20, sync=0, heartbeat=0):
+    """python-canopen devices as device.py makes them. Gives a function that reads their record, as the
+    rows that cangauge should make of it."""
+    record = os.path.join(directory, f"{time.monotonic_ns()}.record")
+    command = [sys.executable, os.path.join(HERE, "device.py"), "--record", record, "--period", str(period)]
+    command += ["--heartbeat", str(heartbeat), *(["--sync", str(sync)] if sync else []), interface, *nodes]
+    kinds = {int(node.split(":")[0]): node.split(":")[1] for node in nodes}
+
+    def read(*wanted):
+        with open(record, encoding="ascii") as file:
+            lines = [line.strip().split(",") for line in file.read().splitlines(keepends=True) if line.endswith("\n")]
+        return [expected(kinds[int(node)], int(node), int(number)) for node, number, *_ in lines
+                if not wanted or int(node) in wanted]
+
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
+    try:
+        assert process.stdout.readline() == "ready\n", "device.py did not start"
+        yield read
+    finally:
+        process.terminate()
+        status = process.wait(GIVE_UP)
+    assert status == 0, f"device.py: exit status {status}"
+
+
+def expected(kind, node, number):
+    """The row of the n-th TPDO of a device of device.py: written from its documentation, not from
+    cangauge's code."""
+    if kind == "integer":
+        value = 7 * number - 5000
+        return (str(node), "ch1", f"{value / 1000:.3f}", "psi", "", wire("<i", value))
+    value, status = number * 0.25 - 100, "ok"
+    if kind == "overload" and number % 8 in (5, 6):
+        return (str(node), "ch1", "", "bar", "overload-high" if number % 8 == 5 else "overload-low", wire("<f", math.nan))
+    if kind == "overload" and number % 8 == 7:
+        return (str(node), "ch1", "", "bar", "invalid", wire("<f", value))
+    return (str(node), "ch1", f"{value:g}", "bar", status, wire("<f", value))
+
+
+def wire(form, value):
+    return "0x" + struct.pack(form, value).hex().upper()
+
+
+def begins(rows, record):
+    """That the rows are the beginning of the record: none missing, none invented, none changed."""
+    assert rows, "no rows"
+    assert len(rows) <= len(record), f"{len(rows)} rows of {len(record)} TPDOs"
+    for number, (row, sent) in enumerate(zip(rows, record)):
+        assert row == sent, f"row {number} is {row} and was sent as {sent}"
+
+
+class Wire:
+    """A raw CAN socket for what no well-behaved participant sends."""
+
+    ERROR, REMOTE, EXTENDED = socket.CAN_ERR_FLAG, socket.CAN_RTR_FLAG, socket.CAN_EFF_FLAG
+
+    def __init__(self, interface):
+        self.socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        self.socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
+        # Sends only.
+        self.socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, b"")
+        self.socket.bind((interface,))
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.socket.close()
+
+    def send(self, identifier, data=b"", length=None):
+        """A classic frame; `length` is that of a remote frame, which has no data."""
+        self._send(struct.pack("=IB3x8s", identifier, len(data) if length is None else length, bytes(data)))
+
+    def send_fd(self, identifier, data, flags=0):
+        """A CAN FD frame."""
+        self._send(struct.pack("=IBB2x64s", identifier, len(data), flags, bytes(data)))
+
+    def _send(self, frame):
+        while True:
+            try:
+                self.socket.send(frame)
+                return
+            except OSError as error:
+                # No room in the queue: later.
+                if error.errno != 105:
+                    raise
+                time.sleep(0.001)
