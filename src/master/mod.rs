@@ -106,7 +106,7 @@ impl<'bus> Master<'bus> {
 
     /// The present moment.
     pub fn now(&self) -> Mono {
-        self.bus.now().mono
+        self.bus.mono()
     }
 
     /// Tells the bus which frames are wanted.
@@ -236,7 +236,8 @@ impl<'bus> Master<'bus> {
     }
 
     /// Carries out transfers side by side and returns their results in the order of the requests. Frames
-    /// that are no part of them go to `watch`.
+    /// that are no part of them go to `watch`. A node that was silent to one request is not asked the rest:
+    /// those end as cancelled.
     ///
     /// # Errors
     /// Only what stops everything; what one device does is in its result.
@@ -245,17 +246,26 @@ impl<'bus> Master<'bus> {
         requests: Vec<Request>,
         watch: &mut dyn FnMut(&Received),
     ) -> Result<Vec<Result<Answer, SdoError>>, Error> {
+        let what: Vec<_> = requests.iter().map(|item| (item.node, item.object, item.operation())).collect();
         let tickets: Vec<Ticket> = requests.into_iter().map(|request| self.start(request)).collect();
         let mut results: Vec<Option<Result<Answer, SdoError>>> = tickets.iter().map(|_| None).collect();
-        let mut open = tickets.len();
         let far = Mono::at(Duration::MAX);
-        while open > 0 {
+        while results.iter().any(Option::is_none) {
             match self.next(far)? {
                 Happening::Sdo(ticket, result) => {
-                    if let Some(at) = tickets.iter().position(|&mine| mine == ticket) {
-                        results[at] = Some(result);
-                        open -= 1;
+                    let Some(at) = tickets.iter().position(|&mine| mine == ticket) else { continue };
+                    let silent =
+                        result.as_ref().err().filter(|error| matches!(error.failure, SdoFailure::NoAnswer { .. }));
+                    if let Some(silent) = silent.map(|error| error.node) {
+                        for (rest, &(node, object, operation)) in what.iter().enumerate() {
+                            if node == silent && rest != at && results[rest].is_none() {
+                                self.forget(std::iter::once(tickets[rest]));
+                                let failure = SdoFailure::Cancelled;
+                                results[rest] = Some(Err(SdoError { node, object, operation, failure }));
+                            }
+                        }
                     }
+                    results[at] = Some(result);
                 }
                 Happening::Frame(received) => watch(&received),
                 Happening::Interrupted => {
