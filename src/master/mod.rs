@@ -106,7 +106,7 @@ impl<'bus> Master<'bus> {
 
     /// The present moment.
     pub fn now(&self) -> Mono {
-        self.bus.now().mono
+        self.bus.mono()
     }
 
     /// Tells the bus which frames are wanted.
