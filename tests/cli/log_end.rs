@@ -128,7 +128,7 @@ fn the_summary() {
     );
     let done = bench.run("log 127 --count 2 -q --summary - -o run.csv").exit(0);
     assert_eq!(done.json()[0]["rows"], 2);
-    bench.run("log 127 --count 2 --summary sum.json").is_usage("sum.json exists");
+    bench.run("log 127 --count 2 --summary sum.json").refuses("sum.json exists");
     bench
         .run("log 127 --count 2 --summary no/folder.json")
         .fails(8, "cangauge: create no/folder.json: No such file or directory (os error 2)\n");

@@ -10,7 +10,7 @@ fn a_file_that_exists_is_not_touched() {
     fs::write(bench.path("run.csv"), "old\n").expect("written");
     let done = bench.run("log 1 --sync 10ms --count 5 -o run.csv");
     assert_eq!(done.stderr, "cangauge: run.csv exists\nhint: overwrite it with --force, or name another file\n");
-    done.is_usage("run.csv exists");
+    done.refuses("run.csv exists");
     assert_eq!(bench.text("run.csv"), "old\n");
     // Asked to overwrite: only once there is something to write.
     bench.run("log 9 -o run.csv --force").exit(3);
@@ -37,12 +37,12 @@ fn links_and_pipes() {
     let bench = Bench::of("mh4@1");
     fs::write(bench.path("old.csv"), "old\n".repeat(1000)).expect("written");
     std::os::unix::fs::symlink("old.csv", bench.path("link.csv")).expect("a link");
-    bench.run("log 1 --sync 10ms --count 2 -o link.csv").is_usage("link.csv exists");
+    bench.run("log 1 --sync 10ms --count 2 -o link.csv").refuses("link.csv exists");
     bench.run("log 1 --sync 10ms --count 2 -o link.csv --force").exit(0);
     assert_eq!(bench.text("old.csv").lines().count(), 3);
     // A name that is taken by a link to nowhere is taken.
     std::os::unix::fs::symlink("nowhere.csv", bench.path("broken.csv")).expect("a link");
-    bench.run("log 1 --sync 10ms --count 2 -o broken.csv").is_usage("broken.csv exists");
+    bench.run("log 1 --sync 10ms --count 2 -o broken.csv").refuses("broken.csv exists");
     assert!(!bench.path("nowhere.csv").exists());
     let made = std::process::Command::new("mkfifo").arg(bench.path("fifo")).status().expect("mkfifo");
     assert!(made.success());

@@ -65,7 +65,7 @@ impl Done {
 
     /// That it was refused before the bus was opened.
     #[track_caller]
-    fn is_usage(self, message: &str) -> Done {
+    fn refuses(self, message: &str) -> Done {
         let done = self.exit(2);
         let first = done.stderr.lines().next().unwrap_or("");
         assert_eq!((done.stdout.as_str(), first), ("", format!("cangauge: {message}").as_str()));

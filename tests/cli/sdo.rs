@@ -82,19 +82,19 @@ fn nothing_is_sent_of_a_value_that_does_not_fit() {
         ("abc", "\"abc\" is not a value of type u16"),
         ("0x10000", "0x10000 does not fit u16 (0 to 65535)"),
     ] {
-        bench.run(&format!("sdo write 5 0x1017 {value}")).is_usage(&format!("0x1017:0: {why}"));
+        bench.run(&format!("sdo write 5 0x1017 {value}")).refuses(&format!("0x1017:0: {why}"));
     }
-    bench.run_words(&["sdo", "write", "5", "0x1017", ""]).is_usage("0x1017:0: \"\" is not a value of type u16");
-    bench.run("sdo write 5 0x5000 300 --type u8").is_usage("0x5000:0: 300 does not fit u8 (0 to 255)");
+    bench.run_words(&["sdo", "write", "5", "0x1017", ""]).refuses("0x1017:0: \"\" is not a value of type u16");
+    bench.run("sdo write 5 0x5000 300 --type u8").refuses("0x5000:0: 300 does not fit u8 (0 to 255)");
     bench
         .run("sdo write 5 0x5000 1e39 --type r32")
-        .is_usage("0x5000:0: 1e39 does not fit r32 (-3.4028235e38 to 3.4028235e38)");
-    bench.run("sdo write 5 0x5000 xyz --type hex").is_usage("0x5000:0: \"xyz\" is not a value of type os");
+        .refuses("0x5000:0: 1e39 does not fit r32 (-3.4028235e38 to 3.4028235e38)");
+    bench.run("sdo write 5 0x5000 xyz --type hex").refuses("0x5000:0: \"xyz\" is not a value of type os");
     // Of several, the first is not written either.
-    bench.run("sdo write 5 0x1017=500 0x1800:5=70000").is_usage("0x1800:5: 70000 does not fit u16 (0 to 65535)");
+    bench.run("sdo write 5 0x1017=500 0x1800:5=70000").refuses("0x1800:5: 70000 does not fit u16 (0 to 65535)");
     bench
         .run("sdo write 5 0x1017=500 0x1800:5")
-        .is_usage("\"0x1800:5\" has no value: give OBJECT VALUE, or OBJECT=VALUE for each");
+        .refuses("\"0x1800:5\" has no value: give OBJECT VALUE, or OBJECT=VALUE for each");
 }
 
 #[test]
@@ -157,10 +157,10 @@ fn names_that_are_none() {
         .fails(2, "cangauge: node 5: WIKA MH-4-CAN has no object \"vendor-di\"\nhint: nearest: vendor-id\n");
     bench
         .run("sdo read 5 nonsense")
-        .is_usage("\"nonsense\" is neither an object (0x1018:1) nor a name (vendor-id, ai-input-pv:1)");
+        .refuses("\"nonsense\" is neither an object (0x1018:1) nor a name (vendor-id, ai-input-pv:1)");
     bench.run("sdo read 5 0x10180:1").exit(2);
     bench.run("sdo read 5 0x1018:256").exit(2);
-    bench.run("sdo read 1-3 0x1018:1").is_usage("\"1-3\" is not a node-ID (1 to 127)");
+    bench.run("sdo read 1-3 0x1018:1").refuses("\"1-3\" is not a node-ID (1 to 127)");
 }
 
 #[test]
@@ -168,13 +168,13 @@ fn bytes_to_and_from_files() {
     let bench = Bench::of("mh4@5");
     bench.run("sdo read 5 0x1008 --output name.bin").prints("");
     assert_eq!(fs::read(bench.path("name.bin")).expect("the file"), b"MH-4-CAN");
-    bench.run("sdo read 5 0x1018:1 --output name.bin").is_usage("name.bin exists");
+    bench.run("sdo read 5 0x1018:1 --output name.bin").refuses("name.bin exists");
     assert_eq!(fs::read(bench.path("name.bin")).expect("the file"), b"MH-4-CAN");
     bench.run("sdo read 5 0x1018:1 --output name.bin --force").prints("");
     assert_eq!(fs::read(bench.path("name.bin")).expect("the file"), [0x47, 0, 0, 0]);
     bench.run("sdo read 9 0x1008 --output other.bin").exit(3);
     assert_eq!(bench.files(), ["name.bin"], "nothing was read: no file");
-    bench.run("sdo read 5 0x1008 0x1018:1 --output other.bin").is_usage("--output takes one object");
+    bench.run("sdo read 5 0x1008 0x1018:1 --output other.bin").refuses("--output takes one object");
 
     fs::write(bench.path("time.bin"), [0xe8, 0x03]).expect("written");
     let done = bench.run("sdo write 5 0x1017 --input time.bin").prints("");
@@ -182,7 +182,7 @@ fn bytes_to_and_from_files() {
     bench
         .run("sdo write 5 0x1017 --input none.bin")
         .fails(8, "cangauge: read none.bin: No such file or directory (os error 2)\n");
-    bench.run("sdo write 5 0x1017 5 --input time.bin").is_usage("--input takes one object and no value");
+    bench.run("sdo write 5 0x1017 5 --input time.bin").refuses("--input takes one object and no value");
 }
 
 #[test]
