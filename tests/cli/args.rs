@@ -125,6 +125,21 @@ fn buses_that_are_none() {
     assert!(done.stderr.starts_with("cangauge: bad.toml: line 2: unknown field `sped`"), "{}", done.stderr);
 }
 
+#[test]
+fn simulated_devices_are_for_others() {
+    Bench::of(ALL).run("sim mh4@5").refuses("nobody else can reach the simulated bus: it is inside this program");
+    Bench::of(ALL).run("sim mh5@5").refuses("there is no device \"mh5\" (mh4, d20, dps, mc1609, or FILE.toml)");
+}
+
+#[test]
+fn completions_are_those_that_are_shipped() {
+    for (shell, file) in [("bash", "cangauge.bash"), ("zsh", "_cangauge"), ("fish", "cangauge.fish")] {
+        let shipped = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("completions").join(file);
+        Bench::of(ALL).run_words(&["completions", shell]).prints(&std::fs::read_to_string(shipped).expect(file));
+    }
+    assert_eq!(Bench::of(ALL).run("completions tcsh").exit(2).stdout, "");
+}
+
 /// An interface that nobody has: what is said depends on the kernel, that it is exit 5 does not.
 #[test]
 #[cfg(target_os = "linux")]

@@ -115,3 +115,33 @@ fn a_stopped_node_is_woken() {
     let done = bench.run("nmt stop 5,6").exit(0);
     assert_eq!(done.stdout, "5  stopped  heartbeat\n6  stopped  sdo\n");
 }
+
+#[test]
+fn a_probe_sets_the_heartbeat_for_a_moment_and_puts_it_back() {
+    let done = Bench::of("mh4@5").run("nmt state 5 --probe").prints("5  pre-operational  heartbeat\n");
+    let writes: Vec<&str> = done.frames_of("605").into_iter().filter(|request| request.starts_with("2B17")).collect();
+    assert_eq!(writes.len(), 2, "{:?}", done.frames);
+    assert!(writes[0] != writes[1] && writes[1] == "2B17100000000000", "{writes:?}");
+    // Where something tells the state already, nothing is set.
+    let done = Bench::described(HEARTBEAT).run("nmt state 5 --probe").exit(0);
+    assert!(done.frames_of("605").iter().all(|request| request.starts_with('4')), "{:?}", done.frames);
+}
+
+#[test]
+fn what_happens_is_followed() {
+    let bench = Bench::described(&format!("{HEARTBEAT}[[device]]\nkind = \"dps\"\nnode = 6\n"));
+    let done = bench.run("nmt watch --duration 1s").exit(0);
+    let said: Vec<String> =
+        done.stdout.lines().map(|line| line.split_whitespace().skip(1).collect::<Vec<_>>().join(" ")).collect();
+    assert_eq!(said, ["5 boot-up", "6 boot-up", "5 state pre-operational"]);
+    assert_eq!(done.frames.iter().filter(|frame| !frame.starts_with("70")).count(), 0, "{:?}", done.frames);
+}
+
+#[test]
+fn who_starts_the_device() {
+    let bench = Bench::of("mh4@5,dps@6");
+    bench.run("nmt startup 5").prints("wait\n");
+    let done = bench.run("nmt startup 5 auto").prints("auto\n");
+    assert!(done.stderr.contains("stored (1010h)"), "{}", done.stderr);
+    assert!(bench.run("nmt startup 6").exit(6).stderr.contains("1F80h"));
+}

@@ -72,6 +72,7 @@ fn objects_and_status_objects() {
     let bench = still();
     bench.run("read 5 0x6130:1").prints("1.25\n");
     bench.run("read 5 pressure.status").prints("0\n");
+    bench.run("read 127 pressure.status").fails(2, "cangauge: node 127: pressure has no status object\n");
     overloaded().run("read 5 pressure.status").prints("3\n");
     overloaded().run("read 6 pressure.status").prints("5\n");
 }
