@@ -184,8 +184,7 @@ fn sync_goes_out_on_the_identifier_of_1005h() {
 }
 
 #[test]
-fn sync_is_refused_where_somebody_else_sends_it() {
-    // The nodes listen to different identifiers: no SYNC serves both.
+fn sync_is_refused_where_one_would_not_serve_all() {
     let bench = Bench::described(
         "[[device]]\nkind = \"mh4\"\nnode = 5\nset = { \"0x1005\" = 0x90 }\n[[device]]\nkind = \"mh4\"\nnode = 6\n",
     );

@@ -1,6 +1,7 @@
 //! Recordings under bad conditions, on the virtual clock.
 
 mod garbage;
+mod second_sync;
 mod stalled;
 
 use cangauge::bus::Stamp;
