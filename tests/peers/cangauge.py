@@ -17,6 +17,7 @@ import time
 import traceback
 
 import commands
+import disturbance
 import recording
 from harness import Cangauge
 
@@ -24,7 +25,11 @@ from harness import Cangauge
 def main():
     binary, interface, *rest = sys.argv[1:]
     pair = rest.pop(0).split(":") if rest and ":" in rest[0] else None
-    checks = [(check, ()) for check in commands.CHECKS + recording.CHECKS]
+    checks = [(check, ()) for check in commands.CHECKS + recording.CHECKS + disturbance.CHECKS]
+    if pair:
+        checks += [(check, pair) for check in disturbance.PAIR_CHECKS]
+    else:
+        print("SKIPPED: checks that need the two ends of a wire (A:B)")
     names = {check.__name__ for check, _ in checks}
     assert set(rest) <= names, f"there are: {', '.join(sorted(names))}"
     os.environ.update(LC_ALL="C", TERM="dumb")

@@ -147,12 +147,12 @@ def measured(rows, *nodes):
 
 
 @contextlib.contextmanager
-def devices(interface, directory, *nodes, period=20, sync=0, heartbeat=0):
+def devices(interface, directory, *nodes, period=20, sync=0, heartbeat=0, quiet=False):
     """python-canopen devices as device.py makes them. Gives a function that reads their record, as the
     rows that cangauge should make of it."""
     record = os.path.join(directory, f"{time.monotonic_ns()}.record")
     command = [sys.executable, os.path.join(HERE, "device.py"), "--record", record, "--period", str(period)]
-    command += ["--heartbeat", str(heartbeat), *(["--sync", str(sync)] if sync else []), interface, *nodes]
+    command += ["--heartbeat", str(heartbeat), *(["--sync", str(sync)] if sync else []), *(["--quiet"] if quiet else []), interface, *nodes]
     kinds = {int(node.split(":")[0]): node.split(":")[1] for node in nodes}
 
     def read(*wanted):
