@@ -56,7 +56,7 @@ VALUES = [
     (od.UNICODE_STRING, "us", "Überdruck ≥ 10 µbar", "Überdruck ≥ 10 µbar"),
     (od.DOMAIN, "d", b"\x01\x02\x03", "0x010203"),
     (od.DOMAIN, "d", bytes(range(100)), "0x" + bytes(range(100)).hex().upper()),
-    (od.TIME_OF_DAY, "t", time(0, 0), "1984-01-01T00:00:00Z"),
+    (od.TIME_OF_DAY, "t", time(0, 0), "1984-01-01T00:00:00.000Z"),
     (od.TIME_OF_DAY, "t", time(LEAP_DAY, 45296789), "2024-02-29T12:34:56.789Z"),
     (od.TIME_DIFFERENCE, "td", time(0, 1500), "1s 500ms"),
     (od.TIME_DIFFERENCE, "td", time(2, 3 * 3600000 + 4), "2days 3h 4ms"),
