@@ -319,7 +319,7 @@ impl Answer {
         object: ObjectId,
         data_type: Option<DataType>,
     ) -> Result<(Value, Option<Note>), SdoError> {
-        let empty = Uploaded { bytes: Vec::new(), indicated: true, announced: None };
+        let empty = Uploaded { bytes: Vec::new(), indicated: true, announced: None, misnamed_end: false };
         let uploaded = self.uploaded.as_ref().unwrap_or(&empty);
         fit(data_type, uploaded).map(|fitted| (fitted.value, fitted.note)).map_err(|error: FitError| SdoError {
             node,
