@@ -85,13 +85,15 @@ pub struct Master<'bus> {
     outgoing: Outgoing,
     /// A frame that came after the moment waited for.
     put_back: Option<Received>,
+    /// The latest moment known without looking at the clock again.
+    seen: Mono,
 }
 
 impl<'bus> Master<'bus> {
     /// A master on `bus`.
     pub fn new(bus: &'bus mut dyn Bus, timing: Timing) -> Master<'bus> {
-        let outgoing = Outgoing::new(bus.bit_rate());
-        Master { bus, timing, sdo: SdoClient::default(), outgoing, put_back: None }
+        let outgoing = Outgoing::new();
+        Master { bus, timing, sdo: SdoClient::default(), outgoing, put_back: None, seen: Mono::START }
     }
 
     /// The bus.
@@ -168,6 +170,9 @@ impl<'bus> Master<'bus> {
 
     /// Sends what still waits, within a second at most: an abort, a state put back.
     pub fn settle(&mut self) {
+        if !self.is_sending() {
+            return;
+        }
         let until = self.now() + Duration::from_secs(1);
         while self.is_sending() && self.now() < until {
             let step = self.now() + Duration::from_millis(1);
@@ -198,6 +203,7 @@ impl<'bus> Master<'bus> {
             match event {
                 Event::Frame(received) => {
                     let at = received.at.mono;
+                    self.seen = self.seen.max(at);
                     if at > until {
                         self.put_back = Some(received);
                         return Ok(Happening::Deadline);
@@ -227,6 +233,7 @@ impl<'bus> Master<'bus> {
             return Ok(None);
         }
         let now = self.now();
+        self.seen = now;
         self.sdo.advance(&self.timing, now, &mut self.outgoing);
         let (sdo, timing) = (&mut self.sdo, &self.timing);
         let retry_at = self.outgoing.flush(self.bus, now, timing.timeout, &mut |ticket, sent_at| {
@@ -312,7 +319,7 @@ impl Answer {
         object: ObjectId,
         data_type: Option<DataType>,
     ) -> Result<(Value, Option<Note>), SdoError> {
-        let empty = Uploaded { bytes: Vec::new(), indicated: true, announced: None };
+        let empty = Uploaded { bytes: Vec::new(), indicated: true, announced: None, misnamed_end: false };
         let uploaded = self.uploaded.as_ref().unwrap_or(&empty);
         fit(data_type, uploaded).map(|fitted| (fitted.value, fitted.note)).map_err(|error: FitError| SdoError {
             node,

@@ -1,6 +1,6 @@
 """Measuring devices on a CAN bus, made with python-canopen: the foreign devices of cangauge's tests.
 
-    device.py [--record FILE] [--period MS] [--sync N] [--heartbeat MS] IFACE NODE:KIND...
+    device.py [--record FILE] [--period MS] [--sync N] [--heartbeat MS] [--quiet] IFACE NODE:KIND...
 
 KIND is real32 (pressure in bar as REAL32 with a status byte), overload (the same, out of its range
 now and then) or integer (pressure in psi as INTEGER32 with three digits). Each sends TPDO 1 while
@@ -17,6 +17,7 @@ every TPDO, value and status as they stand in the PDO, just before it is sent.
 """
 
 import argparse
+import logging
 import math
 import signal
 import sys
@@ -193,10 +194,13 @@ def main():
     parser.add_argument("--period", metavar="MS", type=int, default=50)
     parser.add_argument("--sync", metavar="N", type=int, default=0)
     parser.add_argument("--heartbeat", metavar="MS", type=int, default=0)
+    parser.add_argument("--quiet", action="store_true", help="no word about frames that make no sense")
     parser.add_argument("interface", metavar="IFACE")
     parser.add_argument("nodes", metavar="NODE:KIND", nargs="+")
     arguments = parser.parse_args()
 
+    if arguments.quiet:
+        logging.disable()
     # Waited for below; blocked here so that every thread started from here on inherits that.
     ends = {signal.SIGTERM, signal.SIGINT}
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
