@@ -131,7 +131,7 @@ pub struct Answer {
 
 /// Why a transfer has no result.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{operation} {object}: {failure}")]
+#[error("{operation} {object}: {failure}{}", if *.disturbed { "; another SDO client is talking to this node" } else { "" })]
 pub struct SdoError {
     /// With which node.
     pub node: NodeId,
@@ -141,6 +141,8 @@ pub struct SdoError {
     pub operation: Operation,
     /// What went wrong.
     pub failure: SdoFailure,
+    /// Whether another client used the node's SDO server at the same time.
+    pub disturbed: bool,
 }
 
 /// What went wrong with a transfer.
@@ -166,6 +168,9 @@ pub enum SdoFailure {
     /// The object holds text or bytes where a measured value was asked for.
     #[error("it is no number")]
     NotANumber,
+    /// Another client wrote the same object at the same time.
+    #[error("acknowledged, but whose write is not known: another SDO client wrote the same object")]
+    Ambiguous,
     /// We gave up.
     #[error("not finished")]
     Cancelled,
@@ -184,6 +189,10 @@ struct Active {
     attempts_left: u32,
     /// The user's transfer that waits while this one makes sure that no old answer is still under way.
     behind: Option<(Ticket, Request)>,
+    /// Another client uses the same server.
+    disturbed: bool,
+    /// ... and writes the same object.
+    ambiguous: bool,
 }
 
 /// A request that got no answer, whose answer may still come.
@@ -219,7 +228,17 @@ impl Active {
         let attempts = if request.falls_back() { 0 } else { timing.retries };
         let attempts_left = if request.repeatable { attempts } else { 0 };
         let machine = request.machine(accept_60);
-        Active { ticket, request, machine, deadline: None, unsent: 0, attempts_left, behind: None }
+        Active {
+            ticket,
+            request,
+            machine,
+            deadline: None,
+            unsent: 0,
+            attempts_left,
+            behind: None,
+            disturbed: false,
+            ambiguous: false,
+        }
     }
 
     /// Hands frames to the queue, in place of those that are still in it.
@@ -271,7 +290,23 @@ impl Active {
     }
 
     fn error(&self, failure: SdoFailure) -> SdoError {
-        SdoError { node: self.request.node, object: self.request.object, operation: self.request.operation(), failure }
+        SdoError {
+            node: self.request.node,
+            object: self.request.object,
+            operation: self.request.operation(),
+            failure,
+            disturbed: self.disturbed,
+        }
+    }
+
+    /// Takes a request of another client to the same server. A server has one transfer at a time, so the two
+    /// disturb each other; and the acknowledges of two writes of one object cannot be told apart.
+    fn hear_request(&mut self, frame: &Frame) {
+        self.disturbed = true;
+        if let [command, a, b, c, ..] = frame.data() {
+            let same = ObjectId::from_multiplexer([*a, *b, *c]) == self.request.object;
+            self.ambiguous |= same && command >> 5 == 1 && self.request.operation() == Operation::Write;
+        }
     }
 }
 
@@ -362,6 +397,9 @@ impl SdoClient {
         let mut out = Vec::new();
         let result = match active.machine.on_frame(&received.frame, &mut out) {
             Progress::NotOurs => {
+                if id.sdo_request_node().is_some() {
+                    active.hear_request(&received.frame);
+                }
                 node.settle(&received.frame);
                 return false;
             }
@@ -379,6 +417,7 @@ impl SdoClient {
                 active.give(out, outgoing);
                 return true;
             }
+            Progress::Done(_) if active.ambiguous => Err(active.error(SdoFailure::Ambiguous)),
             Progress::Done(uploaded) => Ok(Answer { uploaded, at: received.at, way: active.way() }),
             Progress::Failed(error) => {
                 if active.is_refused_for_blocks(error) {

@@ -1,5 +1,6 @@
 //! Recordings under bad conditions, on the virtual clock.
 
+mod answers;
 mod garbage;
 mod second_sync;
 mod stalled;
