@@ -4,6 +4,7 @@
 //! [`Master::next`] is the one loop: it sends what waits, receives one thing, lets the SDO client see it
 //! and says what happened. Everything that blocks is built on it.
 
+mod company;
 mod machine;
 mod sdo;
 mod send;
