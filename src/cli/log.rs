@@ -31,7 +31,7 @@ overload-low, or empty where the device tells none), raw (the bytes on the wire)
 
 Examples:
   cangauge -b sim log 1 --sync 100ms --count 20
-  cangauge -b sim log 127 --duration 10s -o dps.csv
+  cangauge -b sim log 127 --duration 5s -o dps.csv
   cangauge -b sim log 1-3,127 pressure --poll 200ms --duration 5s --format json
   cangauge log 5 --passive --device mh4 -o run.csv")]
 pub(crate) struct Log {
@@ -241,6 +241,9 @@ impl Observer for Screen {
 }
 
 fn emergency_text(emergency: &Emergency) -> String {
+    if emergency.code == 0 {
+        return "emergency over (0000h)".to_owned();
+    }
     let register = emergency.register.map(|register| format!(", {register}")).unwrap_or_default();
     format!("emergency {:04X}h, {}{register}", emergency.code, Emergency::class(emergency.code))
 }

@@ -157,7 +157,7 @@ impl Master<'_> {
         progress: &mut dyn FnMut(Moved),
     ) -> Result<Result<Answer, SdoError>, Error> {
         let ticket = self.start(request);
-        let mut report_at = self.now() + REPORT_EVERY;
+        let mut report_at = self.seen + REPORT_EVERY;
         loop {
             match self.next(report_at)? {
                 Happening::Sdo(ended, result) if ended == ticket => return Ok(result),

@@ -151,6 +151,7 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
         }
     };
     recording.expect_sources();
+    recording.excuse(plan);
     master.listen(&recording.filters(&instruments))?;
     if let Mode::Sync(period) = plan.mode {
         refuse_second_sync(master, &instruments, period)?;

@@ -257,10 +257,15 @@ pub fn write(
         if is_signature(data) { request.once() } else { request }
     };
     let first = master.carry_out(request(sizes[0]), options.progress)?;
+    // A refused block transfer was not refused for its size.
+    let expedited = (1..=4).contains(&data.len()) && options.blocks != BlockMode::Always;
     match first {
-        Err(SdoError { failure: SdoFailure::Refused(AbortCode::COMMAND_SPECIFIER | AbortCode::LENGTH), .. })
-            if mode == SizeMode::Auto && (1..=4).contains(&data.len()) =>
+        Err(SdoError { failure: SdoFailure::Refused(code @ (AbortCode::COMMAND_SPECIFIER | AbortCode::LENGTH)), .. })
+            if mode == SizeMode::Auto && expedited =>
         {
+            if code == AbortCode::LENGTH && has_another_width(master, node, object, data.len())? {
+                return Err(first.err().map_or_else(|| Failure::new(Kind::Refused, "refused"), Failure::from));
+            }
             // If the other way is refused too, the first refusal is the one that counts.
             match master.transfer_one(request(sizes[1]))? {
                 Ok(_) => Ok(()),
@@ -270,6 +275,19 @@ pub fn write(
         Err(error) => Err(error.into()),
         Ok(_) => Ok(()),
     }
+}
+
+/// Whether an object says that it has another number of bytes. Written without a size, fewer bytes than it has
+/// would be filled up with whatever stands behind them: -5 as i16 would become 65531 in an i32.
+fn has_another_width(
+    master: &mut Master<'_>,
+    node: NodeId,
+    object: ObjectId,
+    width: usize,
+) -> Result<bool, Failure> {
+    let answer = master.transfer_one(Request::read(node, object))?;
+    let uploaded = answer.ok().and_then(|answer| answer.uploaded);
+    Ok(uploaded.is_some_and(|uploaded| uploaded.indicated && uploaded.bytes.len() != width))
 }
 
 /// Whether these bytes are a signature (save, load, zero, or a number with "set"): it acts, and what is

@@ -10,16 +10,12 @@ single checks. tests/socketcan/vcan provides the interfaces:
     tests/socketcan/vcan -i vcan0,vx0:vx1 target/peers/bin/python tests/peers/cangauge.py target/debug/cangauge vcan0 vx0:vx1
 """
 
-import os
 import sys
-import tempfile
-import time
-import traceback
 
 import commands
 import disturbance
 import recording
-from harness import Cangauge
+from harness import run_checks
 
 
 def main():
@@ -30,31 +26,7 @@ def main():
         checks += [(check, pair) for check in disturbance.PAIR_CHECKS]
     else:
         print("SKIPPED: checks that need the two ends of a wire (A:B)")
-    names = {check.__name__ for check, _ in checks}
-    assert set(rest) <= names, f"there are: {', '.join(sorted(names))}"
-    os.environ.update(LC_ALL="C", TERM="dumb")
-    os.environ.pop("CANGAUGE_BUS", None)
-    cangauge = Cangauge(os.path.abspath(binary), interface)
-    passed, failed = 0, []
-    for check, arguments in checks:
-        if rest and check.__name__ not in rest:
-            continue
-        begun = time.monotonic()
-        with tempfile.TemporaryDirectory() as directory:
-            try:
-                check(cangauge, directory, *arguments)
-                passed += 1
-                word = "ok    "
-            # Whatever went wrong, the next check is made.
-            except Exception:
-                traceback.print_exc(file=sys.stdout)
-                failed.append(check.__name__)
-                word = "FAILED"
-        print(f"{word} {check.__name__} ({time.monotonic() - begun:.1f} s)", flush=True)
-    if failed:
-        print(f"failed: {', '.join(failed)}")
-    print(f"{passed} passed, {len(failed)} failed")
-    return 1 if failed else 0
+    return run_checks(binary, interface, checks, rest)
 
 
 if __name__ == "__main__":

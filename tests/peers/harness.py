@@ -14,7 +14,9 @@ import socket
 import struct
 import subprocess
 import sys
+import tempfile
 import time
+import traceback
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 # A machine that needs longer is taken for hung.
@@ -233,3 +235,32 @@ class Wire:
                 if error.errno != 105:
                     raise
                 time.sleep(0.001)
+
+
+def run_checks(binary, interface, checks, names=()):
+    """Makes the checks, each given with its arguments, or those of them that are named; the exit status."""
+    known = {check.__name__ for check, _ in checks}
+    assert set(names) <= known, f"there are: {', '.join(sorted(known))}"
+    os.environ.update(LC_ALL="C", TERM="dumb")
+    os.environ.pop("CANGAUGE_BUS", None)
+    cangauge = Cangauge(os.path.abspath(binary), interface)
+    passed, failed = 0, []
+    for check, arguments in checks:
+        if names and check.__name__ not in names:
+            continue
+        begun = time.monotonic()
+        with tempfile.TemporaryDirectory() as directory:
+            try:
+                check(cangauge, directory, *arguments)
+                passed += 1
+                word = "ok    "
+            # Whatever went wrong, the next check is made.
+            except Exception:
+                traceback.print_exc(file=sys.stdout)
+                failed.append(check.__name__)
+                word = "FAILED"
+        print(f"{word} {check.__name__} ({time.monotonic() - begun:.1f} s)", flush=True)
+    if failed:
+        print(f"failed: {', '.join(failed)}")
+    print(f"{passed} passed, {len(failed)} failed")
+    return 1 if failed else 0

@@ -41,6 +41,8 @@ pub enum Note {
         /// Bytes delivered.
         found: usize,
     },
+    /// The end of a block transfer says that nothing of the last segment counts; size and CRC say that all does.
+    MisnamedEnd,
 }
 
 impl fmt::Display for Note {
@@ -51,6 +53,9 @@ impl fmt::Display for Note {
             Note::Narrower { expected, found } => write!(f, "the device delivered {found} bytes for {expected}"),
             Note::Announced { announced, found } => {
                 write!(f, "the device announced {announced} bytes and delivered {found}")
+            }
+            Note::MisnamedEnd => {
+                f.write_str("the device calls the last 7 bytes unused; they are kept, since size and CRC include them")
             }
         }
     }
@@ -78,15 +83,16 @@ pub struct FitError {
 /// Bytes that make no value of the type.
 pub fn fit(data_type: Option<DataType>, uploaded: &Uploaded) -> Result<Fitted, FitError> {
     let found = uploaded.bytes.len();
-    let announced = uploaded.announced.filter(|&size| usize::try_from(size) != Ok(found));
-    let announced = announced.map(|announced| Note::Announced { announced, found });
+    let odd = uploaded.announced.filter(|&size| usize::try_from(size) != Ok(found));
+    let odd = odd.map(|announced| Note::Announced { announced, found });
+    let odd = odd.or(uploaded.misnamed_end.then_some(Note::MisnamedEnd));
     let Some(data_type) = data_type else {
-        let note = if uploaded.indicated { announced } else { Some(Note::SizeNotIndicated) };
+        let note = if uploaded.indicated { odd } else { Some(Note::SizeNotIndicated) };
         return Ok(Fitted { value: Value::Bytes(uploaded.bytes.clone()), note });
     };
     let error = |error: WidthError| FitError { data_type, expected: error.expected, found };
     let Some(expected) = data_type.width() else {
-        return Ok(Fitted { value: data_type.decode(&uploaded.bytes).map_err(error)?, note: announced });
+        return Ok(Fitted { value: data_type.decode(&uploaded.bytes).map_err(error)?, note: odd });
     };
     if found < expected {
         let narrow = match data_type {
@@ -101,7 +107,7 @@ pub fn fit(data_type: Option<DataType>, uploaded: &Uploaded) -> Result<Fitted, F
     }
     let (counted, excess) = uploaded.bytes.split_at(expected);
     if excess.is_empty() || !uploaded.indicated {
-        return Ok(Fitted { value: data_type.decode(counted).map_err(error)?, note: announced });
+        return Ok(Fitted { value: data_type.decode(counted).map_err(error)?, note: odd });
     }
     let negative = matches!(data_type, DataType::Integer(_)) && counted.last().is_some_and(|byte| byte & 0x80 != 0);
     let filling = |byte: u8| excess.iter().all(|&found| found == byte);
@@ -117,7 +123,7 @@ mod tests {
     use super::*;
 
     fn uploaded(bytes: &[u8], indicated: bool) -> Uploaded {
-        Uploaded { bytes: bytes.to_vec(), indicated, announced: None }
+        Uploaded { bytes: bytes.to_vec(), indicated, announced: None, misnamed_end: false }
     }
 
     fn text(data_type: DataType, uploaded: &Uploaded) -> Result<(String, Option<Note>), FitError> {
@@ -161,7 +167,7 @@ mod tests {
 
     #[test]
     fn another_size_than_announced_is_said() {
-        let answer = Uploaded { bytes: b"MH-4-CAN".to_vec(), indicated: true, announced: Some(9) };
+        let answer = Uploaded { bytes: b"MH-4-CAN".to_vec(), indicated: true, announced: Some(9), misnamed_end: false };
         let note = Some(Note::Announced { announced: 9, found: 8 });
         assert_eq!(text(DataType::VisibleString, &answer), Ok(("MH-4-CAN".into(), note)));
     }

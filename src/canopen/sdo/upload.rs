@@ -17,6 +17,8 @@ pub struct Uploaded {
     pub indicated: bool,
     /// The size that a segmented transfer announced.
     pub announced: Option<u32>,
+    /// Whether the end of a block transfer took back a segment that size and CRC include: it has not been.
+    pub misnamed_end: bool,
 }
 
 /// A read in progress.
@@ -93,7 +95,7 @@ impl Upload {
         let expedited = command & 0x02 != 0;
         let indicated = command & 0x01 != 0;
         if command == 0x60 && self.accept_60 {
-            return Progress::Done(Uploaded { bytes: data[4..].to_vec(), indicated: false, announced: None });
+            return Progress::Done(Uploaded { bytes: data[4..].to_vec(), indicated: false, announced: None, misnamed_end: false });
         }
         if command >> 5 != 2 {
             let violation = if command == 0x60 { Violation::WriteAcknowledgeToRead } else { Violation::Command };
@@ -103,7 +105,7 @@ impl Upload {
             let unused = if indicated { usize::from(command >> 2 & 3) } else { 0 };
             // A short frame holds fewer bytes than it says: what is there is used, never filled up.
             let end = data.len().min(8 - unused).max(4);
-            return Progress::Done(Uploaded { bytes: data[4..end].to_vec(), indicated, announced: None });
+            return Progress::Done(Uploaded { bytes: data[4..end].to_vec(), indicated, announced: None, misnamed_end: false });
         }
         self.announced = if indicated { number(data) } else { None };
         self.state = State::Segments { toggle: false };
@@ -124,7 +126,7 @@ impl Upload {
         }
         if command & 0x01 != 0 {
             let bytes = std::mem::take(&mut self.bytes);
-            return Progress::Done(Uploaded { bytes, indicated: true, announced: self.announced });
+            return Progress::Done(Uploaded { bytes, indicated: true, announced: self.announced, misnamed_end: false });
         }
         self.state = State::Segments { toggle: !toggle };
         out.push(self.segment_request(!toggle));

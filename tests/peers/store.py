@@ -1,0 +1,136 @@
+"""A device on a CAN bus that keeps data: the SDO server of a foreign implementation.
+
+    store.py {canopen|durand} --files DIR [--heartbeat MS] IFACE NODE
+
+2000h is DIR/2000, read anew for every upload and replaced by every download; 2001h is the same of
+DIR/2001 and read only, 2002h an UNSIGNED32 and 2003h zeros that take longer than anybody waits.
+Prints "ready" once it has booted, and ends on SIGTERM.
+
+With canopen 2100h holds what is written to it, one sub-index for each of values.VALUES, and
+DIR/values has a line "SUB VALUE" for each download, as python-canopen understands it; 2101h has the
+values themselves.
+"""
+
+import argparse
+import logging
+import os
+import signal
+import sys
+
+# What it refuses is what it is asked for here.
+logging.disable(logging.CRITICAL)
+
+HUGE = bytes(16 << 20)
+
+
+class Files:
+    """The objects that are files."""
+
+    def __init__(self, directory):
+        self.directory = directory
+
+    def path(self, name):
+        return os.path.join(self.directory, name)
+
+    def read(self, index):
+        with open(self.path(f"{index:04X}"), "rb") as file:
+            return file.read()
+
+    def write(self, index, data):
+        # Whole or not at all.
+        with open(self.path("new"), "wb") as file:
+            file.write(data)
+        os.replace(self.path("new"), self.path(f"{index:04X}"))
+
+
+def with_canopen(arguments, files):
+    """python-canopen: expedited and segmented."""
+    import canopen
+    from canopen import objectdictionary as od
+
+    from dictionary import channels, record, variable
+    from values import VALUES
+
+    dictionary = od.ObjectDictionary()
+    for entry in [
+        variable("Device type", 0x1000, 0, od.UNSIGNED32, 0, "ro"),
+        variable("Error register", 0x1001, 0, od.UNSIGNED8, 0, "ro"),
+        variable("Producer heartbeat time", 0x1017, 0, od.UNSIGNED16, arguments.heartbeat),
+        channels("Identity", 0x1018, od.UNSIGNED32, [0x1234, 3, 1, arguments.node]),
+        variable("Data", 0x2000, 0, od.DOMAIN),
+        variable("Data to read", 0x2001, 0, od.DOMAIN, access="ro"),
+        variable("Number", 0x2002, 0, od.UNSIGNED32, 0),
+        variable("Huge", 0x2003, 0, od.DOMAIN, HUGE, access="ro"),
+        record("To write", 0x2100, [(sub, entry[0], None, "rw") for sub, entry in enumerate(VALUES, start=1)]),
+        record("To read", 0x2101, [(sub, entry[0], entry[2], "ro") for sub, entry in enumerate(VALUES, start=1)]),
+    ]:
+        dictionary.add_object(entry)
+    node = canopen.LocalNode(arguments.node, dictionary)
+    values = open(files.path("values"), "w", encoding="utf-8")
+
+    def on_read(index, **_):
+        return files.read(index) if index in (0x2000, 0x2001) else None
+
+    def on_write(index, subindex, od, data):
+        if index == 0x2000:
+            files.write(index, data)
+        elif index == 0x2100:
+            print(subindex, repr(od.decode_raw(bytes(data))), file=values, flush=True)
+
+    network = canopen.Network()
+    network.connect(interface="socketcan", channel=arguments.interface)
+    network.add_node(node)
+    node.add_read_callback(on_read)
+    node.add_write_callback(on_write)
+    node.nmt.state = "INITIALISING"
+    node.nmt.state = "PRE-OPERATIONAL"
+    return network.disconnect
+
+
+def with_durand(arguments, files):
+    """durand: block transfer too."""
+    import can
+    from durand import CANBusNetwork, MinimalNode, Record, Variable
+    from durand.datatypes import DatatypeEnum as types
+
+    bus = can.Bus(interface="socketcan", channel=arguments.interface)
+    network = CANBusNetwork(bus)
+    node = MinimalNode(network, arguments.node)
+    dictionary = node.object_dictionary
+    dictionary[0x2000] = Variable(types.DOMAIN, "rw")
+    dictionary[0x2001] = Variable(types.DOMAIN, "ro")
+    dictionary[0x2002] = Variable(types.UNSIGNED32, "rw")
+    dictionary[0x2003] = Variable(types.DOMAIN, "ro", HUGE)
+    for index in (0x2000, 0x2001):
+        dictionary.set_read_callback(index, 0, lambda index=index: files.read(index))
+    dictionary.download_callbacks[(0x2000, 0)].add(lambda data: files.write(0x2000, data))
+
+    def end():
+        network.stop()
+        bus.shutdown()
+
+    return end
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("peer", choices=["canopen", "durand"])
+    parser.add_argument("--files", metavar="DIR", required=True)
+    parser.add_argument("--heartbeat", metavar="MS", type=int, default=0)
+    parser.add_argument("interface", metavar="IFACE")
+    parser.add_argument("node", metavar="NODE", type=lambda text: int(text, 0))
+    arguments = parser.parse_args()
+
+    # Waited for below; blocked here so that every thread started from here on inherits that.
+    ends = {signal.SIGTERM, signal.SIGINT}
+    signal.pthread_sigmask(signal.SIG_BLOCK, ends)
+    end = {"canopen": with_canopen, "durand": with_durand}[arguments.peer](arguments, Files(arguments.files))
+    try:
+        print("ready", flush=True)
+        signal.sigwait(ends)
+    finally:
+        end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
