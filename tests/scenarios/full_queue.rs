@@ -1,8 +1,8 @@
 //! A transmit queue that has no room: nothing is lost by it, and nobody is missed.
 
-use cangauge::bus::{Bus, Event};
 use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::bus::{Bus, Event};
 use cangauge::canopen::id::NodeId;
 use cangauge::master::{Error, Master, Timing};
 use cangauge::sim::{Device, Setup};
@@ -44,7 +44,8 @@ fn a_scan_finds_the_same_nodes_however_often_the_queue_is_full() {
         assert_eq!(expected.iter().map(|node| node.0).collect::<Vec<_>>(), present);
         assert!(expected.iter().all(|node| !node.3.is_empty()), "{expected:?}");
         // Every second call; runs of 20 ms; nearly always.
-        let plans: [&dyn Fn(u64) -> bool; 3] = [&|call| call % 2 == 0, &|call| call / 20 % 2 == 0, &|call| call % 7 > 0];
+        let plans: [&dyn Fn(u64) -> bool; 3] =
+            [&|call| call % 2 == 0, &|call| call / 20 % 2 == 0, &|call| call % 7 > 0];
         for is_full in plans {
             let queue_full = (0..100_000).filter(|&call| is_full(call)).collect();
             let mut faulty = Faulty::new(bus(present), FaultPlan { queue_full, ..FaultPlan::default() });

@@ -1,7 +1,7 @@
 //! Another master that reads the same nodes, on the same SDO channels.
 
-use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::Mono;
+use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
@@ -127,7 +127,9 @@ fn read(object: ObjectId) -> Request {
 /// What is read, as text; of an error what it is called.
 fn outcome(master: &mut Master<'_>, request: Request) -> Result<Vec<u8>, SdoFailure> {
     let answer = master.transfer_one(request).unwrap();
-    answer.map(|answer| answer.uploaded.map(|uploaded| uploaded.bytes).unwrap_or_default()).map_err(|error| error.failure)
+    answer
+        .map(|answer| answer.uploaded.map(|uploaded| uploaded.bytes).unwrap_or_default())
+        .map_err(|error| error.failure)
 }
 
 #[test]
@@ -158,7 +160,10 @@ fn whatever_the_other_reads_and_when_ours_is_what_the_device_holds() {
             }
         }
     }
-    assert!(disturbed * 10 < clean && others > clean / 10, "{clean} came through, {disturbed} never, {others} of theirs");
+    assert!(
+        disturbed * 10 < clean && others > clean / 10,
+        "{clean} came through, {disturbed} never, {others} of theirs"
+    );
     eprintln!("{clean} came through, {disturbed} never, {others} of theirs");
 }
 
