@@ -4,6 +4,7 @@
 //! [`Master::next`] is the one loop: it sends what waits, receives one thing, lets the SDO client see it
 //! and says what happened. Everything that blocks is built on it.
 
+mod company;
 mod machine;
 mod sdo;
 mod send;
@@ -268,8 +269,7 @@ impl<'bus> Master<'bus> {
                             if node == silent && rest != at && results[rest].is_none() {
                                 self.forget(std::iter::once(tickets[rest]));
                                 let failure = SdoFailure::Cancelled;
-                                results[rest] =
-                                    Some(Err(SdoError { node, object, operation, failure, disturbed: false }));
+                                results[rest] = Some(Err(SdoError { node, object, operation, failure }));
                             }
                         }
                     }
@@ -294,13 +294,7 @@ impl<'bus> Master<'bus> {
     pub fn transfer_one(&mut self, request: Request) -> Result<Result<Answer, SdoError>, Error> {
         let (node, object, operation) = (request.node, request.object, request.operation());
         let result = self.transfer(vec![request], &mut |_| {})?.pop();
-        Ok(result.unwrap_or(Err(SdoError {
-            node,
-            object,
-            operation,
-            failure: SdoFailure::Cancelled,
-            disturbed: false,
-        })))
+        Ok(result.unwrap_or(Err(SdoError { node, object, operation, failure: SdoFailure::Cancelled })))
     }
 
     /// Reads a value of a known type.
@@ -333,7 +327,6 @@ impl Answer {
             object,
             operation: Operation::Read,
             failure: SdoFailure::Fit(error),
-            disturbed: false,
         })
     }
 }

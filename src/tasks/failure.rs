@@ -88,6 +88,9 @@ impl From<SdoError> for Failure {
                 let hint = format!("its bytes: cangauge sdo read {} {} --type hex", error.node, error.object);
                 (Kind::Unexpected, None, Some(hint))
             }
+            SdoFailure::Disturbed => {
+                (Kind::Unexpected, None, Some("stop the other program for a moment, or try again".to_owned()))
+            }
             SdoFailure::Cancelled => (Kind::Interrupted, None, None),
         };
         let object = Some(error.object);

@@ -1,7 +1,9 @@
-//! Recordings under bad conditions, on the virtual clock.
+//! Commands and recordings under bad conditions, on the virtual clock.
 
 mod answers;
+mod full_queue;
 mod garbage;
+mod second_master;
 mod second_sync;
 mod stalled;
 
