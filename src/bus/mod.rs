@@ -34,6 +34,11 @@ pub trait Bus {
     /// The present moment.
     fn now(&self) -> Stamp;
 
+    /// The present moment on the monotonic time line alone: on some machines each clock is a system call.
+    fn mono(&self) -> Mono {
+        self.now().mono
+    }
+
     /// Tells which frames are wanted from now on; others may or may not be delivered.
     /// A bus starts with every frame wanted.
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError>;
@@ -67,6 +72,10 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 
     fn now(&self) -> Stamp {
         (**self).now()
+    }
+
+    fn mono(&self) -> Mono {
+        (**self).mono()
     }
 
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {

@@ -82,6 +82,10 @@ impl<B: Bus> Bus for Traced<B> {
         self.bus.now()
     }
 
+    fn mono(&self) -> Mono {
+        self.bus.mono()
+    }
+
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
         self.bus.listen(filters)
     }

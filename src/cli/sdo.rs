@@ -161,7 +161,9 @@ impl ReadArgs {
         let bar = Transfer::new(global.shows_progress());
         let mut progress = |moved| bar.moved(moved);
         let mut options = Options { blocks: self.block.into(), size: SizeMode::Auto, progress: &mut progress };
-        global.with_master(|master| {
+        // Many values are one system call, and not one each.
+        let mut out = io::BufWriter::with_capacity(1 << 16, io::stdout());
+        let result = global.with_master(|master| {
             for object in &self.objects {
                 let at = resolve(&mut knowledge, master, object)?;
                 let value = read(master, &mut knowledge, at, self.data_type, &mut options)?;
@@ -171,16 +173,18 @@ impl ReadArgs {
                 }
                 match &mut file {
                     Some(file) => file.write(&value.raw)?,
-                    None if to_stdout => io::stdout().lock().write_all(&value.raw).map_err(stdout)?,
-                    None => self.print(&value, object, global.format).map_err(stdout)?,
+                    None if to_stdout => out.write_all(&value.raw).map_err(stdout)?,
+                    None => self.print(&mut out, &value, object, global.format).map_err(stdout)?,
                 }
             }
             Ok(())
-        })
+        });
+        // What was read before a failure is said before it.
+        let flushed = out.flush().map_err(stdout);
+        result.and(flushed)
     }
 
-    fn print(&self, value: &ReadValue, object: &ObjectArg, format: Format) -> io::Result<()> {
-        let mut out = io::stdout().lock();
+    fn print(&self, out: &mut dyn Write, value: &ReadValue, object: &ObjectArg, format: Format) -> io::Result<()> {
         let raw = hex(&value.raw);
         let shown = match &value.value {
             _ if self.hex => raw.clone(),
@@ -201,10 +205,10 @@ impl ReadArgs {
                     },
                     raw: &raw,
                 };
-                json::object(&mut out, &line)
+                json::object(out, &line)
             }
             Format::Csv => {
-                let mut csv = csv::Writer::from_writer(&mut out);
+                let mut csv = csv::Writer::from_writer(out);
                 csv.write_record([&self.node.to_string(), &value.object.to_string(), &shown, &raw])?;
                 csv.flush()
             }

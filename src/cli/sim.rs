@@ -1,9 +1,11 @@
 //! `cangauge sim`.
 
+use super::args::BusSpec;
 use super::exit::IntoFailure;
 use super::{Global, open};
 use crate::bus::memory::Station;
 use crate::sim;
+use crate::tasks::{Failure, Kind};
 use clap::Args;
 
 /// Simulate devices on a bus until Ctrl-C
@@ -21,6 +23,14 @@ pub(crate) struct Sim {
 impl Sim {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let bench = open::bench(&self.devices.join(","))?;
+        if let Some(BusSpec::Sim(_)) = global.bus {
+            return Err(Failure::new(
+                Kind::Usage,
+                "nobody else can reach the simulated bus: it is inside this program",
+            )
+            .hint("name an interface, say a virtual one: cangauge -b vcan0 sim mh4@5")
+            .into());
+        }
         let mut bus = open::open(global)?;
         let devices = bench.into_devices().map_err(open::bench_error)?;
         let stations = devices.into_iter().map(|device| Box::new(device) as Box<dyn Station>).collect();

@@ -4,6 +4,7 @@
 //! [`Master::next`] is the one loop: it sends what waits, receives one thing, lets the SDO client see it
 //! and says what happened. Everything that blocks is built on it.
 
+mod company;
 mod machine;
 mod sdo;
 mod send;
@@ -85,13 +86,15 @@ pub struct Master<'bus> {
     outgoing: Outgoing,
     /// A frame that came after the moment waited for.
     put_back: Option<Received>,
+    /// The latest moment known without looking at the clock again.
+    seen: Mono,
 }
 
 impl<'bus> Master<'bus> {
     /// A master on `bus`.
     pub fn new(bus: &'bus mut dyn Bus, timing: Timing) -> Master<'bus> {
-        let outgoing = Outgoing::new(bus.bit_rate());
-        Master { bus, timing, sdo: SdoClient::default(), outgoing, put_back: None }
+        let outgoing = Outgoing::new();
+        Master { bus, timing, sdo: SdoClient::default(), outgoing, put_back: None, seen: Mono::START }
     }
 
     /// The bus.
@@ -106,7 +109,7 @@ impl<'bus> Master<'bus> {
 
     /// The present moment.
     pub fn now(&self) -> Mono {
-        self.bus.now().mono
+        self.bus.mono()
     }
 
     /// Tells the bus which frames are wanted.
@@ -168,6 +171,9 @@ impl<'bus> Master<'bus> {
 
     /// Sends what still waits, within a second at most: an abort, a state put back.
     pub fn settle(&mut self) {
+        if !self.is_sending() {
+            return;
+        }
         let until = self.now() + Duration::from_secs(1);
         while self.is_sending() && self.now() < until {
             let step = self.now() + Duration::from_millis(1);
@@ -198,6 +204,7 @@ impl<'bus> Master<'bus> {
             match event {
                 Event::Frame(received) => {
                     let at = received.at.mono;
+                    self.seen = self.seen.max(at);
                     if at > until {
                         self.put_back = Some(received);
                         return Ok(Happening::Deadline);
@@ -227,6 +234,7 @@ impl<'bus> Master<'bus> {
             return Ok(None);
         }
         let now = self.now();
+        self.seen = now;
         self.sdo.advance(&self.timing, now, &mut self.outgoing);
         let (sdo, timing) = (&mut self.sdo, &self.timing);
         let retry_at = self.outgoing.flush(self.bus, now, timing.timeout, &mut |ticket, sent_at| {
@@ -236,7 +244,8 @@ impl<'bus> Master<'bus> {
     }
 
     /// Carries out transfers side by side and returns their results in the order of the requests. Frames
-    /// that are no part of them go to `watch`.
+    /// that are no part of them go to `watch`. A node that was silent to one request is not asked the rest:
+    /// those end as cancelled.
     ///
     /// # Errors
     /// Only what stops everything; what one device does is in its result.
@@ -245,17 +254,26 @@ impl<'bus> Master<'bus> {
         requests: Vec<Request>,
         watch: &mut dyn FnMut(&Received),
     ) -> Result<Vec<Result<Answer, SdoError>>, Error> {
+        let what: Vec<_> = requests.iter().map(|item| (item.node, item.object, item.operation())).collect();
         let tickets: Vec<Ticket> = requests.into_iter().map(|request| self.start(request)).collect();
         let mut results: Vec<Option<Result<Answer, SdoError>>> = tickets.iter().map(|_| None).collect();
-        let mut open = tickets.len();
         let far = Mono::at(Duration::MAX);
-        while open > 0 {
+        while results.iter().any(Option::is_none) {
             match self.next(far)? {
                 Happening::Sdo(ticket, result) => {
-                    if let Some(at) = tickets.iter().position(|&mine| mine == ticket) {
-                        results[at] = Some(result);
-                        open -= 1;
+                    let Some(at) = tickets.iter().position(|&mine| mine == ticket) else { continue };
+                    let silent =
+                        result.as_ref().err().filter(|error| matches!(error.failure, SdoFailure::NoAnswer { .. }));
+                    if let Some(silent) = silent.map(|error| error.node) {
+                        for (rest, &(node, object, operation)) in what.iter().enumerate() {
+                            if node == silent && rest != at && results[rest].is_none() {
+                                self.forget(std::iter::once(tickets[rest]));
+                                let failure = SdoFailure::Cancelled;
+                                results[rest] = Some(Err(SdoError { node, object, operation, failure }));
+                            }
+                        }
                     }
+                    results[at] = Some(result);
                 }
                 Happening::Frame(received) => watch(&received),
                 Happening::Interrupted => {

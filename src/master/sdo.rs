@@ -2,6 +2,7 @@
 //! late answer never becomes the next reading.
 
 use super::Timing;
+use super::company::Company;
 use super::machine::Machine;
 use super::send::Outgoing;
 use super::transfer::{Blocks, Way, names_the_object};
@@ -166,6 +167,12 @@ pub enum SdoFailure {
     /// The object holds text or bytes where a measured value was asked for.
     #[error("it is no number")]
     NotANumber,
+    /// Another client wrote the same object at the same time.
+    #[error("acknowledged, and whose write that was is not known: another master wrote the same object")]
+    Ambiguous,
+    /// Others use the channel, time and again.
+    #[error("another master uses the node's SDO channel at the same time")]
+    Disturbed,
     /// We gave up.
     #[error("not finished")]
     Cancelled,
@@ -182,8 +189,13 @@ struct Active {
     /// Frames given out that are not on their way yet.
     unsent: usize,
     attempts_left: u32,
+    /// When the first request went out: what came before is no answer to it.
+    asked_at: Option<Mono>,
+    company: Company,
     /// The user's transfer that waits while this one makes sure that no old answer is still under way.
     behind: Option<(Ticket, Request)>,
+    /// Another client writes the same object: whose acknowledge comes cannot be told.
+    ambiguous: bool,
 }
 
 /// A request that got no answer, whose answer may still come.
@@ -205,6 +217,9 @@ struct Node {
 /// How long an answer may be late. Nothing in the standard bounds it; storing takes the longest.
 const GHOST_LIFE: Duration = Duration::from_secs(10);
 
+/// How exactly the moments of sending and receiving can be compared.
+const SLACK: Duration = Duration::from_millis(5);
+
 /// The client's side of every SDO channel.
 #[derive(Debug, Default)]
 pub(super) struct SdoClient {
@@ -219,7 +234,20 @@ impl Active {
         let attempts = if request.falls_back() { 0 } else { timing.retries };
         let attempts_left = if request.repeatable { attempts } else { 0 };
         let machine = request.machine(accept_60);
-        Active { ticket, request, machine, deadline: None, unsent: 0, attempts_left, behind: None }
+        let (deadline, asked_at, behind) = (None, None, None);
+        let company = Company::default();
+        Active {
+            ticket,
+            request,
+            machine,
+            deadline,
+            unsent: 0,
+            attempts_left,
+            asked_at,
+            company,
+            behind,
+            ambiguous: false,
+        }
     }
 
     /// Hands frames to the queue, in place of those that are still in it.
@@ -232,6 +260,39 @@ impl Active {
         for frame in frames {
             outgoing.push(frame, Some(self.ticket));
         }
+    }
+
+    /// Another master has got in the way: begins anew when it is done, if that may be. The server is told
+    /// nothing, since the transfer that it has now is not ours.
+    fn stand_back(&mut self, accept_60: bool, now: Mono, timing: &Timing, outgoing: &mut Outgoing) -> bool {
+        let patience = self.waited(timing) * (1 + timing.retries);
+        if !self.request.repeatable || !self.company.stand_back(now, patience) {
+            return false;
+        }
+        self.give(Vec::new(), outgoing);
+        self.machine = self.request.machine(accept_60);
+        self.asked_at = None;
+        self.deadline = self.company.back_until();
+        true
+    }
+
+    /// Takes a frame that is no answer to us. Whether the transfer can go on.
+    fn overhear(&mut self, accept_60: bool, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
+        let now = received.at.mono;
+        self.company.hear(&received.frame, now);
+        if let Some(until) = self.company.back_until() {
+            self.deadline = Some(until);
+            return true;
+        }
+        let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
+        !in_segments || !self.company.is_in_the_way() || self.stand_back(accept_60, now, timing, outgoing)
+    }
+
+    /// Whether what has just come to its end in segments may not be ours alone.
+    fn is_doubtful(&self, uploaded: Option<&Uploaded>) -> bool {
+        let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
+        let delivered = uploaded.map_or(0, |uploaded| uploaded.bytes.len());
+        in_segments && self.company.casts_doubt(uploaded.and_then(|uploaded| uploaded.announced), delivered)
     }
 
     /// A read turns out to be of a large object: it is asked for in blocks, from the start.
@@ -272,6 +333,14 @@ impl Active {
 
     fn error(&self, failure: SdoFailure) -> SdoError {
         SdoError { node: self.request.node, object: self.request.object, operation: self.request.operation(), failure }
+    }
+
+    /// Takes a request of another client: the acknowledges of two writes of one object cannot be told apart.
+    fn hear_request(&mut self, frame: &Frame) {
+        if let [command, a, b, c, ..] = frame.data() {
+            let same = ObjectId::from_multiplexer([*a, *b, *c]) == self.request.object;
+            self.ambiguous |= same && command >> 5 == 1 && self.request.operation() == Operation::Write;
+        }
     }
 }
 
@@ -332,6 +401,7 @@ impl SdoClient {
         let active = self.nodes.values_mut().filter_map(|node| node.active.as_mut());
         if let Some(active) = active.into_iter().find(|active| active.ticket == ticket) {
             active.machine.on_sent();
+            active.asked_at.get_or_insert(now);
             active.unsent = active.unsent.saturating_sub(1);
             if active.unsent == 0 {
                 active.deadline = Some(now + active.waited(timing));
@@ -360,8 +430,22 @@ impl SdoClient {
             return false;
         };
         let mut out = Vec::new();
-        let result = match active.machine.on_frame(&received.frame, &mut out) {
+        let at = received.at.mono;
+        let progress = match active.asked_at {
+            Some(asked_at) if at + SLACK >= asked_at => active.machine.on_frame(&received.frame, &mut out),
+            _ => Progress::NotOurs,
+        };
+        let result = match progress {
             Progress::NotOurs => {
+                if id.sdo_request_node().is_some() {
+                    active.hear_request(&received.frame);
+                }
+                if !active.overhear(node.accept_60, received, timing, outgoing) {
+                    let error = active.error(SdoFailure::Disturbed);
+                    self.finished.push_back((active.ticket, Err(error)));
+                    outgoing.drop_ticket(active.ticket);
+                    node.active = None;
+                }
                 node.settle(&received.frame);
                 return false;
             }
@@ -379,7 +463,22 @@ impl SdoClient {
                 active.give(out, outgoing);
                 return true;
             }
+            Progress::Done(_) if active.ambiguous => Err(active.error(SdoFailure::Ambiguous)),
+            Progress::Done(uploaded) if active.is_doubtful(uploaded.as_ref()) => {
+                if active.stand_back(node.accept_60, at, timing, outgoing) {
+                    return true;
+                }
+                Err(active.error(SdoFailure::Disturbed))
+            }
             Progress::Done(uploaded) => Ok(Answer { uploaded, at: received.at, way: active.way() }),
+            Progress::Failed(error) if active.company.explains(error) => {
+                if active.stand_back(node.accept_60, at, timing, outgoing) {
+                    return true;
+                }
+                // An abort would hit their transfer.
+                out.clear();
+                Err(active.error(SdoFailure::Disturbed))
+            }
             Progress::Failed(error) => {
                 if active.is_refused_for_blocks(error) {
                     active.request.fall_back();
@@ -417,7 +516,16 @@ impl SdoClient {
             let Some(active) = node.active.as_mut().filter(|active| active.deadline.is_some_and(|at| at <= now)) else {
                 continue;
             };
+            if active.company.back_until().is_some() {
+                active.company.begin();
+                active.give(vec![active.machine.request()], outgoing);
+                continue;
+            }
             let begun = active.machine.has_begun();
+            let explained = begun && active.company.explains(TransferError::NoAnswer);
+            if explained && active.stand_back(node.accept_60, now, timing, outgoing) {
+                continue;
+            }
             let mut out = Vec::new();
             if active.machine.on_timeout(&mut out).is_none() {
                 active.give(out, outgoing);

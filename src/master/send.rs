@@ -19,16 +19,16 @@ const LONGEST_FRAME_BITS: u32 = 135;
 /// The queue between the protocol machines and the bus.
 pub(super) struct Outgoing {
     queue: VecDeque<(Frame, Option<Ticket>)>,
-    bit_rate: Option<u32>,
+    /// Asked for when there is first something to be paced: on some buses the question takes its time.
+    bit_rate: Option<Option<u32>>,
     /// When the wire will have carried everything sent so far, if nobody else sends.
     wire_free_at: Mono,
     full_since: Option<Mono>,
 }
 
 impl Outgoing {
-    pub(super) fn new(bit_rate: Option<u32>) -> Outgoing {
-        let bit_rate = bit_rate.filter(|&rate| rate > 0);
-        Outgoing { queue: VecDeque::new(), bit_rate, wire_free_at: Mono::START, full_since: None }
+    pub(super) fn new() -> Outgoing {
+        Outgoing { queue: VecDeque::new(), bit_rate: None, wire_free_at: Mono::START, full_since: None }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -65,8 +65,12 @@ impl Outgoing {
         patience: Duration,
         sent: &mut dyn FnMut(Ticket, Mono),
     ) -> Result<Option<Mono>, BusError> {
+        if self.queue.len() > AHEAD as usize && self.bit_rate.is_none() {
+            self.bit_rate = Some(bus.bit_rate().filter(|&rate| rate > 0));
+        }
+        let bit_rate = self.bit_rate.flatten();
         while let Some((frame, ticket)) = self.queue.front() {
-            if let Some(bit_rate) = self.bit_rate {
+            if let Some(bit_rate) = bit_rate {
                 let longest = bit_time(LONGEST_FRAME_BITS, bit_rate);
                 if self.wire_free_at.since(now) > longest * AHEAD {
                     return Ok(Some(now + longest));
@@ -87,7 +91,7 @@ impl Outgoing {
                 sent(*ticket, now);
             }
             // What this very frame takes: at the longest for each, a long burst would fall behind the wire.
-            if let Some(bit_rate) = self.bit_rate {
+            if let Some(bit_rate) = bit_rate {
                 self.wire_free_at = self.wire_free_at.max(now) + frame_time(frame, bit_rate);
             }
             self.queue.pop_front();

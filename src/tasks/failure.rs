@@ -81,10 +81,15 @@ impl From<SdoError> for Failure {
                 (Kind::NoAnswer, None, Some("who is there: cangauge scan".to_owned()))
             }
             SdoFailure::NoAnswer { begun: true, .. } => (Kind::NoAnswer, None, None),
-            SdoFailure::Violation(..) | SdoFailure::NotANumber => (Kind::Unexpected, None, None),
+            SdoFailure::Violation(..) | SdoFailure::NotANumber | SdoFailure::Ambiguous => {
+                (Kind::Unexpected, None, None)
+            }
             SdoFailure::Fit(_) => {
                 let hint = format!("its bytes: cangauge sdo read {} {} --type hex", error.node, error.object);
                 (Kind::Unexpected, None, Some(hint))
+            }
+            SdoFailure::Disturbed => {
+                (Kind::Unexpected, None, Some("stop the other program for a moment, or try again".to_owned()))
             }
             SdoFailure::Cancelled => (Kind::Interrupted, None, None),
         };

@@ -58,7 +58,7 @@ pub fn targets(instrument: &Instrument, wanted: &[Wanted], number: &mut usize) -
                 }
                 Wanted::Status(name) => {
                     let object = find(instrument, name)?.status.ok_or_else(|| {
-                        Failure::of_node(Kind::Unexpected, instrument.node, format!("{name} has no status object"))
+                        Failure::of_node(Kind::Usage, instrument.node, format!("{name} has no status object"))
                     })?;
                     plain(instrument, object, &format!("{name}.status"), take())
                 }

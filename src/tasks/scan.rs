@@ -26,6 +26,9 @@ pub struct Found {
 
 const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
 
+/// What the usual transmit queue of 10 frames takes on the wire at the most, each with its answer, in bits.
+const FULL_QUEUE_BITS: u64 = 10 * 2 * 135;
+
 /// How long after the first round of requests the silent nodes are asked once more.
 const SECOND_ROUND: Duration = Duration::from_millis(50);
 
@@ -43,6 +46,10 @@ pub fn scan(
     rounds: u32,
     overrides: &Overrides,
 ) -> Result<Vec<Found>, Error> {
+    // On the slowest of buses a request may stand in the queue for longer than others wait for an answer.
+    let queue = master.bus().bit_rate().filter(|&rate| rate > 0);
+    let queue = queue.map_or(0, |rate| FULL_QUEUE_BITS * 1_000_000 / u64::from(rate));
+    let wait = wait + Duration::from_micros(queue);
     let mut seen = Seen::default();
     let mut open: BTreeMap<Ticket, NodeId> = BTreeMap::new();
     for round in 0..rounds.max(1) {

@@ -52,6 +52,8 @@ impl Clocks {
         // Once a batch is enough: what does not fit then was stamped before the clock was set.
         if mono.is_none() && self.compared.is_some_and(|(at, _)| at < self.read) {
             let start = self.compare(now);
+            // The batch may have been read later than its time says, which is only a guess after a send.
+            self.read = self.read.max(now().mono);
             mono = self.place(wall, start);
         }
         Stamp { mono: mono.unwrap_or(self.read), wall: Wall::at(wall) }

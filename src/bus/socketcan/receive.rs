@@ -68,9 +68,11 @@ impl Batch {
         None
     }
 
-    /// Takes in what is there, without waiting: how many frames, none only with an error.
+    /// Takes in what is there: how many frames, none only with an error. With `wait` it waits for the first
+    /// one as long as the socket's `SO_RCVTIMEO` says, else not at all.
     #[expect(unsafe_code, reason = "no safe interface to recvmmsg delivers the drop counter")]
-    pub(super) fn fill(&mut self, socket: BorrowedFd<'_>) -> io::Result<usize> {
+    pub(super) fn fill(&mut self, socket: BorrowedFd<'_>, wait: bool) -> io::Result<usize> {
+        let flags = if wait { libc::MSG_WAITFORONE } else { libc::MSG_DONTWAIT };
         (self.next, self.count) = (0, 0);
         // SAFETY: all-zero bytes are a valid iovec and mmsghdr: lengths of 0 and null pointers.
         let mut parts: [libc::iovec; BATCH] = unsafe { std::mem::zeroed() };
@@ -88,13 +90,7 @@ impl Batch {
         // `parts` and the slots outlive the call and nothing else touches them during it. A can_frame
         // is plain bytes, so whatever the kernel writes is a valid one.
         let received = unsafe {
-            libc::recvmmsg(
-                socket.as_raw_fd(),
-                headers.as_mut_ptr(),
-                VECTOR,
-                libc::MSG_DONTWAIT as _,
-                std::ptr::null_mut(),
-            )
+            libc::recvmmsg(socket.as_raw_fd(), headers.as_mut_ptr(), VECTOR, flags as _, std::ptr::null_mut())
         };
         let count = usize::try_from(received).map_err(|_| io::Error::last_os_error())?;
         for (slot, header) in self.slots.iter_mut().zip(&headers).take(count) {

@@ -81,7 +81,8 @@ impl Poll {
                     skipped += 1;
                     continue;
                 }
-                for (request, part) in requests(target).into_iter().zip([Part::Value, Part::Status]) {
+                // The value last: when it comes the sample is complete, so that rows stand in order of time.
+                for (request, part) in requests(target).into_iter().zip([Part::Value, Part::Status]).rev() {
                     self.open.insert(master.start(request), (at, part));
                     parts.under_way += 1;
                 }

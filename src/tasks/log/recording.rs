@@ -47,6 +47,8 @@ pub(super) struct Recording {
     rhythms: Vec<Pulse>,
     pulses: BTreeMap<NodeId, Pulse>,
     emergencies_of: BTreeMap<CanId, NodeId>,
+    /// What the descriptions say of each emergency code.
+    meanings: BTreeMap<(NodeId, u16), String>,
     timestamps: TimestampSource,
     pub(super) rows: u64,
     first: Option<Mono>,
@@ -55,6 +57,8 @@ pub(super) struct Recording {
     emergencies: u64,
     gaps: u64,
     syncs: u64,
+    /// SYNCs whose time had passed.
+    left_out: u64,
     skipped: u64,
     wrong_length_said: BTreeSet<NodeId>,
     pub(super) remarks: Vec<String>,
@@ -76,6 +80,7 @@ impl Recording {
                 .filter(|_| plan.mode != Mode::Passive)
                 .map(|&node| (node, Pulse::default()))
                 .collect(),
+            meanings: instruments.iter().flat_map(meanings).collect(),
             emergencies_of: instruments.iter().map(|instrument| (instrument.emergency, instrument.node)).collect(),
             timestamps,
             rows: 0,
@@ -85,12 +90,30 @@ impl Recording {
             emergencies: 0,
             gaps: 0,
             syncs: 0,
+            left_out: 0,
             skipped: 0,
             wrong_length_said: BTreeSet::new(),
             remarks: Vec::new(),
             interrupted: false,
             samples: Vec::new(),
             learner: None,
+        }
+    }
+
+    /// Of several nodes each gives what it has of what is wanted; who has nothing of it is not waited for.
+    pub(super) fn excuse(&mut self, plan: &Plan) {
+        if plan.wanted.is_empty() {
+            return;
+        }
+        let sources = self.decoder.sources();
+        let (giving, others): (Vec<NodeId>, Vec<NodeId>) =
+            self.pulses.keys().copied().partition(|node| sources.iter().any(|source| source.node == *node));
+        if giving.is_empty() {
+            return;
+        }
+        for node in others {
+            self.pulses.remove(&node);
+            self.remarks.push(format!("node {node} gives nothing of what is wanted"));
         }
     }
 
@@ -130,6 +153,7 @@ impl Recording {
             _ => None,
         };
         let mut next_tick = begin + TICK;
+        let mut slot = 0;
         loop {
             let mut until = next_tick;
             if self.rows == 0 {
@@ -140,7 +164,7 @@ impl Recording {
             }
             // Computed from the beginning, never from the last one: no drift.
             if let Some((period, _)) = sync {
-                until = until.min(begin + nth(period, self.syncs));
+                until = until.min(begin + nth(period, slot));
             }
             if let Some(poll) = &poll {
                 until = until.min(poll.due(begin));
@@ -163,10 +187,13 @@ impl Recording {
                         return Ok(());
                     }
                     if let Some((period, id)) = sync
-                        && until >= begin + nth(period, self.syncs)
+                        && until >= begin + nth(period, slot)
                     {
                         master.send_first(Frame::empty(id));
                         self.syncs += 1;
+                        let next = next_slot(begin, master.now(), period, slot);
+                        self.left_out += next - slot - 1;
+                        slot = next;
                     }
                     if let Some(poll) = &mut poll {
                         self.skipped += poll.start_due(begin, until, master);
@@ -232,7 +259,9 @@ impl Recording {
                 if let (Some(&node), Some(emergency)) = (self.emergencies_of.get(&frame.id()), Emergency::parse(frame))
                 {
                     self.emergencies += 1;
-                    observer.note(&Note::Emergency(node, emergency), received.at);
+                    let meaning = self.meanings.get(&(node, emergency.code));
+                    let meaning = meaning.map_or_else(|| Emergency::class(emergency.code), String::as_str);
+                    observer.note(&Note::Emergency(node, emergency, meaning.to_owned()), received.at);
                 } else if let Some((node, life)) = Life::parse(frame)
                     && self.pulses.contains_key(&node)
                     && states.take(node, life, master)
@@ -299,6 +328,9 @@ impl Recording {
             .filter(|(_, pulse)| pulse.last.is_none_or(|last| self.end.since(last) > patience(pulse)))
             .map(|(&node, _)| node)
             .collect();
+        if self.left_out > 0 {
+            self.remarks.push(format!("{} SYNC left out: the program was stopped or too slow", self.left_out));
+        }
         let nothing = (self.rows == 0).then(|| why_nothing(instruments, plan, &self));
         for &node in lost.iter().filter(|_| self.rows > 0) {
             if let Some(instrument) = instruments.iter().find(|instrument| instrument.node == node)
@@ -326,7 +358,24 @@ impl Recording {
     }
 }
 
+/// When the next SYNC is due after that of `slot`. A program that was stopped makes up for none: a burst would
+/// be no rhythm, and two would be closer together than anybody asked for.
+fn next_slot(begin: Mono, now: Mono, period: Duration, slot: u64) -> u64 {
+    let passed = now.since(begin).as_nanos() / period.as_nanos().max(1);
+    let passed = u64::try_from(passed).unwrap_or(u64::MAX - 2);
+    if passed <= slot {
+        return slot + 1;
+    }
+    let next = begin + nth(period, passed + 1);
+    if next.since(now) * 2 < period { passed + 2 } else { passed + 1 }
+}
+
 /// How long a node may be silent: five of its usual intervals, at least a second.
 fn patience(pulse: &Pulse) -> Duration {
     (pulse.interval.unwrap_or_default() * 5).max(Duration::from_secs(1))
+}
+
+fn meanings(instrument: &Instrument) -> impl Iterator<Item = ((NodeId, u16), String)> {
+    let described = instrument.model.as_ref().map_or(&[][..], |model| &model.description.emergencies);
+    described.iter().map(|entry| ((instrument.node, entry.code), entry.text.clone()))
 }

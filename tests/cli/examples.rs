@@ -1,0 +1,65 @@
+//! Every example of the help and of the README is a command that works.
+
+use super::Bench;
+use cangauge::cli::Cli;
+use clap::{Command, CommandFactory, Parser};
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::thread;
+
+/// Examples that take too long, by name.
+const TOO_LONG: [&str; 1] = ["cangauge -b sim log 1-3,127 --sync 10ms --duration 1h -o run.csv"];
+
+/// Every line of the help and the README that begins with the program's name, what stands beside it cut off.
+fn examples() -> BTreeSet<String> {
+    let mut texts =
+        vec![std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("the README")];
+    let mut root = Cli::command();
+    root.build();
+    let mut commands: Vec<Command> = vec![root];
+    while let Some(mut command) = commands.pop() {
+        texts.push(command.render_long_help().to_string());
+        commands.extend(command.get_subcommands().cloned());
+    }
+    let lines = texts.iter().flat_map(|text| text.lines()).map(str::trim).map(|line| {
+        match line.strip_prefix("cargo run -- ") {
+            Some(rest) => format!("cangauge {rest}"),
+            None => line.to_owned(),
+        }
+    });
+    let examples = lines.filter(|line| line.starts_with("cangauge ") && !line.contains("CHANNEL"));
+    examples.map(|line| line.split("  ").next().unwrap_or_default().trim_end_matches(" &").to_owned()).collect()
+}
+
+#[test]
+fn every_example_is_understood() {
+    let examples = examples();
+    assert!(examples.len() >= 15, "{examples:?}");
+    for example in examples {
+        let words = example.split(" > ").next().unwrap_or_default().split_whitespace();
+        if let Err(error) = Cli::try_parse_from(words) {
+            panic!("{example}: {error}");
+        }
+    }
+}
+
+#[test]
+fn every_example_on_the_simulated_bus_works() {
+    let examples: BTreeSet<String> =
+        examples().into_iter().filter(|example| example.starts_with("cangauge -b sim ")).collect();
+    for example in TOO_LONG {
+        assert!(examples.contains(example), "{example} is no example any more");
+    }
+    let run = |example: &str| {
+        let bench = Bench::real("mh4@1");
+        let words: Vec<&str> = example.split_whitespace().skip(1).collect();
+        let done = bench.finish(&mut bench.command(&words)).exit(0);
+        assert!(!done.stdout.is_empty() || !bench.files().is_empty() || example.contains(" sdo write "), "{example}");
+    };
+    // On the real clock, as people have it: side by side.
+    thread::scope(|scope| {
+        for example in examples.iter().filter(|example| !TOO_LONG.contains(&example.as_str())) {
+            scope.spawn(move || run(example));
+        }
+    });
+}

@@ -1,0 +1,206 @@
+//! How a recording begins and ends: states put back, nodes that are silent, Ctrl-C.
+
+use super::Bench;
+use serde_json::json;
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+
+#[test]
+fn mh4_is_silent_without_sync() {
+    let bench = Bench::of("mh4@1");
+    let silent = "cangauge: node 1: no measurements within 5 s: TPDO1 waits for SYNC and nobody sends it\n\
+                  hint: add --sync 100ms, or read by SDO: --poll 100ms (node 1)\n";
+    let done = bench.run("log 1 -o run.csv").exit(3);
+    assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("", silent));
+    assert_eq!(bench.files(), [""; 0], "no file is left");
+    bench.run("log 1").fails(3, silent);
+    bench.run("log 1 --format json").exit(3).error();
+    let within = bench.run("log 1 --duration 2s").exit(3).stderr;
+    assert!(within.contains("no measurements within 2 s"), "{within}");
+    let within = bench.run("log 1 --duration 1h").exit(3).stderr;
+    assert!(within.contains("no measurements within 5 s"), "{within}");
+}
+
+#[test]
+fn a_state_that_was_known_is_put_back() {
+    let with = |more: &str| {
+        Bench::described(&format!("[[device]]\nkind = \"mh4\"\nnode = 5\n{more}set = {{ \"0x1017\" = 100 }}\n"))
+    };
+    let done = with("").run("log 5 --sync 10ms --count 10").exit(0);
+    assert_eq!(done.frames_of("000"), ["0105", "8005"]);
+    assert!(!done.stderr.contains("stays operational"), "{}", done.stderr);
+    let last = done.frames.iter().rposition(|frame| frame == "080#").expect("a SYNC");
+    assert!(done.frames[last..].contains(&"000#8005".to_owned()), "put back at the end");
+    let done = with("start = true\n").run("log 5 --sync 10ms --count 10").exit(0);
+    assert_eq!(done.frames_of("000"), [""; 0], "it was operational already");
+    // On a failure, too: what comes to nothing leaves nothing behind.
+    let done = with("").run("log 5").exit(3);
+    assert_eq!(done.frames_of("000"), ["0105", "8005"]);
+}
+
+#[test]
+fn a_state_that_nothing_told_is_not_guessed() {
+    let done = Bench::of("mh4@5,mh4@6").run("log 5 --sync 10ms --count 10").exit(0);
+    assert_eq!(done.frames_of("000"), ["0105"], "named nodes only");
+    let said = "node 5 was started; its state before is not known, so it stays operational\n";
+    assert!(done.stderr.ends_with(said), "{}", done.stderr);
+}
+
+#[test]
+fn no_nmt_leaves_nmt_alone() {
+    let bench = Bench::described("[[device]]\nkind = \"dps\"\nnode = 5\nstart = true\n");
+    let done = bench.run("log 5 --count 3 --no-nmt").exit(0);
+    assert_eq!(done.frames_of("000"), [""; 0]);
+    let done = Bench::of("dps@5").run("log 5 --no-nmt").exit(3);
+    assert_eq!((done.frames_of("000"), done.stdout.as_str()), (vec![], ""));
+    assert!(done.stderr.contains("is it started?") && done.stderr.contains("nmt state 5"), "{}", done.stderr);
+}
+
+#[test]
+fn named_nodes_must_answer() {
+    let bench = Bench::of("mh4@1");
+    let no_answer = "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: who is there: cangauge scan\n";
+    let done = bench.run("log 1,9 --sync 10ms -o run.csv").exit(3);
+    assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("", no_answer));
+    assert_eq!((done.frames_of("000"), bench.files()), (vec![], vec![]), "nothing was started, no file is left");
+}
+
+#[test]
+fn a_node_that_gives_nothing_among_others() {
+    let done = Bench::of("mh4@1,dps@127").run("log 1,127 --duration 2s").exit(7);
+    assert!(done.stdout.lines().skip(1).all(|line| line.contains(",127,pressure,")), "{}", done.stdout);
+    assert!(
+        done.stderr.contains("node 1: no measurements: TPDO1 waits for SYNC and nobody sends it"),
+        "{}",
+        done.stderr
+    );
+    assert!(done.stderr.ends_with("cangauge: node 1 lost: silent at the end\n"), "{}", done.stderr);
+}
+
+#[test]
+fn signals_that_nobody_has() {
+    let bench = Bench::of("mh4@1,dps@127");
+    bench
+        .run("log 1,127 presure --sync 10ms")
+        .fails(2, "cangauge: no node has a signal \"presure\"\nhint: there are: pressure, temperature\n");
+    bench
+        .run("log 127 pressure.status")
+        .fails(2, "cangauge: no node has an object that tells the status of pressure\n");
+    bench
+        .run("log 127 0x6132:1")
+        .fails(6, "cangauge: no TPDO carries 0x6132:1\nhint: read it by SDO instead: add --poll 100ms\n");
+    bench.run("log 127 0x6132:1 --poll 100ms --count 3").exit(0);
+}
+
+#[test]
+fn the_summary() {
+    let bench = Bench::of("dps@127");
+    let done = bench.run("log 127 --count 20 --summary sum.json").exit(0);
+    let lines: Vec<&str> = done.stderr.lines().collect();
+    assert_eq!(lines[0], "20 rows in 1.9 s, simulated timestamps, 0 frames dropped, 0 gaps");
+    assert!(lines[1].starts_with("node 127 pressure  n 20  mean "), "{}", lines[1]);
+    let summary: serde_json::Value = serde_json::from_str(&bench.text("sum.json")).expect("JSON");
+    assert_eq!(
+        (&summary["rows"], &summary["timestamps"], &summary["dropped"], &summary["gaps"], &summary["lost_nodes"]),
+        (&json!(20), &json!("simulated"), &json!(0), &json!(0), &json!([]))
+    );
+    // The statistics are those of the rows.
+    let values: Vec<f64> = done
+        .stdout
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').nth(4).and_then(|cell| cell.parse().ok()).expect(line))
+        .collect();
+    let mean = values.iter().sum::<f64>() / 20.0;
+    let sd = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 19.0).sqrt();
+    let signal = &summary["signals"][0];
+    let near = |key: &str, wanted: f64| {
+        let found = signal[key].as_f64().expect(key);
+        assert!((found - wanted).abs() < 1e-9, "{key}: {found}, {wanted}");
+    };
+    near("mean", mean);
+    near("sd", sd);
+    near("min", values.iter().copied().fold(f64::INFINITY, f64::min));
+    near("max", values.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+    assert_eq!(
+        (&signal["node"], &signal["signal"], &signal["unit"], &signal["count"], &signal["invalid"]),
+        (&json!(127), &json!("pressure"), &json!("psi"), &json!(20), &json!(0))
+    );
+    let done = bench.run("log 127 --count 2 -q --summary - -o run.csv").exit(0);
+    assert_eq!(done.json()[0]["rows"], 2);
+    bench.run("log 127 --count 2 --summary sum.json").refuses("sum.json exists");
+    bench
+        .run("log 127 --count 2 --summary no/folder.json")
+        .fails(8, "cangauge: create no/folder.json: No such file or directory (os error 2)\n");
+}
+
+#[test]
+fn an_overload_is_told_as_it_comes() {
+    let bench = Bench::described(
+        "[[device]]\nkind = \"mh4\"\nnode = 5\n\
+         [[device.overload]]\nchannel = 1\nfrom = \"700ms\"\nuntil = \"800ms\"\ndirection = \"high\"\n",
+    );
+    let done = bench.run("log 5 --sync 10ms --duration 1s").exit(0);
+    let told = "warning: node 5: emergency F001h, user input overload";
+    assert!(done.stderr.lines().any(|line| line.starts_with(told)), "{}", done.stderr);
+    // (1 SYNC of at most 50 bits and 1 TPDO of at most 135) in 10 ms, of 250 kbit/s.
+    assert!(
+        done.stderr.starts_with("SYNC every 10 ms and the answers take about 7.4 % of the bus\n"),
+        "{}",
+        done.stderr
+    );
+    assert!(done.stderr.contains("node 5: emergency over (0000h)"), "{}", done.stderr);
+    assert!(done.stderr.contains("  10 invalid"), "{}", done.stderr);
+}
+
+#[cfg(unix)]
+fn signal(child: &std::process::Child, name: &str) {
+    let status = Command::new("kill").args([format!("-{name}"), child.id().to_string()]).status().expect("kill");
+    assert!(status.success());
+}
+
+/// On the real clock: a person stops it.
+#[test]
+#[cfg(unix)]
+fn ctrl_c_finishes_the_file() {
+    for name in ["INT", "TERM"] {
+        let bench = Bench::real("dps@127");
+        let mut command = bench.traced(&["log", "127"]);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
+        let mut reader = BufReader::new(child.stdout.take().expect("stdout"));
+        let mut text = String::new();
+        for _ in 0..2 {
+            reader.read_line(&mut text).expect("a line");
+        }
+        signal(&child, name);
+        std::io::Read::read_to_string(&mut reader, &mut text).expect("the rest");
+        let mut lines = text.split_inclusive('\n');
+        assert_eq!(lines.next(), Some("time,elapsed_s,node,signal,value,unit,status,raw\n"));
+        assert!(lines.all(|line| line.ends_with('\n') && line.split(',').count() == 8), "{text}");
+        let output = child.wait_with_output().expect("its end");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{stderr}");
+        let rows = text.lines().count() - 1;
+        assert!(stderr.starts_with(&format!("{rows} row")), "{stderr}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn ctrl_c_before_there_was_a_row() {
+    let bench = Bench::real("mh4@1");
+    let words = ["-b", &bench.bus, "--trace", "-", "log", "1", "-o", "run.csv"];
+    let mut child = bench.command(&words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
+    let mut reader = BufReader::new(child.stderr.take().expect("stderr"));
+    let mut line = String::new();
+    while !line.contains("000#0101") {
+        line.clear();
+        assert!(reader.read_line(&mut line).expect("a line") > 0, "it ended before it had started the node");
+    }
+    signal(&child, "INT");
+    let mut rest = String::new();
+    std::io::Read::read_to_string(&mut reader, &mut rest).expect("the rest");
+    assert_eq!(child.wait().expect("its end").code(), Some(130), "{rest}");
+    assert_eq!(rest, "cangauge: interrupted\n");
+    assert_eq!(bench.files(), [""; 0], "no file is left");
+}

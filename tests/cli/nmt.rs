@@ -1,0 +1,147 @@
+//! `cangauge nmt`.
+
+use super::{ALL, Bench};
+
+const HEARTBEAT: &str = "[[device]]\nkind = \"mh4\"\nnode = 5\nset = { \"0x1017\" = 100 }\n";
+
+#[test]
+fn a_heartbeat_confirms() {
+    let bench = Bench::described(HEARTBEAT);
+    let done = bench.run("nmt start 5").prints("5  operational  heartbeat\n");
+    assert_eq!((done.frames_of("000"), done.stderr.as_str()), (vec!["0105"], ""));
+    bench.run("nmt preop 5").prints("5  pre-operational  heartbeat\n");
+    bench.run("nmt stop 5").prints("5  stopped  heartbeat\n");
+    bench.run("nmt state 5").prints("5  pre-operational  heartbeat\n");
+    let done = bench.run("nmt start 5 -f json").prints("{\"node\":5,\"state\":\"operational\",\"by\":\"heartbeat\"}\n");
+    assert_eq!(done.json()[0]["state"], "operational");
+    bench.run("nmt start 5 -f csv").prints("node,state,by\n5,operational,heartbeat\n");
+}
+
+#[test]
+fn a_boot_up_confirms_a_reset() {
+    let bench = Bench::of(ALL);
+    let done = bench.run("nmt reset 1").prints("1  pre-operational  boot-up\n");
+    assert_eq!((done.frames_of("000"), done.frames_of("701")), (vec!["8101"], vec!["00", "00"]));
+    let done = bench.run("nmt reset-comm 127").prints("127  pre-operational  boot-up\n");
+    assert_eq!(done.frames_of("000"), ["827F"]);
+}
+
+#[test]
+fn guarding_confirms_where_it_is_harmless() {
+    // D-20-9 and MC1609 have 100Ch and 100Dh, both 0; DPS and MH-4 have no guarding.
+    let done = Bench::of(ALL).run("nmt start 1-3,127").exit(0);
+    assert_eq!(
+        done.stdout,
+        "  1  -            none\n  2  operational  guarding\n  3  operational  guarding\n127  -            none\n"
+    );
+    assert_eq!(
+        done.stderr,
+        "node 1: sent, and nothing confirms it: no heartbeat (1017h is 0)\n\
+         node 127: sent, and nothing confirms it: no heartbeat (1017h is 0)\n"
+    );
+    assert_eq!(done.frames_of("000"), ["0101", "0102", "0103", "017F"]);
+    // The first RTR arms life guarding where 100Ch and 100Dh say so: then nobody asks.
+    let guarded = "[[device]]\nkind = \"d20\"\nnode = 2\nset = { \"0x100C\" = 100, \"0x100D\" = 3 }\n";
+    let done = Bench::described(guarded).run("nmt start 2").prints("2  -  none\n");
+    assert_eq!(done.frames_of("702"), ["00"], "the boot-up, and no RTR");
+}
+
+#[test]
+fn silence_proves_stopped() {
+    let done = Bench::of(ALL).run("nmt stop 127").prints("127  stopped  sdo\n");
+    assert_eq!(done.frames_of("000"), ["027F"]);
+}
+
+#[test]
+fn what_cannot_be_confirmed_is_said_or_is_exit_3() {
+    let bench = Bench::of(ALL);
+    let done = bench.run("nmt start 127 -f json").prints("{\"node\":127,\"state\":null,\"by\":\"none\"}\n");
+    assert_eq!(done.stderr, "node 127: sent, and nothing confirms it: no heartbeat (1017h is 0)\n");
+    let done = bench.run("nmt start 127 --confirm").exit(3);
+    assert_eq!(
+        done.stderr,
+        "cangauge: node 127: sent, and nothing confirms it: no heartbeat (1017h is 0)\n\
+         hint: set a heartbeat: cangauge sdo write 127 producer-heartbeat-time 1000\n"
+    );
+}
+
+#[test]
+fn all_is_one_broadcast() {
+    let done = Bench::of(ALL).run("nmt reset all").exit(0);
+    assert_eq!(done.frames_of("000"), ["8100"]);
+    assert_eq!(done.stdout.lines().filter(|line| line.ends_with("boot-up")).count(), 4, "{}", done.stdout);
+}
+
+#[test]
+fn no_wait_only_sends() {
+    let done = Bench::of(ALL).run("nmt start 1,2 --no-wait").prints("");
+    assert_eq!(
+        done.frames.iter().filter(|frame| !frame.ends_with("#00")).collect::<Vec<_>>(),
+        ["000#0101", "000#0102"]
+    );
+    let done = Bench::of(ALL).run("nmt stop all --no-wait").prints("");
+    assert_eq!(done.frames_of("000"), ["0200"]);
+}
+
+#[test]
+fn states_are_told_and_never_guessed() {
+    let done = Bench::of(ALL).run("nmt state 1-3,127 -f json").exit(0);
+    let told: Vec<_> = done.json().iter().map(|node| (node["state"].clone(), node["by"].clone())).collect();
+    let guarding = ("pre-operational".into(), "guarding".into());
+    let none = (serde_json::Value::Null, "none".into());
+    assert_eq!(told, [none.clone(), guarding.clone(), guarding, none]);
+    assert_eq!(done.frames_of("000"), [""; 0]);
+}
+
+#[test]
+fn a_node_that_is_not_there() {
+    let bench = Bench::of(ALL);
+    let done = bench.run("nmt state 9").exit(3);
+    assert_eq!(done.stderr, "cangauge: node 9: no heartbeat and no SDO answer\nhint: who is there: cangauge scan\n");
+    let done = bench.run("nmt state 1,9").exit(7);
+    assert_eq!(done.stdout, "1  -  none\n9  -  none\n");
+    let done = bench.run("nmt start 9 --confirm").exit(3);
+    assert_eq!(
+        done.stderr,
+        "cangauge: node 9: sent, and nothing came back: no heartbeat, no boot-up, no SDO answer\n\
+         hint: who is there: cangauge scan\n"
+    );
+}
+
+#[test]
+fn a_stopped_node_is_woken() {
+    // It has no SDO: only its heartbeat tells.
+    let bench = Bench::described(&format!("{HEARTBEAT}[[device]]\nkind = \"dps\"\nnode = 6\n"));
+    let done = bench.run("nmt stop 5,6").exit(0);
+    assert_eq!(done.stdout, "5  stopped  heartbeat\n6  stopped  sdo\n");
+}
+
+#[test]
+fn a_probe_sets_the_heartbeat_for_a_moment_and_puts_it_back() {
+    let done = Bench::of("mh4@5").run("nmt state 5 --probe").prints("5  pre-operational  heartbeat\n");
+    let writes: Vec<&str> = done.frames_of("605").into_iter().filter(|request| request.starts_with("2B17")).collect();
+    assert_eq!(writes.len(), 2, "{:?}", done.frames);
+    assert!(writes[0] != writes[1] && writes[1] == "2B17100000000000", "{writes:?}");
+    // Where something tells the state already, nothing is set.
+    let done = Bench::described(HEARTBEAT).run("nmt state 5 --probe").exit(0);
+    assert!(done.frames_of("605").iter().all(|request| request.starts_with('4')), "{:?}", done.frames);
+}
+
+#[test]
+fn what_happens_is_followed() {
+    let bench = Bench::described(&format!("{HEARTBEAT}[[device]]\nkind = \"dps\"\nnode = 6\n"));
+    let done = bench.run("nmt watch --duration 1s").exit(0);
+    let said: Vec<String> =
+        done.stdout.lines().map(|line| line.split_whitespace().skip(1).collect::<Vec<_>>().join(" ")).collect();
+    assert_eq!(said, ["5 boot-up", "6 boot-up", "5 state pre-operational"]);
+    assert_eq!(done.frames.iter().filter(|frame| !frame.starts_with("70")).count(), 0, "{:?}", done.frames);
+}
+
+#[test]
+fn who_starts_the_device() {
+    let bench = Bench::of("mh4@5,dps@6");
+    bench.run("nmt startup 5").prints("wait\n");
+    let done = bench.run("nmt startup 5 auto").prints("auto\n");
+    assert!(done.stderr.contains("stored (1010h)"), "{}", done.stderr);
+    assert!(bench.run("nmt startup 6").exit(6).stderr.contains("1F80h"));
+}

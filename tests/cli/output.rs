@@ -1,0 +1,102 @@
+//! What goes where: data to stdout, the rest to stderr, and what happens when nobody takes it.
+
+use super::{ALL, Bench, closed_pipe};
+use std::fs;
+use std::process::Stdio;
+
+/// Every command that prints.
+const PRINTING: [&str; 7] = [
+    "scan",
+    "read 1,127",
+    "sdo read 1 0x1018:1",
+    "nmt state 1",
+    "log 127 --count 5",
+    "log 127 --count 5 --format json",
+    "completions bash",
+];
+
+#[test]
+fn a_reader_that_has_gone_is_a_quiet_success() {
+    let bench = Bench::of(ALL);
+    for line in PRINTING {
+        let words: Vec<&str> = line.split(' ').collect();
+        let child = bench.traced(&words).stdout(closed_pipe()).stderr(Stdio::piped()).spawn().expect("the binary");
+        let done = bench.end(child).exit(0);
+        assert!(!done.stderr.contains("cangauge:") && !done.stderr.contains("warning"), "{line}: {}", done.stderr);
+    }
+    for words in [["--help"], ["--version"], ["help"]] {
+        let child = bench.command(&words).stdout(closed_pipe()).stderr(Stdio::piped()).spawn().expect("the binary");
+        assert_eq!(bench.end(child).exit(0).stderr, "", "{words:?}");
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_is_said() {
+    let bench = Bench::of(ALL);
+    for line in PRINTING {
+        let words: Vec<&str> = line.split(' ').collect();
+        let child = bench.traced(&words).stdout(super::full_disk()).stderr(Stdio::piped()).spawn().expect("the binary");
+        let done = bench.end(child).exit(8);
+        let said = done.stderr.lines().any(|line| line.contains("No space left on device"));
+        assert!(said, "{line}: {}", done.stderr);
+    }
+}
+
+#[test]
+fn quiet_leaves_errors_only() {
+    let bench = Bench::of(ALL);
+    for line in ["scan -q", "nmt start 1 -q", "log 1 --sync 10ms --count 3 -q", "log 1,127 --sync 10ms --count 30 -q"] {
+        let done = bench.run(line).exit(0);
+        assert_eq!(done.stderr, "", "{line}");
+        assert!(!done.stdout.is_empty());
+    }
+    let done = bench.run("read 9 -q").exit(3);
+    assert!(done.stderr.starts_with("cangauge: node 9: "), "{}", done.stderr);
+}
+
+#[test]
+fn colour_only_where_it_was_asked_for() {
+    let bench = Bench::of(ALL);
+    let run = |words: &[&str], environment: &[(&str, &str)]| {
+        let mut command = bench.traced(words);
+        bench.finish(command.envs(environment.iter().copied())).stderr
+    };
+    let coloured = |text: &str| text.contains('\u{1b}');
+    assert!(!coloured(&run(&["read", "9"], &[])), "no terminal");
+    assert!(coloured(&run(&["read", "9", "--color", "always"], &[])));
+    assert!(!coloured(&run(&["read", "9", "--color", "never"], &[("CLICOLOR_FORCE", "1")])));
+    assert!(coloured(&run(&["read", "9"], &[("CLICOLOR_FORCE", "1")])));
+    assert!(!coloured(&run(&["read", "9"], &[("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")])));
+    assert!(!coloured(&run(&["read", "200"], &[])));
+}
+
+#[test]
+fn the_trace_is_as_candump_writes_it() {
+    let bench = Bench::of("mh4@5");
+    bench.run("sdo read 5 0x1018:1").prints("71\n");
+    let trace = bench.text("trace");
+    let lines: Vec<&str> = trace.lines().collect();
+    assert_eq!(lines.len(), 3, "{trace}");
+    assert_eq!(lines[0], "(1767225600.000000) sim 605#4018100100000000");
+    assert!(lines[2].starts_with("(1767225600.00") && lines[2].ends_with(") sim 585#4318100147000000"), "{trace}");
+    let done = bench.finish(&mut bench.command(&["-b", &bench.bus, "--trace", "-", "sdo", "read", "5", "0x1018:1"]));
+    assert_eq!(done.exit(0).stderr, trace);
+    // A value that does not fit opens nothing, and a trace that cannot be written is found before the bus is.
+    fs::remove_file(bench.path("trace")).expect("removed");
+    bench.run("sdo write 5 0x1017 70000").exit(2);
+    assert!(!bench.path("trace").exists());
+    let words = ["-b", &bench.bus, "--trace", "no/such/folder", "scan"];
+    bench
+        .finish(&mut bench.command(&words))
+        .fails(8, "cangauge: write trace no/such/folder: No such file or directory (os error 2)\n");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_trace_on_a_full_disk_is_said() {
+    let bench = Bench::of("mh4@5");
+    let words = ["-b", &bench.bus, "--trace", "/dev/full", "sdo", "read", "5", "0x1018:1"];
+    let done = bench.finish(&mut bench.command(&words)).exit(8);
+    assert!(done.stderr.contains("No space left on device"), "{}", done.stderr);
+}

@@ -1,0 +1,164 @@
+//! `cangauge read`.
+
+use super::{ALL, Bench};
+use serde_json::json;
+
+/// Devices whose quantities stand still, so that every reading is known.
+fn still() -> Bench {
+    Bench::described(
+        "[[device]]\nkind = \"mh4\"\nnode = 5\n\
+         [[device.channel]]\nchannel = 1\nbase = 1.25\namplitude = 0.0\nnoise = 0.0\n\
+         [[device.channel]]\nchannel = 2\nbase = 25.5\namplitude = 0.0\nnoise = 0.0\n\
+         [[device]]\nkind = \"dps\"\nnode = 127\n\
+         [[device.channel]]\nchannel = 1\nbase = 50.0\namplitude = 0.0\nnoise = 0.0\n",
+    )
+}
+
+/// Devices in overload.
+fn overloaded() -> Bench {
+    let overload = "[[device.overload]]\nchannel = 1\nfrom = \"0s\"\n";
+    Bench::described(&format!(
+        "[[device]]\nkind = \"mh4\"\nnode = 5\n{overload}direction = \"high\"\n\
+         [[device]]\nkind = \"mh4\"\nnode = 6\n{overload}direction = \"low\"\n",
+    ))
+}
+
+const NO_ANSWER: &str = "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: who is there: cangauge scan\n";
+
+#[test]
+fn one_signal_of_one_node_is_the_bare_number() {
+    let bench = still();
+    let done = bench.run("read 5 pressure").prints("1.25\n");
+    assert_eq!(done.stderr, "");
+    bench.run("read 127 pressure").prints("50.000\n");
+    bench.run("read 5 temperature").prints("25.5\n");
+}
+
+#[test]
+fn several_are_a_table_with_unit_and_status() {
+    still().run("read 5,127").prints(
+        "5    pressure     1.25 bar    ok\n\
+         5    temperature  25.5 degC   ok\n\
+         127  pressure     50.000 psi  (tells no status)\n",
+    );
+}
+
+#[test]
+fn json_and_csv() {
+    let bench = still();
+    let done = bench.run("read 5,127 -f json").prints(
+        "{\"node\":5,\"signal\":\"pressure\",\"value\":1.25,\"unit\":\"bar\",\"status\":\"ok\"}\n\
+         {\"node\":5,\"signal\":\"temperature\",\"value\":25.5,\"unit\":\"degC\",\"status\":\"ok\"}\n\
+         {\"node\":127,\"signal\":\"pressure\",\"value\":50.0,\"unit\":\"psi\",\"status\":null}\n",
+    );
+    assert_eq!(done.json().len(), 3);
+    bench.run("read 127 -f csv").prints("node,signal,value,unit,status\n127,pressure,50.000,psi,\n");
+}
+
+#[test]
+fn converted_to_another_unit() {
+    let bench = still();
+    // 50 psi = 50 * 0.0689475729 bar, with as many digits as were sent.
+    bench.run("read 127 pressure --in bar").prints("3.4474\n");
+    bench.run("read 5 pressure --in mbar").prints("1250.000\n");
+    bench.run("read 5 pressure --in degC").fails(2, "cangauge: node 5: pressure is in bar, which is no degC\n");
+    bench
+        .run("read 5 pressure --in furlong")
+        .refuses("\"furlong\" is not a known unit (bar, mbar, kPa, MPa, psi, degC, degF, K, 0x4E0000)");
+}
+
+#[test]
+fn objects_and_status_objects() {
+    let bench = still();
+    bench.run("read 5 0x6130:1").prints("1.25\n");
+    bench.run("read 5 pressure.status").prints("0\n");
+    bench.run("read 127 pressure.status").fails(2, "cangauge: node 127: pressure has no status object\n");
+    overloaded().run("read 5 pressure.status").prints("3\n");
+    overloaded().run("read 6 pressure.status").prints("5\n");
+}
+
+#[test]
+fn no_number_is_made_up_for_an_invalid_value() {
+    let bench = overloaded();
+    let done = bench.run("read 5 pressure").exit(6);
+    assert_eq!(
+        (done.stdout.as_str(), done.stderr.as_str()),
+        ("", "cangauge: node 5: pressure has no valid value: overload-high\n")
+    );
+    let rows = bench.run("read 5-6 pressure -f json").exit(0).json();
+    assert_eq!(
+        rows,
+        [
+            json!({"node": 5, "signal": "pressure", "value": null, "unit": "bar", "status": "overload-high"}),
+            json!({"node": 6, "signal": "pressure", "value": null, "unit": "bar", "status": "overload-low"}),
+        ]
+    );
+    bench.run("read 5-6 pressure").prints("5  pressure  -  overload-high\n6  pressure  -  overload-low\n");
+}
+
+#[test]
+fn a_node_that_is_not_there() {
+    let done = still().run("read 9 pressure").fails(3, NO_ANSWER);
+    assert_eq!(done.frames_of("609").len(), 2, "asked, and asked once more");
+    let done = still().run("read 9 -t 50ms --retries 0").exit(3);
+    assert!(done.stderr.contains("no answer within 50 ms"), "{}", done.stderr);
+    assert_eq!(done.frames_of("609").len(), 1);
+}
+
+#[test]
+fn of_several_nodes_those_that_answer_are_printed() {
+    let bench = still();
+    let done = bench.run("read 9,127").exit(7);
+    assert_eq!(done.stdout, "127  pressure  50.000 psi  (tells no status)\n");
+    assert_eq!(done.stderr, NO_ANSWER);
+    let done = bench.run("read 9,10").exit(3);
+    assert_eq!(done.stdout, "");
+    assert_eq!(done.stderr, format!("{NO_ANSWER}{}", NO_ANSWER.replace('9', "10")), "each is named");
+    let done = bench.run("read 9 -f json").exit(3);
+    assert_eq!(
+        done.error(),
+        json!({"error": {"kind": "no-answer", "exit": 3, "message": "node 9: read 0x1000:0: no answer within 500 ms",
+            "node": 9, "object": "0x1000:0", "abort": null, "hint": "who is there: cangauge scan"}})
+    );
+}
+
+#[test]
+fn a_device_that_says_no() {
+    let bench = still();
+    bench
+        .run("read 5 0x5000:1")
+        .fails(4, "cangauge: node 5: read 0x5000:1: refused by the device (0x06020000, the object does not exist)\n");
+    let error = bench.run("read 5 0x5000:1 -f json").exit(4).error();
+    assert_eq!(
+        (&error["error"]["kind"], &error["error"]["abort"], &error["error"]["object"]),
+        (&json!("refused"), &json!("0x06020000"), &json!("0x5000:1"))
+    );
+}
+
+#[test]
+fn a_signal_that_it_does_not_have() {
+    still()
+        .run("read 5 presure")
+        .fails(2, "cangauge: node 5: it has no signal \"presure\"\nhint: it has: pressure, temperature\n");
+}
+
+#[test]
+fn all_are_those_that_answer() {
+    let done = Bench::of(ALL).run("read all -f json").exit(0);
+    let rows = done.json();
+    let of = |node: u8| rows.iter().filter(|row| row["node"] == node).count();
+    assert_eq!((of(1), of(2), of(3), of(127), rows.len()), (2, 1, 16, 1, 20));
+    assert_eq!(done.frames_of("000"), [""; 0], "reading sends no NMT");
+}
+
+#[test]
+fn the_description_can_be_said() {
+    let bench = still();
+    // Taken for a DPS, its REAL32 is an INTEGER32 with 3 digits.
+    bench.run("read 5 pressure --device 5=dps").prints("1067450.368\n");
+    bench.run("read 5 pressure --device 6=dps").prints("1.25\n");
+    bench.run("read 5 --device mh5").refuses("there is no built-in device \"mh5\"");
+    bench
+        .run("read 5 --device none.toml")
+        .fails(8, "cangauge: read none.toml: No such file or directory (os error 2)\n");
+}

@@ -1,0 +1,196 @@
+//! `cangauge sdo`.
+
+use super::{ALL, Bench};
+use serde_json::json;
+use std::fs;
+
+#[test]
+fn one_object_is_the_bare_value() {
+    let bench = Bench::of(ALL);
+    let done = bench.run("sdo read 1 0x1018:1").prints("71\n");
+    assert_eq!(done.frames, ["601#4018100100000000", "701#00", "581#4318100147000000"]);
+    for form in ["1018:1", "1018h:1", "1018.1", "0x1018:0x1", "1018:01h", "vendor-id", "Vendor-Id"] {
+        bench.run(&format!("sdo read 1 {form}")).prints("71\n");
+    }
+    bench.run("sdo read 1 1008").prints("MH-4-CAN\n");
+}
+
+#[test]
+fn several_are_lines_of_object_and_value() {
+    Bench::of(ALL)
+        .run("sdo read 1 vendor-id 0x1018:4 1008h")
+        .prints("vendor-id 71\n0x1018:4 10001\n0x1008:0 MH-4-CAN\n");
+}
+
+#[test]
+fn json() {
+    Bench::of(ALL).run("sdo read 1 0x1018:1 0x1008 0x6130:1 -f json").exit(0).json().iter().enumerate().for_each(
+        |(at, found)| match at {
+            0 => assert_eq!(
+                *found,
+                json!({"node": 1, "object": "0x1018:1", "name": "vendor-id", "type": "u32", "value": 71,
+                    "raw": "0x47000000"})
+            ),
+            1 => assert_eq!(
+                *found,
+                json!({"node": 1, "object": "0x1008:0", "name": "device-name", "type": "vs", "value": "MH-4-CAN",
+                    "raw": "0x4D482D342D43414E"})
+            ),
+            _ => assert!(found["type"] == "r32" && found["value"].is_f64(), "{found}"),
+        },
+    );
+}
+
+#[test]
+fn the_type_can_be_said() {
+    let bench = Bench::of(ALL);
+    bench.run("sdo read 1 0x1018:1 --hex").prints("0x47000000\n");
+    bench.run("sdo read 1 0x1018:1 --type hex").prints("0x47000000\n");
+    bench.run("sdo read 1 0x1018:1 --type i32").prints("71\n");
+    // A value that is wider than the type, the rest not zero: both widths are named.
+    bench.run("sdo read 1 0x1008 --type u8").fails(
+        6,
+        "cangauge: node 1: read 0x1008:0: the device delivered 8 bytes where u8 has 1\n\
+         hint: its bytes: cangauge sdo read 1 0x1008:0 --type hex\n",
+    );
+    let done = bench.run("sdo read 1 0x1017 --type u32").prints("0\n");
+    assert_eq!(done.stderr, "warning: node 1: 0x1017:0: the device delivered 2 bytes for 4\n");
+}
+
+#[test]
+fn a_value_goes_out_as_its_type() {
+    let bench = Bench::of("mh4@5");
+    let done = bench.run("sdo write 5 0x1017 1000").prints("");
+    assert_eq!((done.frames_of("605"), done.stderr.as_str()), (vec!["2B171000E8030000"], ""));
+    let done = bench.run("sdo write 5 producer-heartbeat-time 0x3E8 --verify").prints("");
+    assert_eq!(done.frames_of("605")[0], "2B171000E8030000");
+    assert_eq!(done.frames_of("605")[1], "4017100000000000", "read back");
+    let done = bench.run("sdo write 5 0x1017=500 0x1800:5=100").prints("");
+    assert_eq!(done.frames_of("605"), ["2B171000F4010000", "2B00180564000000"]);
+    let done = bench.run("--verbose sdo write 5 0x1017 1000").prints("");
+    assert_eq!(done.stderr, "node 5: 0x1017:0 written: 0xE803\n");
+}
+
+#[test]
+fn nothing_is_sent_of_a_value_that_does_not_fit() {
+    let bench = Bench::of("mh4@5");
+    for (value, why) in [
+        ("70000", "70000 does not fit u16 (0 to 65535)"),
+        ("65536", "65536 does not fit u16 (0 to 65535)"),
+        ("-5", "-5 does not fit u16 (0 to 65535)"),
+        ("1.5", "\"1.5\" is not a value of type u16"),
+        ("abc", "\"abc\" is not a value of type u16"),
+        ("0x10000", "0x10000 does not fit u16 (0 to 65535)"),
+    ] {
+        bench.run(&format!("sdo write 5 0x1017 {value}")).refuses(&format!("0x1017:0: {why}"));
+    }
+    bench.run_words(&["sdo", "write", "5", "0x1017", ""]).refuses("0x1017:0: \"\" is not a value of type u16");
+    bench.run("sdo write 5 0x5000 300 --type u8").refuses("0x5000:0: 300 does not fit u8 (0 to 255)");
+    bench
+        .run("sdo write 5 0x5000 1e39 --type r32")
+        .refuses("0x5000:0: 1e39 does not fit r32 (-3.4028235e38 to 3.4028235e38)");
+    bench.run("sdo write 5 0x5000 xyz --type hex").refuses("0x5000:0: \"xyz\" is not a value of type os");
+    // Of several, the first is not written either.
+    bench.run("sdo write 5 0x1017=500 0x1800:5=70000").refuses("0x1800:5: 70000 does not fit u16 (0 to 65535)");
+    bench
+        .run("sdo write 5 0x1017=500 0x1800:5")
+        .refuses("\"0x1800:5\" has no value: give OBJECT VALUE, or OBJECT=VALUE for each");
+}
+
+#[test]
+fn an_object_that_only_its_device_has_is_checked_before_it_is_written() {
+    // 2023h is the MH-4's own: who it is has to be read first, and that is all that is sent.
+    let done = Bench::of("mh4@5").run("sdo write 5 0x2023:1 70000").exit(2);
+    assert_eq!(done.stderr, "cangauge: node 5: write 0x2023:1: 70000 does not fit u16 (0 to 65535)\n");
+    // 4xh begins a read, 6xh and 7xh go on with it; 2xh would be a write.
+    assert!(done.frames_of("605").iter().all(|request| request.starts_with(['4', '6', '7'])), "{:?}", done.frames);
+}
+
+#[test]
+fn an_object_without_a_known_type_asks_for_it() {
+    Bench::of("mh4@5").run("sdo write 5 0x5000 5").fails(
+        2,
+        "cangauge: node 5: write 0x5000:0: its type is not known\n\
+         hint: say it: cangauge sdo write 5 0x5000:0 5 --type u32 (or i16, r32, vs)\n",
+    );
+}
+
+#[test]
+fn a_device_that_says_no() {
+    let bench = Bench::of("mh4@5");
+    bench
+        .run("sdo write 5 0x1018:1 5")
+        .fails(4, "cangauge: node 5: write 0x1018:1: refused by the device (0x06010002, the object is read-only)\n");
+    bench
+        .run("sdo read 5 0x5000")
+        .fails(4, "cangauge: node 5: read 0x5000:0: refused by the device (0x06020000, the object does not exist)\n");
+    // What was read before stays.
+    let done = bench.run("sdo read 5 0x1018:1 0x5000 0x1018:4").exit(4);
+    assert_eq!(done.stdout, "0x1018:1 71\n");
+}
+
+#[test]
+fn a_node_that_is_not_there() {
+    let bench = Bench::of("mh4@1");
+    let hint = "hint: who is there: cangauge scan\n";
+    let done = bench
+        .run("sdo read 5 0x6130:1")
+        .fails(3, &format!("cangauge: node 5: read 0x6130:1: no answer within 500 ms\n{hint}"));
+    assert_eq!(done.frames_of("605"), ["4030610100000000"; 2], "nobody had begun to answer: no abort");
+    assert!(done.times.last().is_some_and(|last| (500_000..520_000).contains(last)), "{:?}", done.times);
+    bench
+        .run("sdo write 5 0x1017 100")
+        .fails(3, &format!("cangauge: node 5: write 0x1017:0: no answer within 500 ms\n{hint}"));
+    let error = bench.run("sdo read 5 0x6130:1 -f json -t 2s").exit(3).error();
+    assert_eq!(
+        error,
+        json!({"error": {"kind": "no-answer", "exit": 3, "message": "node 5: read 0x6130:1: no answer within 2 s",
+            "node": 5, "object": "0x6130:1", "abort": null, "hint": "who is there: cangauge scan"}})
+    );
+}
+
+#[test]
+fn names_that_are_none() {
+    let bench = Bench::of("mh4@5");
+    bench
+        .run("sdo read 5 vendor-di")
+        .fails(2, "cangauge: node 5: WIKA MH-4-CAN has no object \"vendor-di\"\nhint: nearest: vendor-id\n");
+    bench
+        .run("sdo read 5 nonsense")
+        .refuses("\"nonsense\" is neither an object (0x1018:1) nor a name (vendor-id, ai-input-pv:1)");
+    bench.run("sdo read 5 0x10180:1").exit(2);
+    bench.run("sdo read 5 0x1018:256").exit(2);
+    bench.run("sdo read 1-3 0x1018:1").refuses("\"1-3\" is not a node-ID (1 to 127)");
+}
+
+#[test]
+fn bytes_to_and_from_files() {
+    let bench = Bench::of("mh4@5");
+    bench.run("sdo read 5 0x1008 --output name.bin").prints("");
+    assert_eq!(fs::read(bench.path("name.bin")).expect("the file"), b"MH-4-CAN");
+    bench.run("sdo read 5 0x1018:1 --output name.bin").refuses("name.bin exists");
+    assert_eq!(fs::read(bench.path("name.bin")).expect("the file"), b"MH-4-CAN");
+    bench.run("sdo read 5 0x1018:1 --output name.bin --force").prints("");
+    assert_eq!(fs::read(bench.path("name.bin")).expect("the file"), [0x47, 0, 0, 0]);
+    bench.run("sdo read 9 0x1008 --output other.bin").exit(3);
+    assert_eq!(bench.files(), ["name.bin"], "nothing was read: no file");
+    bench.run("sdo read 5 0x1008 0x1018:1 --output other.bin").refuses("--output takes one object");
+
+    fs::write(bench.path("time.bin"), [0xe8, 0x03]).expect("written");
+    let done = bench.run("sdo write 5 0x1017 --input time.bin").prints("");
+    assert_eq!(done.frames_of("605"), ["2B171000E8030000"]);
+    bench
+        .run("sdo write 5 0x1017 --input none.bin")
+        .fails(8, "cangauge: read none.bin: No such file or directory (os error 2)\n");
+    bench.run("sdo write 5 0x1017 5 --input time.bin").refuses("--input takes one object and no value");
+}
+
+#[test]
+fn text_from_a_device_steers_no_terminal() {
+    let bench = Bench::described("[[device]]\nkind = \"mh4\"\nnode = 5\nset = { \"0x1008\" = \"a\\u001B[2Jb\" }\n");
+    bench.run("sdo read 5 0x1008").prints("a\\x1B[2Jb\n");
+    let done = bench.run("sdo read 5 0x1008 -f json").exit(0);
+    assert_eq!(done.json()[0]["value"], "a\u{1b}[2Jb", "JSON has its own escapes");
+    let table = bench.run("scan 5").exit(0).stdout;
+    assert!(table.contains("a\\x1B[2Jb") && !table.contains('\u{1b}'), "{table}");
+}

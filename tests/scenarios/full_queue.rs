@@ -1,0 +1,80 @@
+//! A transmit queue that has no room: nothing is lost by it, and nobody is missed.
+
+use cangauge::bus::faults::{FaultPlan, Faulty};
+use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::bus::{Bus, Event};
+use cangauge::canopen::id::NodeId;
+use cangauge::master::{Error, Master, Timing};
+use cangauge::sim::{Device, Setup};
+use cangauge::tasks::Kind;
+use cangauge::tasks::scan::{Found, scan};
+use std::time::Duration;
+
+const WAIT: Duration = Duration::from_millis(200);
+
+/// A bus with simulated devices on these nodes.
+fn bus(nodes: &[u8]) -> MemoryBus {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    for (&node, model) in nodes.iter().zip(["mh4", "dps", "d20", "mc1609"].into_iter().cycle()) {
+        let model = cangauge::device::catalog::by_name(model).unwrap();
+        bus.attach(Device::new(Setup::new(model, NodeId::new(node).unwrap())).unwrap());
+    }
+    bus
+}
+
+fn scan_all(bus: &mut dyn Bus) -> Result<Vec<Found>, Error> {
+    let nodes: Vec<NodeId> = NodeId::all().collect();
+    scan(&mut Master::new(bus, Timing::default()), &nodes, WAIT, 2, &Default::default())
+}
+
+fn described(found: &[Found]) -> Vec<(u8, Option<u32>, Option<String>, String)> {
+    let one = |found: &Found| {
+        let instrument = &found.instrument;
+        let model = instrument.model.as_ref().map(|model| model.description.name.clone()).unwrap_or_default();
+        (found.node.get(), instrument.identity.serial, instrument.identity.name.clone(), model)
+    };
+    found.iter().map(one).collect()
+}
+
+#[test]
+fn a_scan_finds_the_same_nodes_however_often_the_queue_is_full() {
+    let all: Vec<u8> = (1..=127).collect();
+    for present in [&[1, 64, 127][..], &all] {
+        let expected = described(&scan_all(&mut bus(present)).unwrap());
+        assert_eq!(expected.iter().map(|node| node.0).collect::<Vec<_>>(), present);
+        assert!(expected.iter().all(|node| !node.3.is_empty()), "{expected:?}");
+        // Every second call; runs of 20 ms; nearly always.
+        let plans: [&dyn Fn(u64) -> bool; 3] =
+            [&|call| call % 2 == 0, &|call| call / 20 % 2 == 0, &|call| call % 7 > 0];
+        for is_full in plans {
+            let queue_full = (0..100_000).filter(|&call| is_full(call)).collect();
+            let mut faulty = Faulty::new(bus(present), FaultPlan { queue_full, ..FaultPlan::default() });
+            assert_eq!(described(&scan_all(&mut faulty).unwrap()), expected);
+        }
+    }
+}
+
+#[test]
+fn a_short_queue_of_a_slow_bus_is_waited_for() {
+    let present: Vec<u8> = (1..=127).collect();
+    for queue_length in [1, 2, 10] {
+        let mut slow = bus(&present).with_bit_rate(10_000).with_queue_length(queue_length);
+        // The boot-up messages of all of them take their time.
+        let booted = slow.now().mono + Duration::from_secs(5);
+        while slow.receive(booted).unwrap() != Event::Timeout {}
+        let found = scan_all(&mut slow).unwrap();
+        assert_eq!(found.iter().map(|found| found.node.get()).collect::<Vec<_>>(), present, "{queue_length}");
+    }
+}
+
+#[test]
+fn a_queue_that_never_empties_is_a_fault_of_the_bus_after_a_while() {
+    let plan = FaultPlan { queue_full: (3..100_000).collect(), ..FaultPlan::default() };
+    let mut faulty = Faulty::new(bus(&[1]), plan);
+    let begun = faulty.now().mono;
+    let failure = cangauge::tasks::Failure::from(scan_all(&mut faulty).unwrap_err());
+    assert_eq!(failure.kind, Kind::Bus);
+    assert!(failure.hint.unwrap().contains("terminators"));
+    let took = faulty.now().mono.since(begun);
+    assert!((Duration::from_secs(1)..Duration::from_secs(2)).contains(&took), "{took:?}");
+}

@@ -1,0 +1,42 @@
+//! Commands and recordings under bad conditions, on the virtual clock.
+
+mod answers;
+mod full_queue;
+mod garbage;
+mod second_master;
+mod second_sync;
+mod stalled;
+
+use cangauge::bus::Stamp;
+use cangauge::measure::sample::{Sample, Source};
+use cangauge::tasks::log::{Note, Observer};
+use std::ops::ControlFlow;
+
+/// Keeps what a recording gives, as the simulator's own record would write it.
+#[derive(Default)]
+struct Kept {
+    rows: Vec<String>,
+    notes: Vec<Note>,
+}
+
+impl Observer for Kept {
+    fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
+        for sample in samples {
+            let source = &sources[sample.source];
+            let value = sample.value.map(|value| value.to_string()).unwrap_or_default();
+            let status = sample.status.map_or("", |status| status.as_str());
+            let at = sample.at.mono.since_start().as_micros();
+            let Source { node, signal, unit, .. } = source;
+            self.rows.push(format!("{at},{node},{signal},{value},{unit},{status},{}", sample.raw));
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn note(&mut self, note: &Note, _: Stamp) {
+        self.notes.push(note.clone());
+    }
+
+    fn tick(&mut self, _: Stamp, _: u64) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,75 @@
+//! Somebody else sends SYNC already: a second one would double every synchronous TPDO.
+
+use super::Kept;
+use cangauge::bus::memory::{MemoryBus, Outbox, Station};
+use cangauge::bus::time::Mono;
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::NodeId;
+use cangauge::master::{Master, Timing};
+use cangauge::sim::{Bench, Device, State};
+use cangauge::tasks::log::{Mode, Plan, log};
+use cangauge::tasks::{Failure, Kind};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+const PERIOD: Duration = Duration::from_millis(50);
+
+/// A controller that sends SYNC and knows nothing of us.
+struct Controller {
+    next: Mono,
+}
+
+impl Station for Controller {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        out.send("080#".parse().expect("a frame"));
+        self.next = now + PERIOD;
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        Some(self.next)
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+fn record(mode: Mode) -> (MemoryBus, Kept, Result<u64, Failure>) {
+    let text = "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
+    let mut bus = Bench::from_toml(text, Path::new("")).expect("a bench").open().expect("a bus");
+    bus.attach(Controller { next: Mono::START + PERIOD });
+    let plan = Plan {
+        nodes: vec![NodeId::new(5).expect("a node-ID")],
+        wanted: Vec::new(),
+        mode,
+        duration: Some(Duration::from_secs(1)),
+        count: None,
+        nmt: true,
+        overrides: BTreeMap::new(),
+    };
+    let mut kept = Kept::default();
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept);
+    (bus, kept, outcome.map(|outcome| outcome.rows))
+}
+
+#[test]
+fn a_second_sync_is_refused_before_anything_is_started() {
+    let (bus, kept, outcome) = record(Mode::Sync(Duration::from_millis(10)));
+    let failure = outcome.expect_err("refused");
+    assert_eq!(failure.kind, Kind::CheckFailed);
+    assert_eq!(failure.message, "somebody else sends SYNC on this bus: nothing was started");
+    assert!(failure.hint.is_some_and(|hint| hint.starts_with("leave --sync out")));
+    assert_eq!(kept.rows, [""; 0]);
+    let state = bus.stations::<Device>().next().and_then(Device::state);
+    assert_eq!(state, Some(State::PreOperational));
+}
+
+#[test]
+fn without_sync_of_ones_own_theirs_is_recorded() {
+    let (_, kept, outcome) = record(Mode::AsSent);
+    assert_eq!(outcome.map(|rows| rows / 20), Ok(1), "one every 50 ms for a second");
+    assert!((19..=21).contains(&kept.rows.len()), "{}", kept.rows.len());
+}

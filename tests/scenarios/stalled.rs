@@ -1,0 +1,108 @@
+//! A program that was stopped for a while (Ctrl-Z, a laptop that slept, a host under load) goes on as if it
+//! had been there, and makes up for nothing that cannot be made up for.
+
+use super::Kept;
+use cangauge::bus::memory::MemoryBus;
+use cangauge::bus::time::{Mono, Stamp};
+use cangauge::bus::{Bus, BusError, Event, Filters, TimestampSource};
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::NodeId;
+use cangauge::master::{Master, Timing};
+use cangauge::sim::Bench;
+use cangauge::tasks::log::{Mode, Plan, log};
+use std::collections::{BTreeMap, VecDeque};
+use std::path::Path;
+use std::time::Duration;
+
+/// A bus whose reader is away from `from` until `until`: what comes meanwhile waits, as in the kernel.
+struct Stalled {
+    inner: MemoryBus,
+    from: Mono,
+    until: Mono,
+    waiting: VecDeque<Event>,
+    /// When SYNC was handed over.
+    syncs: Vec<Mono>,
+}
+
+impl Stalled {
+    fn sleep(&mut self) -> Result<(), BusError> {
+        while self.inner.now().mono < self.until {
+            match self.inner.receive(self.until)? {
+                Event::Timeout => break,
+                event => self.waiting.push_back(event),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Bus for Stalled {
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        self.inner.bit_rate()
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        self.inner.timestamps()
+    }
+
+    fn now(&self) -> Stamp {
+        self.inner.now()
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        self.inner.listen(filters)
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        if frame.to_string() == "080#" {
+            self.syncs.push(self.inner.now().mono);
+        }
+        self.inner.send(frame)
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        if (self.from..self.until).contains(&self.inner.now().mono) {
+            self.sleep()?;
+        }
+        match self.waiting.pop_front() {
+            Some(event) => Ok(event),
+            None => self.inner.receive(deadline),
+        }
+    }
+}
+
+#[test]
+fn syncs_that_were_missed_are_left_out() {
+    let text = "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
+    let inner = Bench::from_toml(text, Path::new("")).expect("a bench").open().expect("a bus");
+    let at = |milliseconds| Mono::at(Duration::from_millis(milliseconds));
+    let mut bus = Stalled { inner, from: at(1000), until: at(1503), waiting: VecDeque::new(), syncs: Vec::new() };
+    let period = Duration::from_millis(10);
+    let plan = Plan {
+        nodes: vec![NodeId::new(5).expect("a node-ID")],
+        wanted: Vec::new(),
+        mode: Mode::Sync(period),
+        duration: Some(Duration::from_secs(2)),
+        count: None,
+        nmt: true,
+        overrides: BTreeMap::new(),
+    };
+    let mut kept = Kept::default();
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
+    let syncs = bus.syncs;
+    let begin = syncs[0];
+    let gaps: Vec<Duration> = syncs.windows(2).map(|pair| pair[1].since(pair[0])).collect();
+    assert!(gaps.iter().all(|gap| *gap >= period / 2), "none closer together than half a period: {gaps:?}");
+    assert_eq!(gaps.iter().filter(|gap| **gap > period * 2).count(), 1, "one pause");
+    // What comes after it stands in the rhythm of before.
+    let off = syncs.iter().filter(|sync| sync.since(begin).as_nanos() % period.as_nanos() != 0).count();
+    assert!(off <= 1, "{syncs:?}");
+    assert!((149..=151).contains(&syncs.len()), "{}", syncs.len());
+    assert_eq!((outcome.syncs, outcome.rows), (syncs.len() as u64, syncs.len() as u64));
+    let said = outcome.remarks.iter().filter(|remark| remark.ends_with("the program was stopped or too slow"));
+    assert_eq!(said.count(), 1, "{:?}", outcome.remarks);
+}
