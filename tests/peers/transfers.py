@@ -55,7 +55,7 @@ class Wire:
     """The SDO frames of one node, as they come."""
 
     def __init__(self, interface, node=NODE):
-        self.request, self.frames, self.count = 0x600 + node, [], 0
+        self.request, self.requests, self.count = 0x600 + node, [], 0
         self.socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         # SO_RCVBUFFORCE: the guest's limit is lower than what a sub-block of a busy guest needs.
         self.socket.setsockopt(socket.SOL_SOCKET, 33, 8 << 20)
@@ -71,18 +71,14 @@ class Wire:
         self.socket.close()
 
     def drain(self):
-        """Takes what has come; the last hundred frames are kept."""
+        """Takes what has come; requests are kept."""
         with contextlib.suppress(BlockingIOError):
             while True:
                 identifier, length, data = struct.unpack("=IB3x8s", self.socket.recv(16))
-                self.frames.append((identifier, data[:length]))
                 self.count += 1
-        del self.frames[:-100]
+                if identifier == self.request:
+                    self.requests.append(data[:length])
         return self
-
-    def requests(self):
-        """The last requests."""
-        return [data for identifier, data in self.drain().frames if identifier == self.request]
 
 
 class Store:
@@ -431,7 +427,7 @@ def interrupt(cangauge, directory, object, arguments):
             result = run.finish(exit=130, end=None)
         finally:
             run.kill()
-        last = wire.requests()[-1]
+        last = wire.drain().requests[-1]
     assert last[:4] == b"\x80" + struct.pack("<HB", object, 0), f"{arguments}: {last.hex()}"
     assert result.out == "" and result.err == "cangauge: interrupted\n", result
 
