@@ -234,7 +234,9 @@ impl Bus for SocketCan {
     }
 
     fn now(&self) -> Stamp {
-        now(self.opened)
+        let now = now(self.opened);
+        self.looked.set(now.mono);
+        now
     }
 
     fn mono(&self) -> Mono {
