@@ -114,14 +114,6 @@ pub fn built_in() -> &'static [Arc<Model>] {
     })
 }
 
-/// What CiA 301 and CiA 404 say of the objects of every device.
-pub fn standard() -> &'static Dictionary {
-    static STANDARD: OnceLock<Dictionary> = OnceLock::new();
-    STANDARD.get_or_init(|| {
-        Model::from_toml(include_str!("standard.toml")).map(|model| model.dictionary).unwrap_or_default()
-    })
-}
-
 /// The built-in description of a name.
 pub fn by_name(name: &str) -> Option<Arc<Model>> {
     built_in().iter().find(|model| model.description.name == name).cloned()
@@ -175,10 +167,9 @@ mod tests {
 
     #[test]
     fn the_standard_and_the_descriptions_agree() {
-        assert!(Model::from_toml(include_str!("standard.toml")).is_ok());
         for model in built_in() {
             for entry in model.dictionary.iter() {
-                let Some(standard) = standard().get(entry.object) else { continue };
+                let Some(standard) = crate::device::standard::entry(entry.object) else { continue };
                 let name = &model.description.name;
                 assert_eq!(entry.data_type, standard.data_type, "{name} {}", entry.object);
                 assert_eq!(entry.full_name(), standard.full_name(), "{name} {}", entry.object);

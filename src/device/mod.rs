@@ -5,4 +5,5 @@ pub mod description;
 pub mod dictionary;
 pub mod eds;
 pub mod quirk;
+pub mod standard;
 pub mod unit;

@@ -6,11 +6,12 @@
 
 mod company;
 mod machine;
+mod request;
 mod sdo;
 mod send;
 pub mod transfer;
 
-pub use sdo::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
+pub use request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, Way, read_object, write_object};
 
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};

@@ -4,9 +4,10 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, DownloadSize, Note, Uploaded};
 use crate::canopen::value::{DataType, Value};
-use crate::device::catalog::{Model, standard};
+use crate::device::catalog::Model;
 use crate::device::description::SizeIndication;
 use crate::device::dictionary::Entry;
+use crate::device::standard;
 use crate::master::transfer::{BlockMode, Moved, read_object};
 use crate::master::{Error, Master, Request, SdoError, SdoFailure};
 use crate::measure::survey::{Overrides, recognised};
@@ -57,19 +58,21 @@ impl Knowledge {
     }
 
     /// The entry as far as it is known without asking the device.
-    pub fn offline(&self, object: ObjectId) -> Option<&Entry> {
-        match &self.model {
-            Some(Some(model)) => model.dictionary.get(object).or_else(|| standard().get(object)),
-            _ => standard().get(object),
-        }
+    pub fn offline(&self, object: ObjectId) -> Option<Entry> {
+        let described = match &self.model {
+            Some(Some(model)) => model.dictionary.get(object).cloned(),
+            _ => None,
+        };
+        described.or_else(|| standard::entry(object))
     }
 
     /// The entry of a name as far as it is known without asking the device.
-    pub fn offline_name(&self, name: &str) -> Option<&Entry> {
-        match &self.model {
-            Some(Some(model)) => model.dictionary.find(name).or_else(|| standard().find(name)),
-            _ => standard().find(name),
-        }
+    pub fn offline_name(&self, name: &str) -> Option<Entry> {
+        let described = match &self.model {
+            Some(Some(model)) => model.dictionary.find(name).cloned(),
+            _ => None,
+        };
+        described.or_else(|| standard::find(name))
     }
 
     /// The description of the device, read from it at the first time.
@@ -86,7 +89,7 @@ impl Knowledge {
     /// The entry at `object`, from the standard or the device's description.
     pub fn entry(&mut self, master: &mut Master<'_>, object: ObjectId) -> Result<Option<Entry>, Error> {
         if let Some(entry) = self.offline(object) {
-            return Ok(Some(entry.clone()));
+            return Ok(Some(entry));
         }
         Ok(self.model(master)?.and_then(|model| model.dictionary.get(object).cloned()))
     }
@@ -109,14 +112,16 @@ impl Knowledge {
             return Ok(entry.object);
         }
         let model = self.model(master)?;
-        let dictionary = model.as_ref().map_or_else(|| standard(), |model| &model.dictionary);
-        if let Some(entry) = dictionary.find(name) {
+        if let Some(entry) = model.as_ref().and_then(|model| model.dictionary.find(name)) {
             return Ok(entry.object);
         }
+        let known: Vec<String> = match &model {
+            Some(model) => model.dictionary.iter().map(Entry::full_name).collect(),
+            None => standard::names().collect(),
+        };
         let what = model.as_ref().map_or_else(|| "the standard".to_owned(), |model| model.description.title.clone());
-        let mut near: Vec<(usize, String)> = dictionary
-            .iter()
-            .map(|entry| entry.full_name())
+        let mut near: Vec<(usize, String)> = known
+            .into_iter()
             .map(|known| (distance(name, &known), known))
             .filter(|(distance, _)| *distance <= name.len() / 2)
             .collect();
@@ -155,10 +160,10 @@ pub fn read(
     options: &mut Options<'_>,
 ) -> Result<ReadValue, Failure> {
     let node = knowledge.node;
-    let expected = data_type.or_else(|| knowledge.type_of(knowledge.offline(object)));
+    let expected = data_type.or_else(|| knowledge.type_of(knowledge.offline(object).as_ref()));
     let answer = read_object(master, (node, object), expected, options.blocks, options.progress)??;
     let entry = match data_type {
-        Some(_) => knowledge.offline(object).cloned(),
+        Some(_) => knowledge.offline(object),
         None => knowledge.entry(master, object)?,
     };
     let data_type = data_type.or(knowledge.type_of(entry.as_ref()));
