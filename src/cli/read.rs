@@ -66,6 +66,13 @@ impl Read {
                 Err(failure) => failures.push(failure),
             }
         }
+        // Everybody was meant who has it; that somebody has it not is no failure, unless nobody has.
+        if self.nodes == Nodes::All && !shown.is_empty() {
+            let (without, failed) = failures.into_iter().partition(|failure| failure.kind == Kind::Usage);
+            failures = failed;
+            let without: Vec<Failure> = without;
+            without.iter().for_each(|failure| global.console().note(&failure.message));
+        }
         let bare = asked == 1 && wanted.len() == 1;
         let invalid = print(&shown, global.format, bare).map_err(stdout)?;
         if let Some(failure) = invalid {

@@ -162,3 +162,12 @@ fn the_description_can_be_said() {
         .run("read 5 --device none.toml")
         .fails(8, "cangauge: read none.toml: No such file or directory (os error 2)\n");
 }
+
+#[test]
+fn who_has_it_not_is_excused_where_everybody_was_asked() {
+    let done = Bench::of("mh4@1,mc1609@3").run("read all pressure -f json").exit(0);
+    assert_eq!(done.stdout.lines().count(), 1, "{}", done.stdout);
+    assert_eq!(done.stderr, "node 3: it has no signal \"pressure\"\n");
+    Bench::of("mh4@1,mc1609@3").run("read 1,3 pressure").exit(7);
+    Bench::of("mh4@1,mc1609@3").run("read all humidity").exit(2);
+}
