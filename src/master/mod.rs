@@ -122,9 +122,16 @@ impl<'bus> Master<'bus> {
         self.outgoing.push(frame, None);
     }
 
-    /// Puts a frame before all that wait: a SYNC must not stand behind SDO requests.
-    pub fn send_first(&mut self, frame: Frame) {
-        self.outgoing.push_first(frame);
+    /// Puts a frame before all that wait: a SYNC must not stand behind SDO requests. `false` where the one
+    /// before has not even been sent: two of them in a row are one too many.
+    pub fn send_first(&mut self, frame: Frame) -> bool {
+        self.outgoing.push_first(frame)
+    }
+
+    /// From now on an interface that is down, and a bus on which nobody acknowledges, are ridden out: what
+    /// cannot be sent is lost, as any frame may be, and the work goes on. Otherwise they are errors.
+    pub fn ride_out(&mut self, rides_out: bool) {
+        self.outgoing.ride_out(rides_out);
     }
 
     /// Starts an SDO transfer; its end comes as [`Happening::Sdo`] with the ticket returned. One transfer a

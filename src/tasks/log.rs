@@ -156,10 +156,11 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     if let Mode::Sync(period) = plan.mode {
         refuse_second_sync(master, &instruments, period)?;
     }
-    let result = match states.start(master, &instruments, plan) {
-        Ok(()) => recording.run(master, plan, &instruments, &mut states, poll.as_mut(), observer),
-        Err(error) => Err(error),
-    };
+    let result = states.start(master, &instruments, plan).and_then(|()| {
+        master.ride_out(true);
+        recording.run(master, plan, &instruments, &mut states, poll.as_mut(), observer)
+    });
+    master.ride_out(false);
     let restored = states.restore(master);
     recording.remarks.extend(states.remarks());
     match result {

@@ -260,9 +260,10 @@ pub fn write(
     // A refused block transfer was not refused for its size.
     let expedited = (1..=4).contains(&data.len()) && options.blocks != BlockMode::Always;
     match first {
-        Err(SdoError { failure: SdoFailure::Refused(code @ (AbortCode::COMMAND_SPECIFIER | AbortCode::LENGTH)), .. })
-            if mode == SizeMode::Auto && expedited =>
-        {
+        Err(SdoError {
+            failure: SdoFailure::Refused(code @ (AbortCode::COMMAND_SPECIFIER | AbortCode::LENGTH)),
+            ..
+        }) if mode == SizeMode::Auto && expedited => {
             if code == AbortCode::LENGTH && has_another_width(master, node, object, data.len())? {
                 return Err(first.err().map_or_else(|| Failure::new(Kind::Refused, "refused"), Failure::from));
             }
@@ -279,12 +280,7 @@ pub fn write(
 
 /// Whether an object says that it has another number of bytes. Written without a size, fewer bytes than it has
 /// would be filled up with whatever stands behind them: -5 as i16 would become 65531 in an i32.
-fn has_another_width(
-    master: &mut Master<'_>,
-    node: NodeId,
-    object: ObjectId,
-    width: usize,
-) -> Result<bool, Failure> {
+fn has_another_width(master: &mut Master<'_>, node: NodeId, object: ObjectId, width: usize) -> Result<bool, Failure> {
     let answer = master.transfer_one(Request::read(node, object))?;
     let uploaded = answer.ok().and_then(|answer| answer.uploaded);
     Ok(uploaded.is_some_and(|uploaded| uploaded.indicated && uploaded.bytes.len() != width))

@@ -95,7 +95,12 @@ impl Upload {
         let expedited = command & 0x02 != 0;
         let indicated = command & 0x01 != 0;
         if command == 0x60 && self.accept_60 {
-            return Progress::Done(Uploaded { bytes: data[4..].to_vec(), indicated: false, announced: None, misnamed_end: false });
+            return Progress::Done(Uploaded {
+                bytes: data[4..].to_vec(),
+                indicated: false,
+                announced: None,
+                misnamed_end: false,
+            });
         }
         if command >> 5 != 2 {
             let violation = if command == 0x60 { Violation::WriteAcknowledgeToRead } else { Violation::Command };
@@ -105,7 +110,12 @@ impl Upload {
             let unused = if indicated { usize::from(command >> 2 & 3) } else { 0 };
             // A short frame holds fewer bytes than it says: what is there is used, never filled up.
             let end = data.len().min(8 - unused).max(4);
-            return Progress::Done(Uploaded { bytes: data[4..end].to_vec(), indicated, announced: None, misnamed_end: false });
+            return Progress::Done(Uploaded {
+                bytes: data[4..end].to_vec(),
+                indicated,
+                announced: None,
+                misnamed_end: false,
+            });
         }
         self.announced = if indicated { number(data) } else { None };
         self.state = State::Segments { toggle: false };
