@@ -216,9 +216,14 @@ impl Observer for Screen {
     fn note(&mut self, note: &Note, _at: Stamp) {
         match note {
             Note::Remark(text) => self.console.warn(text),
-            Note::Emergency(node, emergency) => {
-                self.console.warn(&format!("node {node}: {}", emergency_text(emergency)))
+            Note::Emergency(node, emergency, meaning) => {
+                self.console.warn(&format!("node {node}: {}", emergency_text(emergency, meaning)));
             }
+            Note::Share(period, share) => self.console.note(&format!(
+                "SYNC every {} and the answers take about {:.1} % of the bus",
+                spoken(*period),
+                share * 100.0
+            )),
             Note::Restarted(node) => self.console.warn(&format!("node {node} restarted")),
             Note::Silent(node, since) => self.console.warn(&format!("node {node}: silent for {}", spoken(*since))),
             Note::Back(node) => self.console.note(&format!("node {node} is back")),
@@ -240,10 +245,10 @@ impl Observer for Screen {
     }
 }
 
-fn emergency_text(emergency: &Emergency) -> String {
+fn emergency_text(emergency: &Emergency, meaning: &str) -> String {
     if emergency.code == 0 {
         return "emergency over (0000h)".to_owned();
     }
     let register = emergency.register.map(|register| format!(", {register}")).unwrap_or_default();
-    format!("emergency {:04X}h, {}{register}", emergency.code, Emergency::class(emergency.code))
+    format!("emergency {:04X}h, {meaning}{register}", emergency.code)
 }

@@ -118,7 +118,14 @@ impl Nmt {
             let nodes = match &targets.nodes {
                 Nodes::These(nodes) => nodes.clone(),
                 // The broadcast goes out whoever is there; who is there decides what can be confirmed.
-                Nodes::All => open::nodes(master, global, &Nodes::All).unwrap_or_default(),
+                Nodes::All => match open::nodes(master, global, &Nodes::All) {
+                    Err(error)
+                        if error.downcast_ref::<Failure>().is_some_and(|failure| failure.kind == Kind::NoAnswer) =>
+                    {
+                        Vec::new()
+                    }
+                    nodes => nodes?,
+                },
             };
             Ok(command(master, kind, &nodes, broadcast).or_fail()?)
         })?;
@@ -155,7 +162,9 @@ impl Targets {
                     )
                 };
                 let failure = Failure::of_node(Kind::NoAnswer, report.node, why);
-                if self.confirm {
+                // A device that is there tells its boot-up, whatever else it tells: silence after a reset, and
+                // silence of a node that was named, are no success.
+                if self.confirm || !report.present || kind.is_reset() {
                     return Some(failure.hint(hint));
                 }
                 global.console().note(&failure.message);

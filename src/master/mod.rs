@@ -276,7 +276,8 @@ impl<'bus> Master<'bus> {
                             if node == silent && rest != at && results[rest].is_none() {
                                 self.forget(std::iter::once(tickets[rest]));
                                 let failure = SdoFailure::Cancelled;
-                                results[rest] = Some(Err(SdoError { node, object, operation, failure }));
+                                results[rest] =
+                                    Some(Err(SdoError { node, object, operation, failure, disturbed: false }));
                             }
                         }
                     }
@@ -301,7 +302,13 @@ impl<'bus> Master<'bus> {
     pub fn transfer_one(&mut self, request: Request) -> Result<Result<Answer, SdoError>, Error> {
         let (node, object, operation) = (request.node, request.object, request.operation());
         let result = self.transfer(vec![request], &mut |_| {})?.pop();
-        Ok(result.unwrap_or(Err(SdoError { node, object, operation, failure: SdoFailure::Cancelled })))
+        Ok(result.unwrap_or(Err(SdoError {
+            node,
+            object,
+            operation,
+            failure: SdoFailure::Cancelled,
+            disturbed: false,
+        })))
     }
 
     /// Reads a value of a known type.
@@ -334,6 +341,7 @@ impl Answer {
             object,
             operation: Operation::Read,
             failure: SdoFailure::Fit(error),
+            disturbed: false,
         })
     }
 }

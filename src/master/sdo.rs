@@ -132,7 +132,7 @@ pub struct Answer {
 
 /// Why a transfer has no result.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{operation} {object}: {failure}")]
+#[error("{operation} {object}: {failure}{}", if *.disturbed { "; another SDO client is talking to this node" } else { "" })]
 pub struct SdoError {
     /// With which node.
     pub node: NodeId,
@@ -142,6 +142,8 @@ pub struct SdoError {
     pub operation: Operation,
     /// What went wrong.
     pub failure: SdoFailure,
+    /// Whether another client used the node's SDO server at the same time.
+    pub disturbed: bool,
 }
 
 /// What went wrong with a transfer.
@@ -167,9 +169,12 @@ pub enum SdoFailure {
     /// The object holds text or bytes where a measured value was asked for.
     #[error("it is no number")]
     NotANumber,
-    /// Others use the channel, time and again.
-    #[error("another master uses the node's SDO channel at the same time")]
+    /// Other clients get in the way, time and again.
+    #[error("it never came to its end")]
     Disturbed,
+    /// Another client wrote the same object at the same time.
+    #[error("acknowledged, but whose write is not known: another SDO client wrote the same object")]
+    Ambiguous,
     /// We gave up.
     #[error("not finished")]
     Cancelled,
@@ -263,7 +268,7 @@ impl Active {
     /// Takes a frame that is no answer to us. Whether the transfer can go on.
     fn overhear(&mut self, accept_60: bool, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let now = received.at.mono;
-        self.company.hear(&received.frame, now);
+        self.company.hear(&received.frame, self.request.object, now);
         if let Some(until) = self.company.back_until() {
             self.deadline = Some(until);
             return true;
@@ -277,6 +282,11 @@ impl Active {
         let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
         let delivered = uploaded.map_or(0, |uploaded| uploaded.bytes.len());
         in_segments && self.company.casts_doubt(uploaded.and_then(|uploaded| uploaded.announced), delivered)
+    }
+
+    /// Whether the acknowledge may be that of another client's write.
+    fn is_ambiguous(&self) -> bool {
+        self.request.operation() == Operation::Write && self.company.has_written_the_same()
     }
 
     /// A read turns out to be of a large object: it is asked for in blocks, from the start.
@@ -316,7 +326,13 @@ impl Active {
     }
 
     fn error(&self, failure: SdoFailure) -> SdoError {
-        SdoError { node: self.request.node, object: self.request.object, operation: self.request.operation(), failure }
+        SdoError {
+            node: self.request.node,
+            object: self.request.object,
+            operation: self.request.operation(),
+            failure,
+            disturbed: self.company.has_clients(),
+        }
     }
 }
 
@@ -442,6 +458,7 @@ impl SdoClient {
                 }
                 Err(active.error(SdoFailure::Disturbed))
             }
+            Progress::Done(_) if active.is_ambiguous() => Err(active.error(SdoFailure::Ambiguous)),
             Progress::Done(uploaded) => Ok(Answer { uploaded, at: received.at, way: active.way() }),
             Progress::Failed(error) if active.company.explains(error) => {
                 if active.stand_back(node.accept_60, at, timing, outgoing) {

@@ -157,15 +157,19 @@ impl Master<'_> {
         progress: &mut dyn FnMut(Moved),
     ) -> Result<Result<Answer, SdoError>, Error> {
         let ticket = self.start(request);
+        // From the latest moment known: a transfer that is over at once costs no look at the clock.
         let mut report_at = self.seen + REPORT_EVERY;
+        let mut timed = false;
         loop {
             match self.next(report_at)? {
                 Happening::Sdo(ended, result) if ended == ticket => return Ok(result),
                 Happening::Deadline => {
-                    if let Some(moved) = self.moved(ticket) {
+                    // The first time only tells the time.
+                    if let Some(moved) = self.moved(ticket).filter(|_| timed) {
                         progress(moved);
                     }
-                    report_at = report_at + REPORT_EVERY;
+                    timed = true;
+                    report_at = self.now() + REPORT_EVERY;
                 }
                 Happening::Interrupted => {
                     self.cancel();

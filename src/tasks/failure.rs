@@ -81,7 +81,9 @@ impl From<SdoError> for Failure {
                 (Kind::NoAnswer, None, Some("who is there: cangauge scan".to_owned()))
             }
             SdoFailure::NoAnswer { begun: true, .. } => (Kind::NoAnswer, None, None),
-            SdoFailure::Violation(..) | SdoFailure::NotANumber => (Kind::Unexpected, None, None),
+            SdoFailure::Violation(..) | SdoFailure::NotANumber | SdoFailure::Ambiguous => {
+                (Kind::Unexpected, None, None)
+            }
             SdoFailure::Fit(_) => {
                 let hint = format!("its bytes: cangauge sdo read {} {} --type hex", error.node, error.object);
                 (Kind::Unexpected, None, Some(hint))

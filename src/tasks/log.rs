@@ -19,7 +19,7 @@ use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
 use crate::measure::survey::{Overrides, instruments};
 use crate::tasks::Failure;
-use checks::{check_wanted, refuse_second_sync};
+use checks::{check_wanted, refuse_second_sync, sync_share};
 use passive::Learner;
 use poll::Poll;
 use recording::Recording;
@@ -60,12 +60,14 @@ pub enum Mode {
 }
 
 /// What happens on the way.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Note {
     /// Something to say that concerns no node.
     Remark(String),
-    /// A node sent an emergency message.
-    Emergency(NodeId, Emergency),
+    /// A node sent an emergency message, which means this.
+    Emergency(NodeId, Emergency, String),
+    /// SYNC at this interval and what comes in answer take this share of the bus.
+    Share(Duration, f64),
     /// A node restarted.
     Restarted(NodeId),
     /// Nothing has come from the node for a while.
@@ -155,6 +157,9 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     master.listen(&recording.filters(&instruments))?;
     if let Mode::Sync(period) = plan.mode {
         refuse_second_sync(master, &instruments, period)?;
+        if let Some(share) = sync_share(master, &instruments, period) {
+            observer.note(&Note::Share(period, share), master.bus().now());
+        }
     }
     let result = states.start(master, &instruments, plan).and_then(|()| {
         master.ride_out(true);

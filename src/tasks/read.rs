@@ -118,6 +118,7 @@ pub fn sample(
         object: target.object,
         operation: crate::master::Operation::Read,
         failure: SdoFailure::NotANumber,
+        disturbed: false,
     })
 }
 

@@ -141,7 +141,14 @@ fn an_overload_is_told_as_it_comes() {
          [[device.overload]]\nchannel = 1\nfrom = \"700ms\"\nuntil = \"800ms\"\ndirection = \"high\"\n",
     );
     let done = bench.run("log 5 --sync 10ms --duration 1s").exit(0);
-    assert!(done.stderr.starts_with("warning: node 5: emergency F001h, "), "{}", done.stderr);
+    let told = "warning: node 5: emergency F001h, user input overload";
+    assert!(done.stderr.lines().any(|line| line.starts_with(told)), "{}", done.stderr);
+    // (1 SYNC of at most 50 bits and 1 TPDO of at most 135) in 10 ms, of 250 kbit/s.
+    assert!(
+        done.stderr.starts_with("SYNC every 10 ms and the answers take about 7.4 % of the bus\n"),
+        "{}",
+        done.stderr
+    );
     assert!(done.stderr.contains("node 5: emergency over (0000h)"), "{}", done.stderr);
     assert!(done.stderr.contains("  10 invalid"), "{}", done.stderr);
 }

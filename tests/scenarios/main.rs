@@ -1,5 +1,6 @@
 //! Commands and recordings under bad conditions, on the virtual clock.
 
+mod answers;
 mod full_queue;
 mod garbage;
 mod second_master;

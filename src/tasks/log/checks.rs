@@ -3,6 +3,7 @@
 use super::{Mode, Plan};
 use crate::bus::BusError;
 use crate::canopen::id::CanId;
+use crate::canopen::pdo::Transmission;
 use crate::master::{Error, Happening, Master};
 use crate::measure::decode::Wanted;
 use crate::measure::instrument::Instrument;
@@ -91,3 +92,22 @@ pub(super) fn refuse_second_sync(
         }
     }
 }
+
+/// The share of the bus that SYNC at this interval takes with the TPDOs that it brings about, each at its
+/// longest; `None` where the bit rate is not known.
+pub(super) fn sync_share(master: &Master<'_>, instruments: &[Instrument], period: Duration) -> Option<f64> {
+    let bit_rate = master.bus().bit_rate()?;
+    let tpdos = instruments.iter().flat_map(|instrument| &instrument.tpdos).filter(|tpdo| tpdo.cob_id.is_valid());
+    let answers = tpdos.filter_map(|tpdo| match tpdo.transmission? {
+        Transmission::AcyclicSync => Some(LONGEST_FRAME_BITS),
+        Transmission::Sync(every) => Some(LONGEST_FRAME_BITS / f64::from(every)),
+        _ => None,
+    });
+    Some((SYNC_BITS + answers.sum::<f64>()) / f64::from(bit_rate) / period.as_secs_f64())
+}
+
+/// Eight bytes, every stuff bit, and the gap.
+const LONGEST_FRAME_BITS: f64 = 135.0;
+
+/// No byte, some stuff bits, and the gap.
+const SYNC_BITS: f64 = 50.0;

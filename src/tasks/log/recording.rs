@@ -47,6 +47,8 @@ pub(super) struct Recording {
     rhythms: Vec<Pulse>,
     pulses: BTreeMap<NodeId, Pulse>,
     emergencies_of: BTreeMap<CanId, NodeId>,
+    /// What the descriptions say of each emergency code.
+    meanings: BTreeMap<(NodeId, u16), String>,
     timestamps: TimestampSource,
     pub(super) rows: u64,
     first: Option<Mono>,
@@ -78,6 +80,7 @@ impl Recording {
                 .filter(|_| plan.mode != Mode::Passive)
                 .map(|&node| (node, Pulse::default()))
                 .collect(),
+            meanings: instruments.iter().flat_map(meanings).collect(),
             emergencies_of: instruments.iter().map(|instrument| (instrument.emergency, instrument.node)).collect(),
             timestamps,
             rows: 0,
@@ -256,7 +259,9 @@ impl Recording {
                 if let (Some(&node), Some(emergency)) = (self.emergencies_of.get(&frame.id()), Emergency::parse(frame))
                 {
                     self.emergencies += 1;
-                    observer.note(&Note::Emergency(node, emergency), received.at);
+                    let meaning = self.meanings.get(&(node, emergency.code));
+                    let meaning = meaning.map_or_else(|| Emergency::class(emergency.code), String::as_str);
+                    observer.note(&Note::Emergency(node, emergency, meaning.to_owned()), received.at);
                 } else if let Some((node, life)) = Life::parse(frame)
                     && self.pulses.contains_key(&node)
                     && states.take(node, life, master)
@@ -368,4 +373,9 @@ fn next_slot(begin: Mono, now: Mono, period: Duration, slot: u64) -> u64 {
 /// How long a node may be silent: five of its usual intervals, at least a second.
 fn patience(pulse: &Pulse) -> Duration {
     (pulse.interval.unwrap_or_default() * 5).max(Duration::from_secs(1))
+}
+
+fn meanings(instrument: &Instrument) -> impl Iterator<Item = ((NodeId, u16), String)> {
+    let described = instrument.model.as_ref().map_or(&[][..], |model| &model.description.emergencies);
+    described.iter().map(|entry| ((instrument.node, entry.code), entry.text.clone()))
 }

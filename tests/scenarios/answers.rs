@@ -1,0 +1,124 @@
+//! Late answers, and the answers that another client's requests bring: none may become ours.
+
+use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
+use cangauge::bus::time::Mono;
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::sdo::DownloadSize;
+use cangauge::canopen::value::{DataType, Value};
+use cangauge::master::{Master, Request, SdoFailure, Timing};
+use std::collections::VecDeque;
+use std::time::Duration;
+
+const TIMEOUT: Duration = Duration::from_millis(100);
+
+/// A server that answers every read with a number that counts up, the n-th after its own delay.
+struct Slow {
+    delays: VecDeque<u64>,
+    due: VecDeque<(Mono, Frame)>,
+    answered: u8,
+}
+
+impl Station for Slow {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, now: Mono, frame: &Frame, _: &mut Outbox) {
+        let [0x40, a, b, c, ..] = *frame.data() else { return };
+        self.answered += 1;
+        let answer = format!("585#43{a:02X}{b:02X}{c:02X}{:02X}000000", self.answered);
+        // A server answers in order: no answer before an earlier one.
+        let earliest = self.due.back().map_or(now, |(due, _)| *due);
+        let due = earliest.max(now + Duration::from_millis(self.delays.pop_front().unwrap_or(1)));
+        self.due.push_back((due, answer.parse().expect("a frame")));
+    }
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        while self.due.front().is_some_and(|(due, _)| *due <= now) {
+            out.send(self.due.pop_front().expect("there is one").1);
+        }
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.due.front().map(|(due, _)| *due)
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+fn node() -> NodeId {
+    NodeId::new(5).expect("a node-ID")
+}
+
+/// What reads of the objects give, one after the other, with answers that come after `delays` ms each.
+fn reads(objects: &[u16], retries: u32, delays: &[u64]) -> Vec<Option<u64>> {
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
+    bus.attach(Slow { delays: delays.iter().copied().collect(), due: VecDeque::new(), answered: 0 });
+    let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries });
+    objects
+        .iter()
+        .map(|&index| {
+            let value = master.read(node(), ObjectId::new(index, 0), DataType::Unsigned(4)).expect("the bus works");
+            value.ok().as_ref().and_then(Value::as_u64)
+        })
+        .collect()
+}
+
+#[test]
+fn a_late_answer_is_not_the_next_reading_of_another_object() {
+    assert_eq!(reads(&[0x2000, 0x2001], 0, &[150, 1]), [None, Some(2)]);
+}
+
+#[test]
+fn a_late_answer_is_not_the_next_reading_of_the_same_object() {
+    // The second reading waits behind a read of 1000h (answer 2), which proves that the first one's answer
+    // can come no more; its own is the third.
+    assert_eq!(reads(&[0x2000, 0x2000, 0x2000], 0, &[150, 1, 1, 1]), [None, Some(3), Some(4)]);
+    // After a repeat two answers are under way for one reading.
+    assert_eq!(reads(&[0x2000, 0x2000], 1, &[150, 1, 1, 1]), [Some(1), Some(4)]);
+    // An answer that came in the meantime, to nobody, needs no such care.
+    assert_eq!(reads(&[0x2000, 0x2001, 0x2000], 0, &[120, 50, 1, 1]), [None, Some(2), Some(3)]);
+}
+
+#[test]
+fn a_server_that_stays_silent_is_no_answer_however_often_it_is_asked() {
+    assert_eq!(reads(&[0x2000, 0x2000], 1, &[10_000]), [None, None]);
+}
+
+/// A server for writes that acknowledges the other client's write and refuses ours.
+struct Torn {
+    ours: bool,
+}
+
+impl Station for Torn {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+        if frame.data().first() == Some(&0x2f) && !self.ours {
+            self.ours = true;
+            // The other client's request was on the wire just before, and its acknowledge comes first.
+            for text in ["605#2F00200007000000", "585#6000200000000000", "585#8000200030000906"] {
+                out.send(text.parse().expect("a frame"));
+            }
+        }
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn the_acknowledge_of_another_clients_write_is_no_success_of_ours() {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(Torn { ours: false });
+    let mut master = Master::new(&mut bus, Timing::default());
+    let request = Request::write(node(), ObjectId::new(0x2000, 0), vec![5], DownloadSize::Indicated);
+    let error = master.transfer_one(request).expect("the bus works").expect_err("no success");
+    assert_eq!(error.failure, SdoFailure::Ambiguous);
+    assert!(error.to_string().ends_with("another SDO client is talking to this node"), "{error}");
+}
