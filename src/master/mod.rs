@@ -15,7 +15,7 @@ pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, Way, read_object, wri
 
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};
 use crate::canopen::frame::Frame;
-use crate::canopen::id::NodeId;
+use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{FitError, Note, Uploaded, fit};
 use crate::canopen::value::{DataType, Value};
@@ -115,6 +115,13 @@ impl<'bus> Master<'bus> {
     /// Tells the bus which frames are wanted.
     pub fn listen(&mut self, filters: &Filters) -> Result<(), Error> {
         Ok(self.bus.listen(filters)?)
+    }
+
+    /// Wants nothing but the SDO channels and the signs of life of these nodes. On a bus full of other traffic
+    /// all of that would have to be read and thrown away, and an answer might find no room among it.
+    pub fn listen_to(&mut self, nodes: &[NodeId]) -> Result<(), Error> {
+        let ids = |&node| [CanId::sdo_response(node), CanId::sdo_request(node), CanId::heartbeat(node)];
+        self.listen(&Filters::Only(nodes.iter().flat_map(ids).collect()))
     }
 
     /// Puts a frame behind those already waiting to be sent.

@@ -141,6 +141,7 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     if plan.mode == Mode::Passive {
         return record_passively(master, plan, observer);
     }
+    master.listen_to(&plan.nodes)?;
     let instruments = instruments(master, &plan.nodes, &plan.overrides)?;
     check_wanted(&instruments, plan)?;
     let mut recording = Recording::new(&instruments, plan, master.bus().timestamps());
