@@ -11,7 +11,6 @@
 
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
-use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, TransferError};
 use std::time::Duration;
 
@@ -26,10 +25,6 @@ pub(super) struct Company {
     /// Somebody has a transfer in segments or blocks.
     in_segments: bool,
     in_blocks: bool,
-    /// Somebody writes the same object.
-    same_written: bool,
-    /// Somebody has sent a request, now or before ours began anew.
-    clients: bool,
     /// When ours was first in the way of theirs.
     since: Option<Mono>,
     /// Until when ours stands back.
@@ -69,16 +64,12 @@ impl Sign {
 }
 
 impl Company {
-    /// Notes what a frame that is on the channel, and no answer to us, tells of others. `object` is ours.
-    pub(super) fn hear(&mut self, frame: &Frame, object: ObjectId, now: Mono) {
+    /// Notes what a frame that is on the channel, and no answer to us, tells of others.
+    pub(super) fn hear(&mut self, frame: &Frame, now: Mono) {
         let Some(sign) = Sign::of(frame) else { return };
         self.seen = true;
         self.in_blocks |= sign == Sign::Blocks;
         self.in_segments |= matches!(sign, Sign::Segments | Sign::Blocks);
-        if let (Some(_), [command, a, b, c, ..]) = (frame.id().sdo_request_node(), frame.data()) {
-            self.clients = true;
-            self.same_written |= command >> 5 == 1 && ObjectId::from_multiplexer([*a, *b, *c]) == object;
-        }
         if let Some(until) = &mut self.back_until {
             match sign {
                 // In blocks every number of a segment would look like an end.
@@ -92,16 +83,6 @@ impl Company {
     /// Whether nothing that comes in segments can be taken for ours any more.
     pub(super) fn is_in_the_way(self) -> bool {
         self.in_segments
-    }
-
-    /// Whether another client was heard.
-    pub(super) fn has_clients(self) -> bool {
-        self.clients
-    }
-
-    /// Whether another client has written the same object: two acknowledges cannot be told apart.
-    pub(super) fn has_written_the_same(self) -> bool {
-        self.same_written
     }
 
     /// Whether a transfer in segments that has come to its end may be somebody else's in part.
@@ -135,7 +116,7 @@ impl Company {
 
     /// Ours begins; what was heard so far was before.
     pub(super) fn begin(&mut self) {
-        *self = Company { since: self.since, clients: self.clients, ..Company::default() };
+        *self = Company { since: self.since, ..Company::default() };
     }
 }
 
@@ -143,7 +124,6 @@ impl Company {
 mod tests {
     use super::*;
 
-    const OURS: ObjectId = ObjectId::new(0x1017, 0);
     const PATIENCE: Duration = Duration::from_millis(1000);
 
     fn ms(millis: u64) -> Mono {
@@ -152,7 +132,7 @@ mod tests {
 
     fn after(texts: &[&str]) -> Company {
         let mut company = Company::default();
-        texts.iter().for_each(|text| company.hear(&text.parse().expect("a frame"), OURS, ms(0)));
+        texts.iter().for_each(|text| company.hear(&text.parse().expect("a frame"), ms(0)));
         company
     }
 
@@ -184,18 +164,6 @@ mod tests {
     }
 
     #[test]
-    fn clients_and_what_they_write() {
-        assert!(!after(&["585#4318100147000000", "605#"]).has_clients());
-        for (text, same) in
-            [("605#2B17100064000000", true), ("605#2B17100164000000", false), ("605#4017100000000000", false)]
-        {
-            let company = after(&[text]);
-            assert!(company.has_clients());
-            assert_eq!(company.has_written_the_same(), same, "{text}");
-        }
-    }
-
-    #[test]
     fn which_failures_others_explain() {
         let (refused, toggle) = (AbortCode(0x0602_0000), AbortCode(0x0503_0000));
         for company in [Company::default(), after(&["605#4018100100000000"])] {
@@ -207,7 +175,7 @@ mod tests {
 
     #[test]
     fn standing_back_ends_with_their_transfer_or_when_it_is_dead() {
-        let hear = |company: &mut Company, text: &str, at| company.hear(&text.parse().expect("a frame"), OURS, ms(at));
+        let hear = |company: &mut Company, text: &str, at| company.hear(&text.parse().expect("a frame"), ms(at));
         let mut company = after(&["585#4108100023000000"]);
         assert!(company.stand_back(ms(100), PATIENCE));
         assert_eq!(company.back_until(), Some(ms(150)));

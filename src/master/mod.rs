@@ -6,11 +6,12 @@
 
 mod company;
 mod machine;
+mod request;
 mod sdo;
 mod send;
 pub mod transfer;
 
-pub use sdo::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
+pub use request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, Way, read_object, write_object};
 
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};
@@ -283,8 +284,7 @@ impl<'bus> Master<'bus> {
                             if node == silent && rest != at && results[rest].is_none() {
                                 self.forget(std::iter::once(tickets[rest]));
                                 let failure = SdoFailure::Cancelled;
-                                results[rest] =
-                                    Some(Err(SdoError { node, object, operation, failure, disturbed: false }));
+                                results[rest] = Some(Err(SdoError { node, object, operation, failure }));
                             }
                         }
                     }
@@ -309,13 +309,7 @@ impl<'bus> Master<'bus> {
     pub fn transfer_one(&mut self, request: Request) -> Result<Result<Answer, SdoError>, Error> {
         let (node, object, operation) = (request.node, request.object, request.operation());
         let result = self.transfer(vec![request], &mut |_| {})?.pop();
-        Ok(result.unwrap_or(Err(SdoError {
-            node,
-            object,
-            operation,
-            failure: SdoFailure::Cancelled,
-            disturbed: false,
-        })))
+        Ok(result.unwrap_or(Err(SdoError { node, object, operation, failure: SdoFailure::Cancelled })))
     }
 
     /// Reads a value of a known type.
@@ -348,7 +342,6 @@ impl Answer {
             object,
             operation: Operation::Read,
             failure: SdoFailure::Fit(error),
-            disturbed: false,
         })
     }
 }

@@ -4,181 +4,16 @@
 use super::Timing;
 use super::company::Company;
 use super::machine::Machine;
+use super::request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 use super::send::Outgoing;
 use super::transfer::{Blocks, Way, names_the_object};
-use crate::bus::time::spoken;
-use crate::bus::{Mono, Received, Stamp};
+use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{AbortCode, DownloadSize, FitError, Progress, TransferError, Uploaded, Violation};
+use crate::canopen::sdo::{AbortCode, Progress, TransferError, Uploaded};
 use std::collections::{BTreeMap, VecDeque};
-use std::fmt;
 use std::time::Duration;
-
-/// Names a transfer from its start to its end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Ticket(u64);
-
-/// What is to be transferred.
-#[derive(Clone, Debug)]
-pub struct Request {
-    /// With which node.
-    pub node: NodeId,
-    /// Which object.
-    pub object: ObjectId,
-    kind: Kind,
-    timeout: Option<Duration>,
-    repeatable: bool,
-    blocks: Blocks,
-    /// The device does no block transfer of this object: that was found out in this very transfer.
-    refused_blocks: bool,
-}
-
-#[derive(Clone, Debug)]
-enum Kind {
-    Read,
-    Write { data: Vec<u8>, size: DownloadSize },
-}
-
-impl Request {
-    /// A read.
-    pub fn read(node: NodeId, object: ObjectId) -> Request {
-        Request::new(node, object, Kind::Read)
-    }
-
-    /// A write of a plain value.
-    pub fn write(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> Request {
-        Request::new(node, object, Kind::Write { data, size })
-    }
-
-    fn new(node: NodeId, object: ObjectId, kind: Kind) -> Request {
-        let (blocks, refused_blocks) = (Blocks::Never, false);
-        Request { node, object, kind, timeout: None, repeatable: true, blocks, refused_blocks }
-    }
-
-    /// In blocks, or not: see [`super::BlockMode`] for the choice.
-    pub fn blocks(mut self, blocks: Blocks) -> Request {
-        self.blocks = blocks;
-        self
-    }
-
-    /// Sent once only, whatever the time-outs say: signatures, and scans that do their own asking.
-    pub fn once(mut self) -> Request {
-        self.repeatable = false;
-        self
-    }
-
-    /// With a longer wait than others: storing.
-    pub fn within(mut self, timeout: Duration) -> Request {
-        self.timeout = Some(timeout);
-        self
-    }
-
-    /// Whether a request for blocks is only the first try.
-    fn falls_back(&self) -> bool {
-        matches!(self.blocks, Blocks::First { .. })
-    }
-
-    fn fall_back(&mut self) {
-        self.blocks = Blocks::Never;
-        self.refused_blocks = true;
-    }
-
-    fn machine(&self, accept_60: bool) -> Machine {
-        match &self.kind {
-            Kind::Read => Machine::read(self.node, self.object, accept_60, self.blocks),
-            Kind::Write { data, size } => Machine::write(self.node, self.object, data.clone(), *size, self.blocks),
-        }
-    }
-
-    /// Whether it reads or writes.
-    pub fn operation(&self) -> Operation {
-        match self.kind {
-            Kind::Read => Operation::Read,
-            Kind::Write { .. } => Operation::Write,
-        }
-    }
-}
-
-/// Whether a transfer reads or writes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Operation {
-    /// SDO upload.
-    Read,
-    /// SDO download.
-    Write,
-}
-
-impl fmt::Display for Operation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Operation::Read => "read",
-            Operation::Write => "write",
-        })
-    }
-}
-
-/// The end of a transfer that succeeded.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Answer {
-    /// What was read; `None` of a write.
-    pub uploaded: Option<Uploaded>,
-    /// When the last frame of the answer was received.
-    pub at: Stamp,
-    /// How the data went.
-    pub way: Way,
-}
-
-/// Why a transfer has no result.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{operation} {object}: {failure}{}", if *.disturbed { "; another SDO client is talking to this node" } else { "" })]
-pub struct SdoError {
-    /// With which node.
-    pub node: NodeId,
-    /// Which object.
-    pub object: ObjectId,
-    /// Whether it was read or written.
-    pub operation: Operation,
-    /// What went wrong.
-    pub failure: SdoFailure,
-    /// Whether another client used the node's SDO server at the same time.
-    pub disturbed: bool,
-}
-
-/// What went wrong with a transfer.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SdoFailure {
-    /// The device refused.
-    #[error("refused by the device ({0})")]
-    Refused(AbortCode),
-    /// Nothing came.
-    #[error("no answer within {}{}", spoken(*.waited), if *.begun { " in the middle of the transfer" } else { "" })]
-    NoAnswer {
-        /// The longest wait for one answer.
-        waited: Duration,
-        /// Whether the device had begun to answer.
-        begun: bool,
-    },
-    /// The device answered against the protocol.
-    #[error("{0}: {1}")]
-    Violation(Violation, Frame),
-    /// The device delivered bytes that make no value of the type.
-    #[error("{0}")]
-    Fit(FitError),
-    /// The object holds text or bytes where a measured value was asked for.
-    #[error("it is no number")]
-    NotANumber,
-    /// Other clients get in the way, time and again.
-    #[error("it never came to its end")]
-    Disturbed,
-    /// Another client wrote the same object at the same time.
-    #[error("acknowledged, but whose write is not known: another SDO client wrote the same object")]
-    Ambiguous,
-    /// We gave up.
-    #[error("not finished")]
-    Cancelled,
-}
 
 /// A transfer under way.
 #[derive(Debug)]
@@ -196,6 +31,8 @@ struct Active {
     company: Company,
     /// The user's transfer that waits while this one makes sure that no old answer is still under way.
     behind: Option<(Ticket, Request)>,
+    /// Another client writes the same object: whose acknowledge comes cannot be told.
+    ambiguous: bool,
 }
 
 /// A request that got no answer, whose answer may still come.
@@ -236,7 +73,18 @@ impl Active {
         let machine = request.machine(accept_60);
         let (deadline, asked_at, behind) = (None, None, None);
         let company = Company::default();
-        Active { ticket, request, machine, deadline, unsent: 0, attempts_left, asked_at, company, behind }
+        Active {
+            ticket,
+            request,
+            machine,
+            deadline,
+            unsent: 0,
+            attempts_left,
+            asked_at,
+            company,
+            behind,
+            ambiguous: false,
+        }
     }
 
     /// Hands frames to the queue, in place of those that are still in it.
@@ -268,7 +116,7 @@ impl Active {
     /// Takes a frame that is no answer to us. Whether the transfer can go on.
     fn overhear(&mut self, accept_60: bool, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let now = received.at.mono;
-        self.company.hear(&received.frame, self.request.object, now);
+        self.company.hear(&received.frame, now);
         if let Some(until) = self.company.back_until() {
             self.deadline = Some(until);
             return true;
@@ -282,11 +130,6 @@ impl Active {
         let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
         let delivered = uploaded.map_or(0, |uploaded| uploaded.bytes.len());
         in_segments && self.company.casts_doubt(uploaded.and_then(|uploaded| uploaded.announced), delivered)
-    }
-
-    /// Whether the acknowledge may be that of another client's write.
-    fn is_ambiguous(&self) -> bool {
-        self.request.operation() == Operation::Write && self.company.has_written_the_same()
     }
 
     /// A read turns out to be of a large object: it is asked for in blocks, from the start.
@@ -326,12 +169,14 @@ impl Active {
     }
 
     fn error(&self, failure: SdoFailure) -> SdoError {
-        SdoError {
-            node: self.request.node,
-            object: self.request.object,
-            operation: self.request.operation(),
-            failure,
-            disturbed: self.company.has_clients(),
+        SdoError { node: self.request.node, object: self.request.object, operation: self.request.operation(), failure }
+    }
+
+    /// Takes a request of another client: the acknowledges of two writes of one object cannot be told apart.
+    fn hear_request(&mut self, frame: &Frame) {
+        if let [command, a, b, c, ..] = frame.data() {
+            let same = ObjectId::from_multiplexer([*a, *b, *c]) == self.request.object;
+            self.ambiguous |= same && command >> 5 == 1 && self.request.operation() == Operation::Write;
         }
     }
 }
@@ -429,6 +274,9 @@ impl SdoClient {
         };
         let result = match progress {
             Progress::NotOurs => {
+                if id.sdo_request_node().is_some() {
+                    active.hear_request(&received.frame);
+                }
                 if !active.overhear(node.accept_60, received, timing, outgoing) {
                     let error = active.error(SdoFailure::Disturbed);
                     self.finished.push_back((active.ticket, Err(error)));
@@ -452,13 +300,13 @@ impl SdoClient {
                 active.give(out, outgoing);
                 return true;
             }
+            Progress::Done(_) if active.ambiguous => Err(active.error(SdoFailure::Ambiguous)),
             Progress::Done(uploaded) if active.is_doubtful(uploaded.as_ref()) => {
                 if active.stand_back(node.accept_60, at, timing, outgoing) {
                     return true;
                 }
                 Err(active.error(SdoFailure::Disturbed))
             }
-            Progress::Done(_) if active.is_ambiguous() => Err(active.error(SdoFailure::Ambiguous)),
             Progress::Done(uploaded) => Ok(Answer { uploaded, at: received.at, way: active.way() }),
             Progress::Failed(error) if active.company.explains(error) => {
                 if active.stand_back(node.accept_60, at, timing, outgoing) {

@@ -118,7 +118,6 @@ pub fn sample(
         object: target.object,
         operation: crate::master::Operation::Read,
         failure: SdoFailure::NotANumber,
-        disturbed: false,
     })
 }
 

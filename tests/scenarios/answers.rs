@@ -120,5 +120,4 @@ fn the_acknowledge_of_another_clients_write_is_no_success_of_ours() {
     let request = Request::write(node(), ObjectId::new(0x2000, 0), vec![5], DownloadSize::Indicated);
     let error = master.transfer_one(request).expect("the bus works").expect_err("no success");
     assert_eq!(error.failure, SdoFailure::Ambiguous);
-    assert!(error.to_string().ends_with("another SDO client is talking to this node"), "{error}");
 }

@@ -164,7 +164,6 @@ fn whatever_the_other_reads_and_when_ours_is_what_the_device_holds() {
         disturbed * 10 < clean && others > clean / 10,
         "{clean} came through, {disturbed} never, {others} of theirs"
     );
-    eprintln!("{clean} came through, {disturbed} never, {others} of theirs");
 }
 
 #[test]
