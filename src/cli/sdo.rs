@@ -1,7 +1,7 @@
 //! `cangauge sdo`.
 
 use super::args::ObjectArg;
-use super::exit::{FileError, stdout};
+use super::exit::{FileError, IntoFailure, stdout};
 use super::file::OutFile;
 use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
@@ -164,6 +164,7 @@ impl ReadArgs {
         // Many values are one system call, and not one each.
         let mut out = io::BufWriter::with_capacity(1 << 16, io::stdout());
         let result = global.with_master(|master| {
+            master.listen_to(&[self.node]).or_fail()?;
             for object in &self.objects {
                 let at = resolve(&mut knowledge, master, object)?;
                 let value = read(master, &mut knowledge, at, self.data_type, &mut options)?;
@@ -268,6 +269,7 @@ impl WriteArgs {
             }
         }
         global.with_master(|master| {
+            master.listen_to(&[self.node]).or_fail()?;
             let mut ready = Vec::new();
             for (object, value) in &pairs {
                 let at = resolve(&mut knowledge, master, object)?;

@@ -16,7 +16,7 @@ pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, Way, read_object, wri
 
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};
 use crate::canopen::frame::Frame;
-use crate::canopen::id::NodeId;
+use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{FitError, Note, Uploaded, fit};
 use crate::canopen::value::{DataType, Value};
@@ -118,14 +118,28 @@ impl<'bus> Master<'bus> {
         Ok(self.bus.listen(filters)?)
     }
 
+    /// Wants nothing but the SDO channels and the signs of life of these nodes. On a bus full of other traffic
+    /// all of that would have to be read and thrown away, and an answer might find no room among it.
+    pub fn listen_to(&mut self, nodes: &[NodeId]) -> Result<(), Error> {
+        let ids = |&node| [CanId::sdo_response(node), CanId::sdo_request(node), CanId::heartbeat(node)];
+        self.listen(&Filters::Only(nodes.iter().flat_map(ids).collect()))
+    }
+
     /// Puts a frame behind those already waiting to be sent.
     pub fn send(&mut self, frame: Frame) {
         self.outgoing.push(frame, None);
     }
 
-    /// Puts a frame before all that wait: a SYNC must not stand behind SDO requests.
-    pub fn send_first(&mut self, frame: Frame) {
-        self.outgoing.push_first(frame);
+    /// Puts a frame before all that wait: a SYNC must not stand behind SDO requests. `false` where the one
+    /// before has not even been sent: two of them in a row are one too many.
+    pub fn send_first(&mut self, frame: Frame) -> bool {
+        self.outgoing.push_first(frame)
+    }
+
+    /// From now on an interface that is down, and a bus on which nobody acknowledges, are ridden out: what
+    /// cannot be sent is lost, as any frame may be, and the work goes on. Otherwise they are errors.
+    pub fn ride_out(&mut self, rides_out: bool) {
+        self.outgoing.ride_out(rides_out);
     }
 
     /// Starts an SDO transfer; its end comes as [`Happening::Sdo`] with the ticket returned. One transfer a

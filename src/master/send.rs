@@ -24,11 +24,14 @@ pub(super) struct Outgoing {
     /// When the wire will have carried everything sent so far, if nobody else sends.
     wire_free_at: Mono,
     full_since: Option<Mono>,
+    /// What cannot be sent is lost, as on the wire, and no error.
+    rides_out: bool,
 }
 
 impl Outgoing {
     pub(super) fn new() -> Outgoing {
-        Outgoing { queue: VecDeque::new(), bit_rate: None, wire_free_at: Mono::START, full_since: None }
+        let wire_free_at = Mono::START;
+        Outgoing { queue: VecDeque::new(), bit_rate: None, wire_free_at, full_since: None, rides_out: false }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -39,8 +42,17 @@ impl Outgoing {
         self.queue.push_back((frame, ticket));
     }
 
-    pub(super) fn push_first(&mut self, frame: Frame) {
-        self.queue.push_front((frame, None));
+    /// Puts a frame before all others, unless the very same is there already.
+    pub(super) fn push_first(&mut self, frame: Frame) -> bool {
+        let is_new = self.queue.front() != Some(&(frame, None));
+        if is_new {
+            self.queue.push_front((frame, None));
+        }
+        is_new
+    }
+
+    pub(super) fn ride_out(&mut self, rides_out: bool) {
+        self.rides_out = rides_out;
     }
 
     /// Forgets the frames of SDO transfers.
@@ -57,7 +69,8 @@ impl Outgoing {
     /// if something is left.
     ///
     /// # Errors
-    /// The bus's own, and a transmit queue that stays full for `patience` (at least a second).
+    /// The bus's own, and a transmit queue that stays full for `patience` (at least a second). Neither a full
+    /// queue nor an interface that is down while [`Outgoing::ride_out`] holds.
     pub(super) fn flush(
         &mut self,
         bus: &mut dyn Bus,
@@ -80,11 +93,18 @@ impl Outgoing {
                 Ok(()) => {}
                 Err(BusError::QueueFull) => {
                     let since = *self.full_since.get_or_insert(now);
-                    if now.since(since) > patience.max(Duration::from_secs(1)) {
+                    if now.since(since) <= patience.max(Duration::from_secs(1)) {
+                        return Ok(Some(now + RETRY));
+                    }
+                    if !self.rides_out {
                         return Err(BusError::QueueFull);
                     }
-                    return Ok(Some(now + RETRY));
+                    // Nobody takes anything. What waits would be too late when somebody does again.
+                    self.queue.drain(..).filter_map(|(_, ticket)| ticket).for_each(|ticket| sent(ticket, now));
+                    self.full_since = None;
+                    return Ok(None);
                 }
+                Err(BusError::Down(_)) if self.rides_out => {}
                 Err(error) => return Err(error),
             }
             if let Some(ticket) = ticket {

@@ -141,6 +141,7 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     if plan.mode == Mode::Passive {
         return record_passively(master, plan, observer);
     }
+    master.listen_to(&plan.nodes)?;
     let instruments = instruments(master, &plan.nodes, &plan.overrides)?;
     check_wanted(&instruments, plan)?;
     let mut recording = Recording::new(&instruments, plan, master.bus().timestamps());
@@ -161,10 +162,11 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
             observer.note(&Note::Share(period, share), master.bus().now());
         }
     }
-    let result = match states.start(master, &instruments, plan) {
-        Ok(()) => recording.run(master, plan, &instruments, &mut states, poll.as_mut(), observer),
-        Err(error) => Err(error),
-    };
+    let result = states.start(master, &instruments, plan).and_then(|()| {
+        master.ride_out(true);
+        recording.run(master, plan, &instruments, &mut states, poll.as_mut(), observer)
+    });
+    master.ride_out(false);
     let restored = states.restore(master);
     recording.remarks.extend(states.remarks());
     match result {

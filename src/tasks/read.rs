@@ -154,6 +154,7 @@ pub fn read(
     wanted: &[Wanted],
     overrides: &Overrides,
 ) -> Result<Vec<Result<Readings, Failure>>, Error> {
+    master.listen_to(nodes)?;
     let mut results = Vec::new();
     for &node in nodes {
         results.push(match instruments(master, &[node], overrides) {

@@ -46,6 +46,7 @@ pub fn scan(
     rounds: u32,
     overrides: &Overrides,
 ) -> Result<Vec<Found>, Error> {
+    master.listen_to(nodes)?;
     // On the slowest of buses a request may stand in the queue for longer than others wait for an answer.
     let queue = master.bus().bit_rate().filter(|&rate| rate > 0);
     let queue = queue.map_or(0, |rate| FULL_QUEUE_BITS * 1_000_000 / u64::from(rate));

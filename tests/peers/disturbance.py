@@ -249,6 +249,22 @@ def full_queue(cangauge, directory, here, there):
             assert "transmit queue is full" in result.err and "acknowledge" in result.err, result
 
 
+def nobody_acknowledges(cangauge, directory, here, there):
+    """A plug that is out for a while: log says that nothing comes, and goes on when it is back."""
+    with devices(there, directory, "10:real32", sync=1) as record:
+        with cangauge.running("log", 10, "--sync", "20ms", directory=directory, bus=here) as log:
+            log.await_rows(10)
+            with slow_queue(here, "8bit", 2):
+                log.await_words("node 10: silent")
+                # Long enough for the queue to be given up, however fast the machine is.
+                time.sleep(2)
+                assert log.is_running(), log.text("err")
+            survives(log)
+            result = log.finish()
+        assert "node 10 is back" in result.err, result
+        begins(measured(result.rows()), record())
+
+
 def link(interface, state):
     subprocess.run(["ip", "link", "set", interface, state], check=True)
 
@@ -292,4 +308,4 @@ def link_lost(cangauge, directory, here, there):
 CHECKS = [garbage_while_recording, garbage_while_sending_sync, garbage_while_polling, garbage_while_listening, second_master,
           heavy_traffic]
 # These need two interfaces that are the ends of one wire.
-PAIR_CHECKS = [full_queue, link_lost]
+PAIR_CHECKS = [full_queue, nobody_acknowledges, link_lost]

@@ -189,10 +189,10 @@ impl Recording {
                     if let Some((period, id)) = sync
                         && until >= begin + nth(period, slot)
                     {
-                        master.send_first(Frame::empty(id));
-                        self.syncs += 1;
+                        let is_sent = master.send_first(Frame::empty(id));
+                        self.syncs += u64::from(is_sent);
                         let next = next_slot(begin, master.now(), period, slot);
-                        self.left_out += next - slot - 1;
+                        self.left_out += next - slot - u64::from(is_sent);
                         slot = next;
                     }
                     if let Some(poll) = &mut poll {
