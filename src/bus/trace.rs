@@ -91,8 +91,10 @@ impl<B: Bus> Bus for Traced<B> {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        // Before it is handed over: an answer may come before the program comes to look at the clock.
+        let at = self.bus.now();
         self.bus.send(frame)?;
-        self.line(self.bus.now(), frame);
+        self.line(at, frame);
         Ok(())
     }
 

@@ -51,6 +51,13 @@ impl Model {
         for object in &description.objects {
             dictionary.insert_described(object).map_err(DescriptionError)?;
         }
+        for entry in dictionary.iter() {
+            for (what, scalar) in [("default", &entry.default), ("low", &entry.low), ("high", &entry.high)] {
+                if let Some(Err(error)) = scalar.as_ref().map(|scalar| scalar.encode(entry.data_type, NodeId::MIN)) {
+                    return Err(DescriptionError(format!("{what} of {}: {error}", entry.object)));
+                }
+            }
+        }
         Ok(Model { description, dictionary, untyped: BTreeSet::new() })
     }
 
@@ -81,9 +88,8 @@ impl Model {
     /// Whether the objects that confirm the identity hold what they must. Bytes beyond the type's
     /// width do not count: a server that omits the size sends four.
     fn is_confirmed(&self, traits: &Traits) -> bool {
-        let Ok(any_node) = NodeId::new(1) else { return false };
         self.description.identify.confirm.iter().all(|(&object, value)| {
-            let wanted = self.dictionary.get(object).and_then(|entry| value.encode(entry.data_type, any_node).ok());
+            let wanted = self.dictionary.get(object).and_then(|entry| value.encode(entry.data_type, NodeId::MIN).ok());
             match (wanted, traits.answers.get(&object)) {
                 (Some(wanted), Some(found)) => found.starts_with(&wanted),
                 _ => false,
@@ -175,6 +181,15 @@ mod tests {
                 assert_eq!(entry.full_name(), standard.full_name(), "{name} {}", entry.object);
             }
         }
+    }
+
+    #[test]
+    fn a_default_that_is_none_of_its_type_is_refused() {
+        let text = "name='x'\ntitle=''\nvendor=''\nsource=''\n[identify]\n[[object]]\nat='0x2000'\nname='o'\ntype='u8'\naccess='rw'\n";
+        assert!(Model::from_toml(&format!("{text}default=255")).is_ok());
+        let error = Model::from_toml(&format!("{text}default=256")).expect_err("too large");
+        assert_eq!(error.to_string(), "default of 0x2000:0: 256 does not fit u8 (0 to 255)");
+        assert!(Model::from_toml(&format!("{text}low='x'")).is_err());
     }
 
     #[test]
