@@ -1,6 +1,6 @@
 //! Finds who is on the bus.
 
-use crate::bus::{Filters, Received};
+use crate::bus::{Filters, Mono, Received};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::{Life, NmtState};
@@ -32,6 +32,9 @@ const FULL_QUEUE_BITS: u64 = 10 * 2 * 135;
 /// How long after the first round of requests the silent nodes are asked once more.
 const SECOND_ROUND: Duration = Duration::from_millis(50);
 
+/// How long after the last request heartbeats are waited for that tell the states of those that answered.
+const STATES: Duration = Duration::from_millis(200);
+
 /// Asks every node for its device type, all side by side, and reads the identity of those that answer.
 ///
 /// A heartbeat or boot-up shows a node too, one that cannot answer (stopped) included. The silent ones are
@@ -53,14 +56,21 @@ pub fn scan(
     let wait = wait + Duration::from_micros(queue);
     let mut seen = Seen::default();
     let mut open: BTreeMap<Ticket, NodeId> = BTreeMap::new();
-    for round in 0..rounds.max(1) {
-        let last = round + 1 == rounds.max(1);
-        for &node in nodes.iter().filter(|node| !seen.answered.contains(node)) {
+    let mut asked_at = master.now();
+    // One round more is for those who were switched on in the middle and have missed the question.
+    for round in 0..=rounds.max(1) {
+        let last = round + 1 >= rounds.max(1);
+        let missed = |node: &&NodeId| round < rounds.max(1) || seen.booted.contains(node);
+        for &node in nodes.iter().filter(|node| !seen.answered.contains(node)).filter(missed) {
             let request = Request::read(node, DEVICE_TYPE).once().within(wait);
             open.insert(master.start(request), node);
         }
-        let mut until = master.now() + SECOND_ROUND;
-        loop {
+        if open.is_empty() {
+            continue;
+        }
+        asked_at = master.now();
+        let mut until = asked_at + SECOND_ROUND;
+        while !open.is_empty() {
             let far = until + wait * 10 + Duration::from_secs(10);
             match master.next(if last { far } else { until })? {
                 Happening::Sdo(ticket, result) => {
@@ -89,16 +99,11 @@ pub fn scan(
                 }
                 Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {}
             }
-            if last && open.is_empty() {
-                break;
-            }
-        }
-        if last {
-            break;
         }
         master.forget(open.keys().copied());
         open.clear();
     }
+    seen.listen_for_states(master, asked_at + wait.min(STATES))?;
     let wanted: BTreeSet<NodeId> = nodes.iter().copied().collect();
     describe(master, &seen, &wanted, overrides)
 }
@@ -179,6 +184,7 @@ pub fn listen(master: &mut Master<'_>, nodes: &[NodeId], length: Duration) -> Re
 #[derive(Default)]
 struct Seen {
     answered: BTreeSet<NodeId>,
+    booted: BTreeSet<NodeId>,
     /// Who showed itself by heartbeat or boot-up, and in which state.
     states: BTreeMap<NodeId, Option<NmtState>>,
 }
@@ -191,9 +197,26 @@ impl Seen {
             }
             Some((node, Life::BootUp)) => {
                 self.states.entry(node).or_insert(None);
+                self.booted.insert(node);
             }
             None => {}
         }
+    }
+
+    /// Waits for the heartbeats of those that answered.
+    fn listen_for_states(&mut self, master: &mut Master<'_>, until: Mono) -> Result<(), Error> {
+        while !self.answered.iter().all(|node| self.states.get(node).is_some_and(Option::is_some)) {
+            match master.next(until)? {
+                Happening::Frame(received) => self.take(&received),
+                Happening::Deadline => break,
+                Happening::Interrupted => return Err(Error::Interrupted),
+                Happening::Link(false) => {
+                    return Err(Error::Bus(crate::bus::BusError::Down(master.bus().name().to_owned())));
+                }
+                Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {}
+            }
+        }
+        Ok(())
     }
 
     /// Everything that shows a node, by the predefined connection set: who only listens has nothing better.
