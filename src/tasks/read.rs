@@ -155,39 +155,53 @@ pub fn read(
     overrides: &Overrides,
 ) -> Result<Vec<Result<Readings, Failure>>, Error> {
     master.listen_to(nodes)?;
-    let mut results = Vec::new();
-    for &node in nodes {
-        results.push(match instruments(master, &[node], overrides) {
-            Ok(surveyed) => match surveyed.first() {
-                Some(instrument) => read_one(master, instrument, wanted)?,
-                None => Ok(Vec::new()),
-            },
-            Err(Error::Sdo(error)) => Err(error.into()),
-            Err(error) => return Err(error),
-        });
-    }
-    Ok(results)
+    let planned: Vec<Result<Vec<Target>, Failure>> = surveyed(master, nodes, overrides)?
+        .into_iter()
+        .map(|instrument| instrument.and_then(|instrument| targets(&instrument, wanted, &mut 0)))
+        .collect();
+    let asked = planned.iter().flatten().flatten().flat_map(requests).collect();
+    let mut answers = master.transfer(asked, &mut |_| {})?.into_iter();
+    Ok(planned.into_iter().map(|targets| readings(targets?, &mut answers)).collect())
 }
 
-fn read_one(
+/// Every node's instrument; where one of them does not answer, each is asked for itself.
+fn surveyed(
     master: &mut Master<'_>,
-    instrument: &Instrument,
-    wanted: &[Wanted],
-) -> Result<Result<Readings, Failure>, Error> {
-    let targets = match targets(instrument, wanted, &mut 0) {
-        Ok(targets) => targets,
-        Err(failure) => return Ok(Err(failure)),
-    };
-    let asked = targets.iter().flat_map(requests).collect();
-    let mut answers = master.transfer(asked, &mut |_| {})?.into_iter();
-    let mut samples = Vec::new();
-    for target in targets {
-        let Some(value) = answers.next() else { break };
-        let status = if target.status.is_some() { answers.next() } else { None };
-        match sample(&target, value, status) {
-            Ok(sample) => samples.push((target, sample)),
-            Err(error) => return Ok(Err(error.into())),
-        }
+    nodes: &[NodeId],
+    overrides: &Overrides,
+) -> Result<Vec<Result<Instrument, Failure>>, Error> {
+    match instruments(master, nodes, overrides) {
+        Ok(all) => return Ok(all.into_iter().map(Ok).collect()),
+        Err(Error::Sdo(error)) if nodes.len() == 1 => return Ok(vec![Err(error.into())]),
+        Err(Error::Sdo(_)) => {}
+        Err(error) => return Err(error),
     }
-    Ok(Ok(samples))
+    let mut each = Vec::new();
+    for node in nodes {
+        each.extend(surveyed(master, &[*node], overrides)?);
+    }
+    Ok(each)
+}
+
+/// The samples of one node's targets, out of the answers to [`requests`]. All of its answers are taken,
+/// whatever the first ones are: the next node's come behind them.
+fn readings(
+    targets: Vec<Target>,
+    answers: &mut dyn Iterator<Item = Result<Answer, SdoError>>,
+) -> Result<Readings, Failure> {
+    let answered: Vec<_> = targets
+        .into_iter()
+        .filter_map(|target| {
+            let value = answers.next()?;
+            let status = if target.status.is_some() { answers.next() } else { None };
+            Some((target, value, status))
+        })
+        .collect();
+    answered
+        .into_iter()
+        .map(|(target, value, status)| {
+            let sample = sample(&target, value, status)?;
+            Ok((target, sample))
+        })
+        .collect()
 }
