@@ -1,6 +1,6 @@
 //! A wrapper around any bus that goes wrong on purpose, for tests.
 
-use super::{Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource};
+use super::{Bus, BusError, Event, Filters, Mode, Mono, Received, Stamp, TimestampSource};
 use crate::canopen::frame::Frame;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
@@ -75,6 +75,14 @@ impl<B: Bus> Bus for Faulty<B> {
 
     fn timestamps(&self) -> TimestampSource {
         self.bus.timestamps()
+    }
+
+    fn can_set_bit_rate(&self) -> Result<(), BusError> {
+        self.bus.can_set_bit_rate()
+    }
+
+    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
+        self.bus.set_bit_rate(bit_rate, mode)
     }
 
     fn now(&self) -> Stamp {

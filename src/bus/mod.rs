@@ -50,6 +50,23 @@ pub trait Bus {
     /// With a deadline in the past it returns what is there already, without waiting.
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError>;
 
+    /// Whether [`Bus::set_bit_rate`] can be expected to work: asked before anything is changed that depends on it.
+    ///
+    /// # Errors
+    /// Why not: no privilege, or no such thing on this bus.
+    fn can_set_bit_rate(&self) -> Result<(), BusError> {
+        Err(BusError::Unsupported(format!("the bit rate of {} cannot be set from here", self.name())))
+    }
+
+    /// Takes this side of the bus to another bit rate in bit/s: the interface goes down and comes up at the new
+    /// one. Frames that wait to be sent are lost.
+    ///
+    /// # Errors
+    /// What the interface says; it may then be down.
+    fn set_bit_rate(&mut self, _bit_rate: u32, _mode: Mode) -> Result<(), BusError> {
+        self.can_set_bit_rate()
+    }
+
     /// Writes out what is still buffered (a trace). To be called when the work is done: dropping a
     /// bus can report nothing.
     fn finish(&mut self) -> Result<(), BusError> {
@@ -90,9 +107,27 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
         (**self).receive(deadline)
     }
 
+    fn can_set_bit_rate(&self) -> Result<(), BusError> {
+        (**self).can_set_bit_rate()
+    }
+
+    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
+        (**self).set_bit_rate(bit_rate, mode)
+    }
+
     fn finish(&mut self) -> Result<(), BusError> {
         (**self).finish()
     }
+}
+
+/// How an interface takes part in the traffic.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// It sends and acknowledges.
+    #[default]
+    Normal,
+    /// It only listens: no frame, no acknowledge, no error flag.
+    ListenOnly,
 }
 
 /// What comes from a bus.

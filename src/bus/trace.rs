@@ -1,6 +1,6 @@
 //! A wrapper around any bus that writes every frame sent and received, as `candump -L` does.
 
-use super::{Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall};
+use super::{Bus, BusError, Event, Filters, Mode, Mono, Received, Stamp, TimestampSource, Wall};
 use crate::canopen::frame::Frame;
 use std::io::{self, BufWriter, Write};
 use std::time::Duration;
@@ -76,6 +76,14 @@ impl<B: Bus> Bus for Traced<B> {
 
     fn timestamps(&self) -> TimestampSource {
         self.bus.timestamps()
+    }
+
+    fn can_set_bit_rate(&self) -> Result<(), BusError> {
+        self.bus.can_set_bit_rate()
+    }
+
+    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
+        self.bus.set_bit_rate(bit_rate, mode)
     }
 
     fn now(&self) -> Stamp {
