@@ -77,6 +77,10 @@ impl<B: Bus> Bus for Faulty<B> {
         self.bus.timestamps()
     }
 
+    fn is_live(&self) -> bool {
+        self.bus.is_live()
+    }
+
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
         self.bus.can_set_bit_rate()
     }

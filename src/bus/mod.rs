@@ -6,6 +6,7 @@ pub mod interrupt;
 pub mod memory;
 #[cfg(unix)]
 mod poll;
+pub mod replay;
 #[cfg(test)]
 mod script;
 #[cfg(target_os = "linux")]
@@ -30,6 +31,11 @@ pub trait Bus {
 
     /// Where the wall time of received frames comes from.
     fn timestamps(&self) -> TimestampSource;
+
+    /// Whether there is somebody on it now. A recording only receives, and it comes to an end.
+    fn is_live(&self) -> bool {
+        true
+    }
 
     /// The present moment.
     fn now(&self) -> Stamp;
@@ -85,6 +91,10 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 
     fn timestamps(&self) -> TimestampSource {
         (**self).timestamps()
+    }
+
+    fn is_live(&self) -> bool {
+        (**self).is_live()
     }
 
     fn now(&self) -> Stamp {
@@ -143,6 +153,8 @@ pub enum Event {
     Link(bool),
     /// The deadline was reached.
     Timeout,
+    /// The recording is over. Reported once; from then on time passes and nothing comes.
+    Ended,
     /// The user asked to stop (Ctrl-C, SIGTERM). Reported once a signal: what comes after it is
     /// tidying up, which may use the bus again.
     Interrupted,
@@ -213,6 +225,8 @@ pub enum TimestampSource {
     Program,
     /// The clock of the simulated bus.
     Simulated,
+    /// Whatever recorded it.
+    Recorded,
 }
 
 impl fmt::Display for TimestampSource {
@@ -222,6 +236,7 @@ impl fmt::Display for TimestampSource {
             TimestampSource::Kernel => "kernel",
             TimestampSource::Program => "program",
             TimestampSource::Simulated => "simulated",
+            TimestampSource::Recorded => "recorded",
         })
     }
 }
@@ -269,6 +284,14 @@ pub enum BusError {
     /// This system or this build has no such bus.
     #[error("{0}")]
     Unsupported(String),
+    /// A local file fails: a trace, a recording.
+    #[error("{what}: {source}")]
+    File {
+        /// What was being done.
+        what: String,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
     /// Anything else, with what was being done.
     #[error("{what}: {source}")]
     Io {

@@ -50,7 +50,7 @@ impl<B: Bus> Traced<B> {
 
     fn check(&mut self, written: io::Result<()>) {
         if let Err(source) = written {
-            self.failed = Some(BusError::Io { what: format!("write trace {}", self.file), source });
+            self.failed = Some(BusError::File { what: format!("write trace {}", self.file), source });
             // Dropping the writer would try to write the rest once more.
             if let Some(out) = self.out.take() {
                 let _ = out.into_parts();
@@ -76,6 +76,10 @@ impl<B: Bus> Bus for Traced<B> {
 
     fn timestamps(&self) -> TimestampSource {
         self.bus.timestamps()
+    }
+
+    fn is_live(&self) -> bool {
+        self.bus.is_live()
     }
 
     fn can_set_bit_rate(&self) -> Result<(), BusError> {

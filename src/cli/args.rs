@@ -130,6 +130,8 @@ pub enum BusSpec {
     SocketCan(String),
     /// The simulated bus: what stands behind `sim:`, or nothing.
     Sim(Option<String>),
+    /// A candump log.
+    Replay(String),
 }
 
 impl FromStr for BusSpec {
@@ -140,10 +142,11 @@ impl FromStr for BusSpec {
             None if text == "sim" => Ok(BusSpec::Sim(None)),
             Some(("sim", rest)) => Ok(BusSpec::Sim(Some(rest.to_owned()))),
             Some(("socketcan", name)) => interface(name),
+            Some(("replay", file)) if !file.is_empty() => Ok(BusSpec::Replay(file.to_owned())),
             None => interface(text),
-            Some(_) => {
-                Err(format!("\"{text}\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml)"))
-            }
+            Some(_) => Err(format!(
+                "\"{text}\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE)"
+            )),
         }
     }
 }
@@ -224,7 +227,8 @@ mod tests {
         assert_eq!("socketcan:vcan1".parse(), Ok(BusSpec::SocketCan("vcan1".into())));
         assert_eq!("sim".parse(), Ok(BusSpec::Sim(None)));
         assert_eq!("sim:mh4@5,dps@127".parse(), Ok(BusSpec::Sim(Some("mh4@5,dps@127".into()))));
-        for wrong in ["", "foo:bar", "a/b", "a-name-that-is-too-long"] {
+        assert_eq!("replay:a:b.log".parse(), Ok(BusSpec::Replay("a:b.log".into())));
+        for wrong in ["", "foo:bar", "replay:", "a/b", "a-name-that-is-too-long"] {
             assert!(wrong.parse::<BusSpec>().is_err(), "{wrong}");
         }
     }

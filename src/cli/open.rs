@@ -7,6 +7,7 @@ use super::read::everybody;
 use crate::bus::Bus;
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
+use crate::bus::replay::Replay;
 use crate::bus::trace::Traced;
 use crate::canopen::id::NodeId;
 use crate::device::catalog::{self, Model};
@@ -40,6 +41,9 @@ pub(super) fn open(global: &Global) -> anyhow::Result<Box<dyn Bus>> {
     let bus: Box<dyn Bus> = match &spec {
         BusSpec::Sim(bench) => Box::new(simulated(bench.as_deref())?),
         BusSpec::SocketCan(name) => socketcan(name)?,
+        BusSpec::Replay(file) => {
+            Box::new(Replay::open(file).map_err(|source| FileError { what: format!("replay {file}"), source })?)
+        }
     };
     Ok(match trace {
         Some((out, name)) => Box::new(Traced::new(bus, out, &name)),

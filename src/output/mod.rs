@@ -2,6 +2,7 @@
 
 pub mod console;
 pub mod csv;
+mod elapsed;
 pub mod json;
 pub mod progress;
 pub mod rows;

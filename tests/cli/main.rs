@@ -9,6 +9,7 @@ mod log_file;
 mod nmt;
 mod output;
 mod read;
+mod replay;
 mod scan;
 mod sdo;
 
