@@ -2,6 +2,7 @@
 
 pub mod console;
 pub mod csv;
+pub mod interfaces;
 pub mod json;
 pub mod progress;
 pub mod rows;
