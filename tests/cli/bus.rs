@@ -42,3 +42,43 @@ fn what_is_no_can_interface() {
     let done = bench.run("bus up lo").exit(5);
     assert!(done.stderr.starts_with("cangauge: lo is not a CAN interface\n"), "{}", done.stderr);
 }
+
+/// Two devices at 125 kbit/s with a heartbeat, where the program is at 250 kbit/s.
+const OTHER_RATE: &str = "[[device]]\nkind = \"mh4\"\nnode = 5\nbit_rate = 125000\nset = { \"0x1017\" = 1000 }\n\
+                          [[device]]\nkind = \"dps\"\nnode = 6\nbit_rate = 125000\n";
+
+#[test]
+fn the_bit_rate_is_found_by_listening() {
+    let bench = Bench::described(OTHER_RATE);
+    let done = bench.run("bus detect").prints("125000\n");
+    let lines: Vec<&str> = done.stderr.lines().collect();
+    assert!(lines[0].starts_with("250000 bit/s: 0 valid frames, "), "{}", done.stderr);
+    assert!(lines[1].starts_with("125000 bit/s: ") && lines[1].contains(" valid frame"), "{}", done.stderr);
+    assert!(done.frames.iter().all(|frame| frame.starts_with("705#")), "it sends nothing: {:?}", done.frames);
+    let done = bench.run("bus detect sim:bench.toml -f csv -q");
+    assert_eq!(done.exit(0).stdout, "interface,bit_rate,by\nsim,125000,frames\n");
+    let found = &bench.run("bus detect -f json -q").exit(0).json()[0];
+    assert_eq!(
+        (&found["interface"], &found["bit_rate"], &found["by"]),
+        (&"sim".into(), &125_000.into(), &"frames".into())
+    );
+    assert_eq!(found["tried"][0]["bit_rate"], 250_000);
+    assert_eq!(found["tried"][0]["acknowledged"], serde_json::Value::Null);
+}
+
+#[test]
+fn one_sensor_alone_is_asked_only_with_active() {
+    let bench = Bench::described("[[device]]\nkind = \"dps\"\nnode = 6\nbit_rate = 100000\n");
+    let done = bench.run("bus detect -q").exit(3);
+    assert_eq!(done.stdout, "");
+    let first = done.stderr.lines().next();
+    assert!(first.is_some_and(|line| line.starts_with("cangauge: sim: ")), "{}", done.stderr);
+    assert!(
+        done.stderr.contains("on a bench with one device only: cangauge bus detect sim --active"),
+        "{}",
+        done.stderr
+    );
+    let done = bench.run("bus detect --active").prints("100000\n");
+    assert!(done.stderr.contains("nothing valid is heard: asking"), "{}", done.stderr);
+    assert!(done.frames.contains(&"606#4000100000000000".to_owned()));
+}
