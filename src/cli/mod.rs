@@ -2,6 +2,7 @@
 //! it gets.
 
 pub mod args;
+mod bus;
 mod completions;
 pub mod exit;
 mod file;
@@ -133,6 +134,8 @@ pub(crate) enum Command {
     Sdo(sdo::Sdo),
     /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// List CAN interfaces, switch them on and off, find the bit rate of a bus
+    Bus(bus::BusCommand),
     /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
     /// Print the completions for a shell
@@ -197,6 +200,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Bus(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }

@@ -3,6 +3,7 @@
 pub mod console;
 pub mod csv;
 mod elapsed;
+pub mod interfaces;
 pub mod json;
 pub mod progress;
 pub mod rows;
