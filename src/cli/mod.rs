@@ -3,6 +3,7 @@
 
 pub mod args;
 mod completions;
+mod each;
 pub mod exit;
 mod file;
 mod log;
@@ -13,6 +14,7 @@ mod read;
 mod scan;
 mod sdo;
 mod sim;
+mod store;
 
 use crate::master::{Master, Timing};
 use crate::output::console::Console;
@@ -133,6 +135,10 @@ pub(crate) enum Command {
     Sdo(sdo::Sdo),
     /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// Let devices keep their settings beyond power off (1010h)
+    Store(store::Store),
+    /// Give devices their settings as delivered (1011h); node-ID and bit rate stay
+    Restore(store::Restore),
     /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
     /// Print the completions for a shell
@@ -197,6 +203,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Store(command) => command.run(&cli.global),
+        Command::Restore(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }

@@ -4,6 +4,7 @@ use crate::canopen::id::NodeId;
 use crate::measure::sample::{Number, Sample, Source, Status};
 use crate::tasks::nmt::Report;
 use crate::tasks::scan::Found;
+use crate::tasks::store::Done;
 use crate::tasks::{Failure, Kind};
 use serde::Serialize;
 use std::io::{self, Write};
@@ -108,6 +109,28 @@ pub fn startup(out: &mut dyn Write, node: NodeId, starts: &str, raw: u64) -> io:
         raw: u64,
     }
     line(out, &Startup { node: node.get(), startup: starts, raw })
+}
+
+/// What a device stored.
+pub fn stored(out: &mut dyn Write, node: NodeId, done: &Done) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Stored<'a> {
+        node: u8,
+        stored: String,
+        verified: &'a str,
+    }
+    line(out, &Stored { node: node.get(), stored: done.groups(), verified: done.verified.as_str() })
+}
+
+/// What a device restored.
+pub fn restored(out: &mut dyn Write, node: NodeId, done: &Done) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Restored<'a> {
+        node: u8,
+        restored: String,
+        verified: &'a str,
+    }
+    line(out, &Restored { node: node.get(), restored: done.groups(), verified: done.verified.as_str() })
 }
 
 /// Something that `nmt watch` saw.

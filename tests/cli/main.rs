@@ -11,6 +11,7 @@ mod output;
 mod read;
 mod scan;
 mod sdo;
+mod store;
 
 use std::fs;
 use std::io::{self, Read};
