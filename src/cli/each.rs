@@ -45,6 +45,18 @@ pub(super) fn each<T>(
 }
 
 impl<T> Each<T> {
+    /// Takes the failures out that a request for everybody excuses: who cannot do it was not meant, unless nobody
+    /// can.
+    pub(super) fn excuse(&mut self, global: &Global, excused: impl Fn(&Failure) -> bool) {
+        if self.done.is_empty() {
+            return;
+        }
+        let (without, failed): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.failures).into_iter().partition(|failure| excused(failure));
+        without.iter().for_each(|failure| global.console().note(&failure.message));
+        self.failures = failed;
+    }
+
     /// What all of it comes to. Where it was ended, that is what it comes to.
     pub(super) fn end(self) -> anyhow::Result<()> {
         let ended = self.failures.last().filter(|failure| matches!(failure.kind, Kind::Interrupted | Kind::Bus));

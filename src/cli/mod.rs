@@ -2,6 +2,7 @@
 //! it gets.
 
 pub mod args;
+mod autozero;
 mod completions;
 mod each;
 pub mod exit;
@@ -135,6 +136,8 @@ pub(crate) enum Command {
     Sdo(sdo::Sdo),
     /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// Make the present reading of a channel zero (6125h), with checks before and after
+    Autozero(autozero::Autozero),
     /// Let devices keep their settings beyond power off (1010h)
     Store(store::Store),
     /// Give devices their settings as delivered (1011h); node-ID and bit rate stay
@@ -203,6 +206,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Autozero(command) => command.run(&cli.global),
         Command::Store(command) => command.run(&cli.global),
         Command::Restore(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),

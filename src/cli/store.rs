@@ -5,7 +5,7 @@ use super::each::{Each, each};
 use super::exit::stdout;
 use super::{Format, Global};
 use crate::canopen::id::NodeId;
-use crate::output::{json, table};
+use crate::output::{csv, json, table};
 use crate::tasks::store::{Done, Group};
 use crate::tasks::{restore, store};
 use clap::{Args, ValueEnum};
@@ -102,12 +102,7 @@ fn tell(
         let mut out = io::stdout().lock();
         match global.format {
             Format::Json => each.done.iter().try_for_each(|(node, done)| json(&mut out, *node, done))?,
-            Format::Csv => {
-                let mut csv = csv::Writer::from_writer(&mut out);
-                csv.write_record(["node", what, "verified"])?;
-                each.done.iter().try_for_each(|done| csv.write_record(cells(done)))?;
-                csv.flush()?;
-            }
+            Format::Csv => csv::write(&mut out, &["node", what, "verified"], each.done.iter().map(cells))?,
             Format::Text => {
                 let rows: Vec<Vec<String>> = each.done.iter().map(cells).collect();
                 table::write(&mut out, &[table::Align::Right, table::Align::Left, table::Align::Left], &rows)?;

@@ -1,5 +1,6 @@
 //! The procedures that users think in. They return reports and print nothing.
 
+pub mod autozero;
 pub mod failure;
 mod kept;
 pub mod log;
