@@ -6,6 +6,7 @@ mod garbage;
 mod scan;
 mod second_master;
 mod second_sync;
+mod signatures;
 mod stalled;
 
 use cangauge::bus::Stamp;
