@@ -2,8 +2,10 @@
 //! it gets.
 
 pub mod args;
+mod autozero;
 mod bus;
 mod completions;
+mod each;
 pub mod exit;
 mod file;
 mod log;
@@ -14,6 +16,7 @@ mod read;
 mod scan;
 mod sdo;
 mod sim;
+mod store;
 
 use crate::master::{Master, Timing};
 use crate::output::console::Console;
@@ -136,6 +139,12 @@ pub(crate) enum Command {
     Log(log::Log),
     /// List CAN interfaces, switch them on and off, find the bit rate of a bus
     Bus(bus::BusCommand),
+    /// Make the present reading of a channel zero (6125h), with checks before and after
+    Autozero(autozero::Autozero),
+    /// Let devices keep their settings beyond power off (1010h)
+    Store(store::Store),
+    /// Give devices their settings as delivered (1011h); node-ID and bit rate stay
+    Restore(store::Restore),
     /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
     /// Print the completions for a shell
@@ -201,6 +210,9 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
         Command::Bus(command) => command.run(&cli.global),
+        Command::Autozero(command) => command.run(&cli.global),
+        Command::Store(command) => command.run(&cli.global),
+        Command::Restore(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }

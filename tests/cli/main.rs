@@ -2,6 +2,7 @@
 //! frames. Benches go by the virtual clock, so that waiting takes no time.
 
 mod args;
+mod autozero;
 mod bus;
 mod examples;
 mod log;
@@ -13,6 +14,7 @@ mod read;
 mod replay;
 mod scan;
 mod sdo;
+mod store;
 
 use std::fs;
 use std::io::{self, Read};

@@ -8,6 +8,7 @@ mod lss;
 mod scan;
 mod second_master;
 mod second_sync;
+mod signatures;
 mod stalled;
 
 use cangauge::bus::Stamp;
