@@ -1,0 +1,403 @@
+//! One expression, for one node where it names none, and what has come of it.
+
+use super::bind::{Bound, Display, Gathered};
+use super::evaluate::{Formula, Values};
+use super::tree::Function;
+use crate::bus::Stamp;
+use crate::canopen::id::NodeId;
+use crate::device::unit::Unit;
+use crate::measure::sample::Status;
+use crate::measure::statistics::Statistics;
+use std::time::Duration;
+
+/// What it comes to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ruling {
+    /// It holds.
+    Ok,
+    /// It does not hold.
+    Fail,
+    /// Nothing was measured that it could be judged by.
+    NoData,
+}
+
+/// The value of a quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// As it stands in the expression.
+    pub name: String,
+    /// Its unit: that of the limit where one was given.
+    pub unit: Option<Unit>,
+    /// The device's decimal digits, where it is a number as the device sends it.
+    pub digits: Option<u8>,
+    /// Whether it is a number as it was sent, without rounding.
+    pub exact: bool,
+    /// The value; the mean where there are several.
+    pub value: Option<f64>,
+    /// The least and the greatest one, where there are several.
+    pub range: Option<(f64, f64)>,
+}
+
+/// A sample that did not satisfy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Violation {
+    /// When it came.
+    pub at: Stamp,
+    /// Since the first sample of all.
+    pub elapsed: Duration,
+    /// The value of each quantity of the verdict; `None` where it has none.
+    pub values: Vec<Option<f64>>,
+    /// What the device says of it.
+    pub status: Option<Status>,
+}
+
+/// What came of an expression.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verdict {
+    /// The expression as it was written.
+    pub text: String,
+    /// The node that its signals without a node are of.
+    pub node: Option<NodeId>,
+    /// What it comes to.
+    pub ruling: Ruling,
+    /// The values it was judged by.
+    pub values: Vec<Shown>,
+    /// Samples, valid and invalid.
+    pub count: u64,
+    /// Samples that did not satisfy, without the invalid ones.
+    pub violations: u64,
+    /// Samples without a valid value, where they are not what was asked about.
+    pub invalid: u64,
+    /// The first sample that did not satisfy.
+    pub first: Option<Violation>,
+    /// Why nothing was measured.
+    pub reason: Option<String>,
+}
+
+impl Verdict {
+    /// That nothing was measured.
+    pub fn nothing(text: &str, node: Option<NodeId>, reason: impl Into<String>) -> Verdict {
+        Verdict {
+            text: text.to_owned(),
+            node,
+            ruling: Ruling::NoData,
+            values: Vec::new(),
+            count: 0,
+            violations: 0,
+            invalid: 0,
+            first: None,
+            reason: Some(reason.into()),
+        }
+    }
+}
+
+/// How an expression stands while it is measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Standing {
+    /// The expression as it was written.
+    pub text: String,
+    /// The node that its signals without a node are of.
+    pub node: Option<NodeId>,
+    /// Whether it has held until now; `None` before there is anything to judge.
+    pub holds: Option<bool>,
+    /// The values at the moment.
+    pub values: Vec<Shown>,
+}
+
+/// Slots whose values belong together.
+#[derive(Clone, Debug)]
+struct Joint {
+    slots: Vec<usize>,
+    /// Whether the slot has come since the last time.
+    fresh: Vec<bool>,
+}
+
+impl Joint {
+    fn new(slots: Vec<usize>) -> Joint {
+        let fresh = vec![false; slots.len()];
+        Joint { slots, fresh }
+    }
+
+    fn is_fresh(&self, slot: usize) -> bool {
+        self.slots.iter().zip(&self.fresh).any(|(&own, &fresh)| own == slot && fresh)
+    }
+
+    fn has_come(&mut self, slot: usize) {
+        for (own, fresh) in self.slots.iter().zip(&mut self.fresh) {
+            *fresh |= *own == slot;
+        }
+    }
+
+    fn is_complete(&self) -> bool {
+        !self.fresh.is_empty() && self.fresh.iter().all(|&fresh| fresh)
+    }
+
+    fn is_waiting(&self) -> bool {
+        self.fresh.iter().any(|&fresh| fresh)
+    }
+}
+
+/// What a joint is for.
+#[derive(Clone, Copy, Debug)]
+enum Role {
+    /// A rule for every sample.
+    Rule(usize),
+    /// Samples to be gathered.
+    Gather(usize),
+    /// A value to be shown.
+    Show(usize),
+}
+
+/// When a sample came, and what the device says of it.
+pub(super) type Moment = (Stamp, Duration, Option<Status>);
+
+/// One expression under judgement.
+#[derive(Clone, Debug)]
+pub(super) struct Case {
+    bound: Bound,
+    values: Vec<Option<f64>>,
+    seen: Vec<bool>,
+    digits: Vec<Option<u8>>,
+    joints: Vec<(Joint, Role)>,
+    /// Samples judged by each rule, and those of them without a value.
+    judged: Vec<(u64, u64)>,
+    gathered: Vec<Statistics>,
+    shown: Vec<Statistics>,
+    violations: u64,
+    first: Option<Violation>,
+    last: Option<Moment>,
+}
+
+impl Case {
+    pub(super) fn new(bound: Bound) -> Case {
+        let joint = |slots: &dyn Fn(&mut Vec<usize>), role| {
+            let mut all = Vec::new();
+            slots(&mut all);
+            (Joint::new(all), role)
+        };
+        let mut joints = Vec::new();
+        // What is shown comes first: a violation shows what it is judged by.
+        for (at, display) in bound.displays.iter().enumerate() {
+            joints.push(joint(&|slots| display.formula.slots(slots), Role::Show(at)));
+        }
+        for (at, rule) in bound.by_sample.iter().enumerate() {
+            joints.push(joint(&|slots| rule.slots(slots), Role::Rule(at)));
+        }
+        for (at, gathered) in bound.gathered.iter().enumerate() {
+            joints.push(joint(&|slots| gathered.argument.slots(slots), Role::Gather(at)));
+        }
+        Case {
+            values: vec![None; bound.slots.len()],
+            seen: vec![false; bound.slots.len()],
+            digits: vec![None; bound.slots.len()],
+            joints,
+            judged: vec![(0, 0); bound.by_sample.len()],
+            gathered: vec![Statistics::default(); bound.gathered.len()],
+            shown: vec![Statistics::default(); bound.displays.len()],
+            violations: 0,
+            first: None,
+            last: None,
+            bound,
+        }
+    }
+
+    pub(super) fn bound(&self) -> &Bound {
+        &self.bound
+    }
+
+    /// Takes the value of a slot.
+    pub(super) fn take(&mut self, slot: usize, value: Option<f64>, digits: Option<u8>, moment: Moment) {
+        self.judge_where(|joint| joint.is_fresh(slot), self.last.unwrap_or(moment));
+        self.values[slot] = value;
+        self.seen[slot] = true;
+        self.digits[slot] = digits.or(self.digits[slot]);
+        self.joints.iter_mut().for_each(|(joint, _)| joint.has_come(slot));
+        self.last = Some(moment);
+        self.judge_where(Joint::is_complete, moment);
+    }
+
+    /// Judges what still waits for another signal.
+    pub(super) fn finish(&mut self, at: Stamp) {
+        let moment = self.last.unwrap_or((at, Duration::ZERO, None));
+        self.judge_where(Joint::is_waiting, moment);
+    }
+
+    fn judge_where(&mut self, is_due: impl Fn(&Joint) -> bool, moment: Moment) {
+        for at in 0..self.joints.len() {
+            let (joint, role) = &mut self.joints[at];
+            if is_due(joint) && joint.slots.iter().all(|&slot| self.seen[slot]) {
+                joint.fresh.fill(false);
+                let role = *role;
+                self.judge(role, moment);
+            }
+        }
+    }
+
+    fn judge(&mut self, role: Role, moment: Moment) {
+        let values = Values { slots: &self.values, aggregates: &[] };
+        let at = moment.0.mono.since_start();
+        match role {
+            Role::Show(display) => {
+                let value = self.bound.displays[display].formula.value(values);
+                self.shown[display].add(value, at);
+            }
+            Role::Gather(gathered) => {
+                let Gathered { function, argument, .. } = &self.bound.gathered[gathered];
+                let (function, value) = (*function, argument.value(values));
+                self.gathered[gathered].add(value, at);
+                if value.is_none() && function != Function::Invalid {
+                    self.violated(moment);
+                }
+            }
+            Role::Rule(rule) => {
+                let holds = self.bound.by_sample[rule].holds(values);
+                let (judged, invalid) = &mut self.judged[rule];
+                *judged += 1;
+                match holds {
+                    Some(true) => return,
+                    Some(false) => self.violations += 1,
+                    None => *invalid += 1,
+                }
+                self.violated(moment);
+            }
+        }
+    }
+
+    /// Keeps the first sample that does not satisfy.
+    fn violated(&mut self, (at, elapsed, status): Moment) {
+        if self.first.is_none() {
+            let values = Values { slots: &self.values, aggregates: &[] };
+            let values = self.bound.displays.iter().map(|display| display.formula.value(values)).collect();
+            self.first = Some(Violation { at, elapsed, values, status });
+        }
+    }
+
+    /// The value of each function at the moment.
+    fn aggregates(&self) -> Vec<Option<f64>> {
+        let value = |(gathered, statistics): (&Gathered, &Statistics)| match gathered.function {
+            Function::Mean => statistics.mean(),
+            Function::Noise => statistics.deviation(),
+            Function::Min => statistics.min(),
+            Function::Max => statistics.max(),
+            Function::Rate => statistics.rate(),
+            Function::Gap => (statistics.count() > 1).then(|| statistics.longest_interval().as_secs_f64()),
+            Function::Count => Some(statistics.count() as f64),
+            Function::Invalid => Some(statistics.invalid() as f64),
+        };
+        self.bound.gathered.iter().zip(&self.gathered).map(value).collect()
+    }
+
+    fn count(&self) -> u64 {
+        let gathered = self.gathered.iter().map(Statistics::count);
+        self.judged.iter().map(|&(judged, _)| judged).chain(gathered).max().unwrap_or(0)
+    }
+
+    /// Samples without a value, where that is not what was asked about.
+    fn invalid(&self) -> u64 {
+        let asked = |gathered: &Gathered| gathered.function == Function::Invalid;
+        let gathered = self.bound.gathered.iter().zip(&self.gathered).filter(|(gathered, _)| !asked(gathered));
+        let gathered = gathered.map(|(_, statistics)| statistics.invalid());
+        self.judged.iter().map(|&(_, invalid)| invalid).chain(gathered).max().unwrap_or(0)
+    }
+
+    pub(super) fn verdict(&self, silent: &[(NodeId, String)]) -> Verdict {
+        let aggregates = self.aggregates();
+        let (ruling, reason) = self.ruling(&aggregates, silent);
+        Verdict {
+            text: self.bound.text.clone(),
+            node: self.bound.node,
+            ruling,
+            values: self.shown(&aggregates, false),
+            count: self.count(),
+            violations: self.violations,
+            invalid: self.invalid(),
+            first: self.first.clone(),
+            reason,
+        }
+    }
+
+    fn ruling(&self, aggregates: &[Option<f64>], silent: &[(NodeId, String)]) -> (Ruling, Option<String>) {
+        if self.violations > 0 || self.invalid() > 0 {
+            return (Ruling::Fail, None);
+        }
+        let is_silent = |node: &NodeId| self.bound.slots.iter().any(|slot| slot.node == *node);
+        if let Some((_, reason)) = silent.iter().find(|(node, _)| is_silent(node)) {
+            return (Ruling::NoData, Some(reason.clone()));
+        }
+        if let Some(slot) = self.seen.iter().position(|seen| !seen) {
+            let slot = &self.bound.slots[slot];
+            return (Ruling::NoData, Some(format!("node {}: {} did not come", slot.node, slot.name)));
+        }
+        let values = Values { slots: &self.values, aggregates };
+        let held: Vec<Option<bool>> = self.bound.at_the_end.iter().map(|rule| rule.holds(values)).collect();
+        if held.contains(&Some(false)) {
+            return (Ruling::Fail, None);
+        }
+        if held.contains(&None) && !aggregates.contains(&None) {
+            return (Ruling::Fail, Some("what it comes to is no number".to_owned()));
+        }
+        if held.contains(&None) {
+            return (Ruling::NoData, Some("there are too few samples for it".to_owned()));
+        }
+        (Ruling::Ok, None)
+    }
+
+    pub(super) fn standing(&self) -> Standing {
+        let aggregates = self.aggregates();
+        let holds = match self.ruling(&aggregates, &[]).0 {
+            Ruling::Ok => Some(true),
+            Ruling::Fail => Some(false),
+            Ruling::NoData => None,
+        };
+        let values = self.shown(&aggregates, true);
+        Standing { text: self.bound.text.clone(), node: self.bound.node, holds, values }
+    }
+
+    /// The values of what is shown: those at the moment, or what became of all.
+    fn shown(&self, aggregates: &[Option<f64>], now: bool) -> Vec<Shown> {
+        let shown = |(display, statistics): (&Display, &Statistics)| {
+            let values = Values { slots: &self.values, aggregates };
+            let at_the_moment = display.formula.value(values);
+            let several = statistics.count() > 1 && !now;
+            Shown {
+                name: display.name.clone(),
+                unit: display.unit,
+                digits: self.digits_of(&display.formula),
+                exact: self.is_exact(&display.formula),
+                value: if several { statistics.mean() } else { at_the_moment },
+                range: statistics.min().zip(statistics.max()).filter(|_| several),
+            }
+        };
+        self.bound.displays.iter().zip(&self.shown).map(shown).collect()
+    }
+
+    /// What a formula passes on as it was sent, where it does so.
+    fn passed_on<'a>(&'a self, formula: &'a Formula) -> Option<&'a Formula> {
+        match formula {
+            Formula::Aggregate(at) => {
+                let gathered = self.bound.gathered.get(*at)?;
+                matches!(gathered.function, Function::Min | Function::Max).then_some(&gathered.argument)
+            }
+            Formula::Absolute(inner) => Some(inner),
+            other => Some(other),
+        }
+    }
+
+    fn digits_of(&self, formula: &Formula) -> Option<u8> {
+        match self.passed_on(formula)? {
+            Formula::Slot(slot) => self.digits.get(*slot).copied().flatten(),
+            _ => None,
+        }
+    }
+
+    fn is_exact(&self, formula: &Formula) -> bool {
+        let counts = |at: &usize| {
+            let gathered = self.bound.gathered.get(*at);
+            gathered.is_some_and(|gathered| matches!(gathered.function, Function::Count | Function::Invalid))
+        };
+        match formula {
+            Formula::Aggregate(at) if counts(at) => true,
+            other => matches!(self.passed_on(other), Some(Formula::Slot(_))),
+        }
+    }
+}
