@@ -48,6 +48,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "read" -d 'Read me
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "nmt" -d 'Send NMT commands and tell states'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sdo" -d 'Read and write objects of the object dictionary'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "check" -d 'Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "bus" -d 'List CAN interfaces, switch them on and off, find the bit rate of a bus'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "completions" -d 'Print the completions for a shell'
@@ -393,6 +394,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sync -d 'Send 
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l poll -d 'Read by SDO at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s o -l output -d 'Write to a file instead of stdout' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l summary -d 'Write the summary as JSON to a file; - for stdout' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l expect -d 'Exit with 1 at the end unless this held: \'pressure in 9..11 bar\', see cangauge check --help' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s q -l quiet -d 'Say less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l passive -d 'Send nothing at all'
@@ -400,6 +402,30 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Lea
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite files that exist'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l for -d 'Judge all samples that come in this time' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sync -d 'Send SYNC at this interval' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l poll -d 'Read by SDO at this interval' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l junit -d 'Write the verdicts as JUnit XML, for CI servers: one test case per expression' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l force -d 'Overwrite a file that exists'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
@@ -546,12 +572,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s q -l q
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "nmt" -d 'Send NMT commands and tell states'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "bus" -d 'List CAN interfaces, switch them on and off, find the bit rate of a bus'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "completions" -d 'Print the completions for a shell'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check bus sim completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check bus sim completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check bus sim completions help" -f -a "nmt" -d 'Send NMT commands and tell states'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check bus sim completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check bus sim completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check bus sim completions help" -f -a "check" -d 'Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check bus sim completions help" -f -a "bus" -d 'List CAN interfaces, switch them on and off, find the bit rate of a bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check bus sim completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check bus sim completions help" -f -a "completions" -d 'Print the completions for a shell'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check bus sim completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'

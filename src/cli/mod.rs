@@ -3,6 +3,7 @@
 
 pub mod args;
 mod bus;
+mod check;
 mod completions;
 pub mod exit;
 mod file;
@@ -134,6 +135,8 @@ pub(crate) enum Command {
     Sdo(sdo::Sdo),
     /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data
+    Check(check::Check),
     /// List CAN interfaces, switch them on and off, find the bit rate of a bus
     Bus(bus::BusCommand),
     /// Simulate devices on a bus until Ctrl-C
@@ -200,6 +203,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Check(command) => command.run(&cli.global),
         Command::Bus(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),

@@ -15,6 +15,7 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
 use crate::master::{Error, Master};
 use crate::measure::decode::Wanted;
+use crate::measure::expression::judge::Jury;
 use crate::measure::instrument::Instrument;
 use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
@@ -100,6 +101,9 @@ pub trait Observer {
 
     /// Something happened.
     fn note(&mut self, note: &Note, at: Stamp);
+
+    /// How things stand with what is expected of the measurements, as often as time passes.
+    fn standing(&mut self, _jury: &Jury, _at: Stamp) {}
 
     /// Time passes: called at least ten times a second while nothing comes.
     fn tick(&mut self, at: Stamp, rows: u64) -> ControlFlow<()>;

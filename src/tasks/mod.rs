@@ -1,5 +1,6 @@
 //! The procedures that users think in. They return reports and print nothing.
 
+pub mod check;
 pub mod detect;
 pub mod failure;
 pub mod host;

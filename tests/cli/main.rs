@@ -3,6 +3,7 @@
 
 mod args;
 mod bus;
+mod check;
 mod examples;
 mod log;
 mod log_end;

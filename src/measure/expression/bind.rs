@@ -146,9 +146,22 @@ impl Expression {
     /// # Errors
     /// The first other one.
     pub fn names_only(&self, nodes: &[NodeId]) -> Result<(), ExpressionError> {
-        let other = |signal: &&SignalName| signal.node.is_some_and(|node| !nodes.contains(&node));
+        for signal in self.signals() {
+            if let Some(node) = signal.node.filter(|node| !nodes.contains(node)) {
+                return Err(self.fail(signal.at, format!("node {node} is none of those named")));
+            }
+        }
+        Ok(())
+    }
+
+    /// That it needs nothing but this.
+    ///
+    /// # Errors
+    /// The first other signal.
+    pub fn needs_only(&self, recorded: &[&Wanted]) -> Result<(), ExpressionError> {
+        let other = |signal: &&SignalName| !recorded.contains(&&signal.what);
         match self.signals().into_iter().find(other) {
-            Some(signal) => Err(self.fail(signal.at, format!("{signal}: the node is none of those named"))),
+            Some(signal) => Err(self.fail(signal.at, format!("{} is not recorded", signal.name()))),
             None => Ok(()),
         }
     }

@@ -91,6 +91,17 @@ impl Verdict {
     }
 }
 
+/// Why nothing came of a node.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Silence {
+    /// Which one.
+    pub node: NodeId,
+    /// Which signal, as it stands in a [`crate::measure::sample::Source`]; `None` for all of them.
+    pub signal: Option<String>,
+    /// In words.
+    pub reason: String,
+}
+
 /// How an expression stands while it is measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Standing {
@@ -300,7 +311,7 @@ impl Case {
         self.judged.iter().map(|&(_, invalid)| invalid).chain(gathered).max().unwrap_or(0)
     }
 
-    pub(super) fn verdict(&self, silent: &[(NodeId, String)]) -> Verdict {
+    pub(super) fn verdict(&self, silent: &[Silence]) -> Verdict {
         let aggregates = self.aggregates();
         let (ruling, reason) = self.ruling(&aggregates, silent);
         Verdict {
@@ -316,13 +327,16 @@ impl Case {
         }
     }
 
-    fn ruling(&self, aggregates: &[Option<f64>], silent: &[(NodeId, String)]) -> (Ruling, Option<String>) {
+    fn ruling(&self, aggregates: &[Option<f64>], silent: &[Silence]) -> (Ruling, Option<String>) {
         if self.violations > 0 || self.invalid() > 0 {
             return (Ruling::Fail, None);
         }
-        let is_silent = |node: &NodeId| self.bound.slots.iter().any(|slot| slot.node == *node);
-        if let Some((_, reason)) = silent.iter().find(|(node, _)| is_silent(node)) {
-            return (Ruling::NoData, Some(reason.clone()));
+        let concerns = |silence: &&Silence| {
+            let mut of_it = self.bound.slots.iter().filter(|slot| slot.node == silence.node);
+            of_it.any(|slot| silence.signal.as_ref().is_none_or(|signal| *signal == slot.name))
+        };
+        if let Some(silence) = silent.iter().find(concerns) {
+            return (Ruling::NoData, Some(silence.reason.clone()));
         }
         if let Some(slot) = self.seen.iter().position(|seen| !seen) {
             let slot = &self.bound.slots[slot];

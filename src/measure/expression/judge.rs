@@ -6,7 +6,7 @@
 //! sample goes unjudged.
 
 use super::bind::{Bound, Offers, unit_of};
-use super::case::{Case, Standing, Verdict};
+use super::case::{Case, Silence, Standing, Verdict};
 use super::{Expression, ExpressionError};
 use crate::bus::{Mono, Stamp};
 use crate::canopen::id::NodeId;
@@ -37,6 +37,8 @@ enum SlotUnit {
 pub struct Jury {
     expressions: Vec<Expression>,
     cases: Vec<Case>,
+    /// The verdicts of those that nothing can be measured for.
+    settled: Vec<Verdict>,
     ways: Vec<Vec<Way>>,
     first: Option<Mono>,
 }
@@ -50,25 +52,38 @@ impl Jury {
                 expressions.push(expression.clone());
             }
         }
-        Jury { expressions, cases: Vec::new(), ways: Vec::new(), first: None }
+        Jury { expressions, cases: Vec::new(), settled: Vec::new(), ways: Vec::new(), first: None }
     }
 
     /// Finds the signals among what is offered: an expression that names no node is judged for each of
-    /// `nodes`. With `excuse`, a node that lacks a signal is left out where another one has it.
+    /// `nodes`. With `excuse`, a node that lacks a signal is left out where another one has it. What needs a
+    /// node that is silent is settled already.
     ///
     /// # Errors
     /// Signals that there are not, and units that do not go together.
-    pub fn bind(&mut self, nodes: &[NodeId], offers: &Offers, excuse: bool) -> Result<(), ExpressionError> {
+    pub fn bind(
+        &mut self,
+        nodes: &[NodeId],
+        offers: &Offers,
+        excuse: bool,
+        silent: &[Silence],
+    ) -> Result<(), ExpressionError> {
         for expression in &self.expressions {
             expression.names_only(nodes)?;
-            if !expression.is_of_every_node() {
-                self.cases.push(Case::new(expression.bind(None, offers)?));
-                continue;
-            }
-            let having = |node: &&NodeId| offers.has_all(**node, expression);
-            let excused = excuse && nodes.iter().any(|node| having(&node));
-            for node in nodes.iter().filter(|node| !excused || having(node)) {
-                self.cases.push(Case::new(expression.bind(Some(*node), offers)?));
+            let reason =
+                |node: NodeId| silent.iter().find(|silence| silence.node == node).map(|silence| &silence.reason);
+            let of_every_node = expression.is_of_every_node();
+            let named = expression.signals().into_iter().find_map(|signal| reason(signal.node?));
+            let having = |node: &NodeId| offers.has_all(*node, expression);
+            let excused = excuse && nodes.iter().any(having);
+            for node in nodes.iter().take(if of_every_node { nodes.len() } else { 1 }) {
+                let own = reason(*node).filter(|_| of_every_node);
+                if let Some(reason) = named.or(own) {
+                    let node = Some(*node).filter(|_| of_every_node);
+                    self.settled.push(Verdict::nothing(expression.text(), node, reason));
+                } else if !of_every_node || !excused || having(node) {
+                    self.cases.push(Case::new(expression.bind(Some(*node), offers)?));
+                }
             }
         }
         Ok(())
@@ -140,17 +155,20 @@ impl Jury {
         self.cases.iter().map(Case::standing).collect()
     }
 
-    /// The verdicts at `at`, in the order of the expressions and their nodes. `silent` are nodes that give
-    /// nothing any more, each with the reason.
-    pub fn verdicts(mut self, at: Stamp, silent: &[(NodeId, String)]) -> Vec<Verdict> {
+    /// The verdicts at `at`, in the order of the expressions and their nodes. `silent` are nodes and signals
+    /// that gave nothing, or nothing any more.
+    pub fn verdicts(mut self, at: Stamp, silent: &[Silence]) -> Vec<Verdict> {
         self.cases.iter_mut().for_each(|case| case.finish(at));
         let mut verdicts = Vec::new();
         for expression in &self.expressions {
-            let of_it: Vec<&Case> = self.cases.iter().filter(|case| case.bound().text == expression.text()).collect();
+            let judged = self.cases.iter().filter(|case| case.bound().text == expression.text());
+            let settled = self.settled.iter().filter(|verdict| verdict.text == expression.text()).cloned();
+            let mut of_it: Vec<Verdict> = judged.map(|case| case.verdict(silent)).chain(settled).collect();
             if of_it.is_empty() {
-                verdicts.push(Verdict::nothing(expression.text(), None, "nothing of it was measured"));
+                of_it.push(Verdict::nothing(expression.text(), None, "nothing of it was measured"));
             }
-            verdicts.extend(of_it.into_iter().map(|case| case.verdict(silent)));
+            of_it.sort_by_key(|verdict| verdict.node);
+            verdicts.extend(of_it);
         }
         verdicts
     }

@@ -47,7 +47,8 @@ impl Expression {
     /// # Errors
     /// What is wrong, and with which character it begins.
     pub fn parse(text: &str) -> Result<Expression, ExpressionError> {
-        let text = text.trim();
+        // Line ends and tabs are blanks; the places of errors are those in the text without them.
+        let text = &*text.split_whitespace().collect::<Vec<_>>().join(" ");
         let fail = |at, message: String| ExpressionError { text: text.to_owned(), at, message, hint: None };
         if let Some((at, _)) = text.char_indices().nth(LONGEST) {
             return Err(fail(at, format!("an expression has at most {LONGEST} characters")));
@@ -59,7 +60,7 @@ impl Expression {
         Ok(Expression { text: text.to_owned(), parts })
     }
 
-    /// The text it was read from.
+    /// The text it was read from, with single blanks.
     pub fn text(&self) -> &str {
         &self.text
     }

@@ -1,5 +1,5 @@
 use super::bind::Offers;
-use super::case::{Ruling, Verdict};
+use super::case::{Ruling, Silence, Verdict};
 use super::judge::Jury;
 use super::tree::{At, Comparison, Condition, Function, Operator, Quantity, SignalName};
 use super::{Expression, ExpressionError};
@@ -244,7 +244,7 @@ fn sources(signals: &[Signal<'_>]) -> Vec<Source> {
 fn bound(text: &str, signals: &[Signal<'_>]) -> Result<Jury, ExpressionError> {
     let offers = Offers::of_sources(&sources(signals));
     let mut jury = Jury::new(&[parse(text)]);
-    jury.bind(&offers.nodes(), &offers, true)?;
+    jury.bind(&offers.nodes(), &offers, true, &[])?;
     Ok(jury)
 }
 
@@ -411,7 +411,7 @@ fn what_does_not_go_together_is_said_before() {
         ("p - 2 > 20 K", "degC", 9, "20 K may be a temperature here or a difference of two"),
         ("|p| < 60 degF", "degC", 7, "60 degF may be a temperature here or a difference of two"),
         ("presure < 3", "bar", 1, "node 5 has no signal \"presure\""),
-        ("1 < 6.p", "bar", 5, "6.p: the node is none of those named"),
+        ("1 < 6.p", "bar", 5, "node 6 is none of those named"),
     ] {
         let error = bound(text, &[("p", unit, &[])]).expect_err(text);
         assert_eq!((error.column(), error.message.as_str()), (column, message), "{text}");
@@ -445,7 +445,7 @@ fn without_a_node_it_is_judged_for_each() {
     let offers = Offers::of_sources(&signals);
     let jury = |text: &str, excuse| {
         let mut jury = Jury::new(&[parse(text), parse(text)]);
-        jury.bind(&offers.nodes(), &offers, excuse).map(|()| jury)
+        jury.bind(&offers.nodes(), &offers, excuse, &[]).map(|()| jury)
     };
     let mut both = jury("p < 2 bar", true).expect("bound");
     assert_eq!(both.wanted_of(signals[1].node), [Wanted::Signal("p".into())]);
@@ -458,7 +458,7 @@ fn without_a_node_it_is_judged_for_each() {
     // Silent at the end: what was good until then is no success.
     let mut one = jury("5.p < 2", true).expect("bound");
     one.take(&[sample(0, 0, Some(1.0))], &signals);
-    let silent = [(signals[0].node, "node 5 is silent".to_owned())];
+    let silent = [Silence { node: signals[0].node, signal: None, reason: "node 5 is silent".to_owned() }];
     let verdict = one.clone().verdicts(Stamp::default(), &silent).remove(0);
     assert_eq!((verdict.ruling, verdict.reason.as_deref()), (Ruling::NoData, Some("node 5 is silent")));
     assert_eq!(one.verdicts(Stamp::default(), &[])[0].ruling, Ruling::Ok);
