@@ -155,7 +155,7 @@ impl Log {
             let mut expecting = Expecting::new(&self.expect, &plan.nodes, true, &mut screen);
             let outcome = log(master, &plan, &mut expecting);
             let verdicts = match &outcome {
-                Ok(outcome) => expecting.verdicts(outcome, master.bus().now()),
+                Ok(outcome) => expecting.verdicts(outcome),
                 Err(_) => Ok(Vec::new()),
             };
             let interrupted = match &outcome {

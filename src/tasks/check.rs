@@ -117,7 +117,7 @@ fn read_once(master: &mut Master<'_>, plan: &Plan) -> Result<Report, Failure> {
         }
     }
     jury.take(&samples, &sources);
-    let verdicts = jury.verdicts(master.bus().now(), &silent);
+    let verdicts = jury.verdicts(None, &silent);
     let begun = samples.first().map(|sample| sample.at);
     let length = begun.zip(samples.last()).map_or(Duration::ZERO, |(first, last)| last.at.mono.since(first.mono));
     Ok(Report { verdicts, begun, length, failures, remarks: Vec::new() })
@@ -164,7 +164,7 @@ fn record(
         return Err(Error::Interrupted.into());
     }
     let begun = expecting.begun;
-    let verdicts = expecting.verdicts(&outcome, master.bus().now())?;
+    let verdicts = expecting.verdicts(&outcome)?;
     let failures = outcome.nothing.into_iter().collect();
     Ok(Report { verdicts, begun, length: outcome.length, failures, remarks: outcome.remarks })
 }
@@ -208,7 +208,7 @@ impl<'a> Expecting<'a> {
     ///
     /// # Errors
     /// An expression that turned out not to fit the devices.
-    pub fn verdicts(self, outcome: &Outcome, at: Stamp) -> Result<Vec<Verdict>, Failure> {
+    pub fn verdicts(self, outcome: &Outcome) -> Result<Vec<Verdict>, Failure> {
         if let Some(failure) = self.failure {
             return Err(failure);
         }
@@ -218,7 +218,8 @@ impl<'a> Expecting<'a> {
             Silence { node: *node, signal: None, reason }
         };
         let silent: Vec<Silence> = outcome.lost.iter().map(silence).collect();
-        Ok(self.jury.verdicts(at, &silent))
+        let end = self.begun.map(|begun| begun.mono + outcome.length);
+        Ok(self.jury.verdicts(end, &silent))
     }
 }
 

@@ -1,6 +1,6 @@
 //! `cangauge check` and `log --expect`: what holds, what does not, and what cannot be told.
 
-use super::{ALL, Bench};
+use super::Bench;
 use serde_json::json;
 use std::fs;
 
@@ -273,10 +273,35 @@ fn a_log_with_expectations() {
 
 #[test]
 fn who_only_listens_learns_the_units_on_the_way() {
-    let bench = Bench::of(ALL);
-    let words = |expression: &'static str| {
-        ["log", "127", "--passive", "--device", "127=dps", "--count", "5", "--expect", expression]
+    let bench = Bench::described(
+        "[[device]]\nkind = \"dps\"\nnode = 5\nstart = true\n\
+         [[device.channel]]\nchannel = 1\nbase = 50.0\namplitude = 0.0\nnoise = 0.0\n",
+    );
+    let log = |expression| {
+        bench.run_words(&["log", "5", "--passive", "--device", "dps", "--count", "9", "--expect", expression])
     };
-    let done = bench.run_words(&words("pressure > 1000"));
-    assert!([Some(1), Some(3)].contains(&done.code), "{}", done.stderr);
+    let done = log("pressure in 49..51").exit(0);
+    assert!(done.stderr.contains("ok: node 5: pressure in 49..51: 50.000"), "{}", done.stderr);
+    log("5.pressure < 49").exit(1);
+    let done = log("temperature < 49").exit(3);
+    assert!(done.stderr.contains("temperature < 49: no data: nothing of it was measured"), "{}", done.stderr);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_check_that_is_cut_short_says_nothing() {
+    use std::process::{Command, Stdio};
+    let bench = Bench::real("mh4@1");
+    let mut command =
+        bench.traced(&["check", "1", "pressure < 1000", "--for", "1h", "--poll", "10ms", "--junit", "r.xml"]);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
+    // The first request of the measuring: what has been asked before has other objects.
+    while fs::read_to_string(bench.path("trace")).map_or(true, |trace| !trace.contains("601#4030")) {
+        std::thread::yield_now();
+    }
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    assert!(killed.success());
+    let done = bench.end(child).exit(130);
+    assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("", "cangauge: interrupted\n"));
+    assert!(bench.text("r.xml").contains(" errors=\"1\""));
 }

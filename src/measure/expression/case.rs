@@ -3,7 +3,7 @@
 use super::bind::{Bound, Display, Gathered};
 use super::evaluate::{Formula, Values};
 use super::tree::Function;
-use crate::bus::Stamp;
+use crate::bus::{Mono, Stamp};
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
 use crate::measure::sample::Status;
@@ -115,6 +115,31 @@ pub struct Standing {
     pub values: Vec<Shown>,
 }
 
+/// How often a signal came.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rhythm {
+    count: u32,
+    first: Mono,
+    last: Mono,
+}
+
+impl Rhythm {
+    fn beat(&mut self, now: Mono) {
+        if self.count == 0 {
+            self.first = now;
+        }
+        self.count = self.count.saturating_add(1);
+        self.last = now;
+    }
+
+    /// Whether nothing came for five of its intervals, at least for a second.
+    fn has_ceased(&self, end: Mono) -> bool {
+        let intervals = self.count.saturating_sub(1).max(1);
+        let usual = self.last.since(self.first) / intervals;
+        end.since(self.last) > (usual * 5).max(Duration::from_secs(1))
+    }
+}
+
 /// Slots whose values belong together.
 #[derive(Clone, Debug)]
 struct Joint {
@@ -167,7 +192,8 @@ pub(super) type Moment = (Stamp, Duration, Option<Status>);
 pub(super) struct Case {
     bound: Bound,
     values: Vec<Option<f64>>,
-    seen: Vec<bool>,
+    /// How often each slot came, and when first and last.
+    rhythms: Vec<Rhythm>,
     digits: Vec<Option<u8>>,
     joints: Vec<(Joint, Role)>,
     /// Samples judged by each rule, and those of them without a value.
@@ -199,7 +225,7 @@ impl Case {
         }
         Case {
             values: vec![None; bound.slots.len()],
-            seen: vec![false; bound.slots.len()],
+            rhythms: vec![Rhythm::default(); bound.slots.len()],
             digits: vec![None; bound.slots.len()],
             joints,
             judged: vec![(0, 0); bound.by_sample.len()],
@@ -220,7 +246,7 @@ impl Case {
     pub(super) fn take(&mut self, slot: usize, value: Option<f64>, digits: Option<u8>, moment: Moment) {
         self.judge_where(|joint| joint.is_fresh(slot), self.last.unwrap_or(moment));
         self.values[slot] = value;
-        self.seen[slot] = true;
+        self.rhythms[slot].beat(moment.0.mono);
         self.digits[slot] = digits.or(self.digits[slot]);
         self.joints.iter_mut().for_each(|(joint, _)| joint.has_come(slot));
         self.last = Some(moment);
@@ -228,15 +254,16 @@ impl Case {
     }
 
     /// Judges what still waits for another signal.
-    pub(super) fn finish(&mut self, at: Stamp) {
-        let moment = self.last.unwrap_or((at, Duration::ZERO, None));
-        self.judge_where(Joint::is_waiting, moment);
+    pub(super) fn finish(&mut self) {
+        if let Some(last) = self.last {
+            self.judge_where(Joint::is_waiting, last);
+        }
     }
 
     fn judge_where(&mut self, is_due: impl Fn(&Joint) -> bool, moment: Moment) {
         for at in 0..self.joints.len() {
             let (joint, role) = &mut self.joints[at];
-            if is_due(joint) && joint.slots.iter().all(|&slot| self.seen[slot]) {
+            if is_due(joint) && joint.slots.iter().all(|&slot| self.rhythms[slot].count > 0) {
                 joint.fresh.fill(false);
                 let role = *role;
                 self.judge(role, moment);
@@ -311,9 +338,10 @@ impl Case {
         self.judged.iter().map(|&(_, invalid)| invalid).chain(gathered).max().unwrap_or(0)
     }
 
-    pub(super) fn verdict(&self, silent: &[Silence]) -> Verdict {
+    /// The verdict; with the `end` of a recording, a signal that ceased before it leaves none.
+    pub(super) fn verdict(&self, end: Option<Mono>, silent: &[Silence]) -> Verdict {
         let aggregates = self.aggregates();
-        let (ruling, reason) = self.ruling(&aggregates, silent);
+        let (ruling, reason) = self.ruling(&aggregates, end, silent);
         Verdict {
             text: self.bound.text.clone(),
             node: self.bound.node,
@@ -327,7 +355,7 @@ impl Case {
         }
     }
 
-    fn ruling(&self, aggregates: &[Option<f64>], silent: &[Silence]) -> (Ruling, Option<String>) {
+    fn ruling(&self, aggregates: &[Option<f64>], end: Option<Mono>, silent: &[Silence]) -> (Ruling, Option<String>) {
         if self.violations > 0 || self.invalid() > 0 {
             return (Ruling::Fail, None);
         }
@@ -338,9 +366,13 @@ impl Case {
         if let Some(silence) = silent.iter().find(concerns) {
             return (Ruling::NoData, Some(silence.reason.clone()));
         }
-        if let Some(slot) = self.seen.iter().position(|seen| !seen) {
-            let slot = &self.bound.slots[slot];
-            return (Ruling::NoData, Some(format!("node {}: {} did not come", slot.node, slot.name)));
+        for (slot, rhythm) in self.bound.slots.iter().zip(&self.rhythms) {
+            if rhythm.count == 0 {
+                return (Ruling::NoData, Some(format!("node {}: {} did not come", slot.node, slot.name)));
+            }
+            if end.is_some_and(|end| rhythm.has_ceased(end)) {
+                return (Ruling::NoData, Some(format!("node {}: {} was silent at the end", slot.node, slot.name)));
+            }
         }
         let values = Values { slots: &self.values, aggregates };
         let held: Vec<Option<bool>> = self.bound.at_the_end.iter().map(|rule| rule.holds(values)).collect();
@@ -358,7 +390,7 @@ impl Case {
 
     pub(super) fn standing(&self) -> Standing {
         let aggregates = self.aggregates();
-        let holds = match self.ruling(&aggregates, &[]).0 {
+        let holds = match self.ruling(&aggregates, None, &[]).0 {
             Ruling::Ok => Some(true),
             Ruling::Fail => Some(false),
             Ruling::NoData => None,

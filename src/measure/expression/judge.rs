@@ -8,7 +8,7 @@
 use super::bind::{Bound, Offers, unit_of};
 use super::case::{Case, Silence, Standing, Verdict};
 use super::{Expression, ExpressionError};
-use crate::bus::{Mono, Stamp};
+use crate::bus::Mono;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
@@ -155,15 +155,15 @@ impl Jury {
         self.cases.iter().map(Case::standing).collect()
     }
 
-    /// The verdicts at `at`, in the order of the expressions and their nodes. `silent` are nodes and signals
-    /// that gave nothing, or nothing any more.
-    pub fn verdicts(mut self, at: Stamp, silent: &[Silence]) -> Vec<Verdict> {
-        self.cases.iter_mut().for_each(|case| case.finish(at));
+    /// The verdicts, in the order of the expressions and their nodes. `silent` are nodes and signals that gave
+    /// nothing, or nothing any more; with the `end` of a recording, signals that ceased before it are found, too.
+    pub fn verdicts(mut self, end: Option<Mono>, silent: &[Silence]) -> Vec<Verdict> {
+        self.cases.iter_mut().for_each(Case::finish);
         let mut verdicts = Vec::new();
         for expression in &self.expressions {
             let judged = self.cases.iter().filter(|case| case.bound().text == expression.text());
             let settled = self.settled.iter().filter(|verdict| verdict.text == expression.text()).cloned();
-            let mut of_it: Vec<Verdict> = judged.map(|case| case.verdict(silent)).chain(settled).collect();
+            let mut of_it: Vec<Verdict> = judged.map(|case| case.verdict(end, silent)).chain(settled).collect();
             if of_it.is_empty() {
                 of_it.push(Verdict::nothing(expression.text(), None, "nothing of it was measured"));
             }

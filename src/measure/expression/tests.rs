@@ -267,7 +267,7 @@ fn verdict(text: &str, signals: &[Signal<'_>]) -> Verdict {
             }
         }
     }
-    let mut verdicts = jury.verdicts(Stamp::default(), &[]);
+    let mut verdicts = jury.verdicts(None, &[]);
     assert_eq!(verdicts.len(), 1, "{verdicts:?}");
     verdicts.remove(0)
 }
@@ -356,7 +356,7 @@ fn a_number_is_the_one_that_its_text_reads_as() {
         let mut jury = bound(text, &[("p", "bar", &[])]).expect("bound");
         let value = Some(Number::Real32(9.95));
         jury.take(&[Sample { value, ..sample(0, 0, Some(0.0)) }], &offers);
-        assert_eq!(jury.verdicts(Stamp::default(), &[])[0].ruling, expected, "{text}");
+        assert_eq!(jury.verdicts(None, &[])[0].ruling, expected, "{text}");
     }
 }
 
@@ -450,7 +450,7 @@ fn without_a_node_it_is_judged_for_each() {
     let mut both = jury("p < 2 bar", true).expect("bound");
     assert_eq!(both.wanted_of(signals[1].node), [Wanted::Signal("p".into())]);
     both.take(&[sample(0, 0, Some(1.9)), sample(1, 1, Some(29.1)), sample(2, 2, Some(99.0))], &signals);
-    let verdicts = both.verdicts(Stamp::default(), &[]);
+    let verdicts = both.verdicts(None, &[]);
     let rulings: Vec<_> = verdicts.iter().map(|verdict| (verdict.node.map(NodeId::get), verdict.ruling)).collect();
     assert_eq!(rulings, [(Some(5), Ruling::Ok), (Some(6), Ruling::Fail)]);
     assert_eq!(jury("p < 2", false).expect_err("7 has no p").message, "node 7 has no signal \"p\"");
@@ -459,9 +459,25 @@ fn without_a_node_it_is_judged_for_each() {
     let mut one = jury("5.p < 2", true).expect("bound");
     one.take(&[sample(0, 0, Some(1.0))], &signals);
     let silent = [Silence { node: signals[0].node, signal: None, reason: "node 5 is silent".to_owned() }];
-    let verdict = one.clone().verdicts(Stamp::default(), &silent).remove(0);
+    let verdict = one.clone().verdicts(None, &silent).remove(0);
     assert_eq!((verdict.ruling, verdict.reason.as_deref()), (Ruling::NoData, Some("node 5 is silent")));
-    assert_eq!(one.verdicts(Stamp::default(), &[])[0].ruling, Ruling::Ok);
+    assert_eq!(one.verdicts(None, &[])[0].ruling, Ruling::Ok);
+}
+
+#[test]
+fn a_signal_that_ceases_leaves_no_verdict() {
+    let two = [("5.p", "bar", &[1.0, 1.0, 1.0][..]), ("5.t", "degC", &[])];
+    let mut jury = bound("p < 2", &two).expect("bound");
+    for at in 0..100 {
+        jury.take(&[sample(at * 300, 0, Some(1.0))], &sources(&two));
+    }
+    let ruling = |jury: &Jury, end_ms| {
+        jury.clone().verdicts(Some(Mono::at(Duration::from_millis(end_ms))), &[]).remove(0).ruling
+    };
+    // Five of its intervals are 1.5 s; the last one came at 29.7 s.
+    assert_eq!((ruling(&jury, 31_200), ruling(&jury, 31_201)), (Ruling::Ok, Ruling::NoData));
+    jury.take(&[sample(29_800, 0, Some(3.0))], &sources(&two));
+    assert_eq!(ruling(&jury, 60_000), Ruling::Fail, "what failed has failed");
 }
 
 #[test]
@@ -472,10 +488,10 @@ fn a_unit_that_changes_while_it_is_recorded() {
     let mut after = before.clone();
     after.extend(sources(&[("p", "mbar", &[]), ("p", "degC", &[])]));
     jury.take(&[sample(10, 1, Some(1999.0))], &after);
-    assert_eq!(jury.clone().verdicts(Stamp::default(), &[])[0].ruling, Ruling::Ok);
+    assert_eq!(jury.clone().verdicts(None, &[])[0].ruling, Ruling::Ok);
     let mut lost = jury.clone();
     jury.take(&[sample(20, 1, Some(2001.0))], &after);
-    assert_eq!(jury.verdicts(Stamp::default(), &[])[0].violations, 1);
+    assert_eq!(jury.verdicts(None, &[])[0].violations, 1);
     lost.take(&[sample(20, 2, Some(1.0))], &after);
-    assert_eq!(lost.verdicts(Stamp::default(), &[])[0].invalid, 1);
+    assert_eq!(lost.verdicts(None, &[])[0].invalid, 1);
 }
