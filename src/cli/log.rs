@@ -10,7 +10,7 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
 use crate::measure::decode::Wanted;
 use crate::measure::expression::Expression;
-use crate::measure::expression::case::Verdict;
+use crate::measure::expression::verdict::Verdict;
 use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
 use crate::output::progress::Progress;

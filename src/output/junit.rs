@@ -2,7 +2,7 @@
 //! expression, and per node where an expression is judged for several.
 
 use super::verdict::findings;
-use crate::measure::expression::case::{Ruling, Verdict};
+use crate::measure::expression::verdict::{Ruling, Verdict};
 use crate::tasks::check::Report;
 use std::fmt::Write;
 

@@ -2,7 +2,7 @@
 
 use super::progress::{RATE, bar, style};
 use super::verdict::values;
-use crate::measure::expression::case::Standing;
+use crate::measure::expression::verdict::Standing;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget};
 use std::io::{self, Write};
 use std::time::Duration;

@@ -3,7 +3,7 @@
 use super::table::{Align, write};
 use super::text::{grouped, significant};
 use crate::canopen::id::NodeId;
-use crate::measure::expression::case::{Ruling, Shown, Verdict, Violation};
+use crate::measure::expression::verdict::{Ruling, Shown, Verdict, Violation};
 use crate::measure::sample::Status;
 use serde::Serialize;
 use std::io::{self, Write};

@@ -3,6 +3,10 @@
 use super::Bench;
 use serde_json::json;
 use std::fs;
+#[cfg(unix)]
+use std::io::{BufRead, BufReader, Read};
+#[cfg(unix)]
+use std::process::{Command, Stdio};
 
 /// Devices whose quantities stand still.
 fn still() -> Bench {
@@ -290,18 +294,22 @@ fn who_only_listens_learns_the_units_on_the_way() {
 #[test]
 #[cfg(unix)]
 fn a_check_that_is_cut_short_says_nothing() {
-    use std::process::{Command, Stdio};
     let bench = Bench::real("mh4@1");
-    let mut command =
-        bench.traced(&["check", "1", "pressure < 1000", "--for", "1h", "--poll", "10ms", "--junit", "r.xml"]);
-    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
-    // The first request of the measuring: what has been asked before has other objects.
-    while fs::read_to_string(bench.path("trace")).map_or(true, |trace| !trace.contains("601#4030")) {
-        std::thread::yield_now();
+    let check = ["check", "1", "pressure < 1000", "--for", "1h", "--poll", "10ms", "--junit", "r.xml"];
+    let mut command = bench.command(&[&["-b", &bench.bus, "--trace", "-"], &check[..]].concat());
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
+    let mut reader = BufReader::new(child.stderr.take().expect("stderr"));
+    let mut line = String::new();
+    while !line.contains("601#40306101") {
+        line.clear();
+        assert!(reader.read_line(&mut line).expect("a line") > 0, "it ended before it had measured");
     }
     let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
     assert!(killed.success());
-    let done = bench.end(child).exit(130);
-    assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("", "cangauge: interrupted\n"));
+    let mut rest = String::new();
+    reader.read_to_string(&mut rest).expect("the rest");
+    let output = child.wait_with_output().expect("its end");
+    assert_eq!((output.status.code(), output.stdout.as_slice()), (Some(130), &b""[..]), "{rest}");
+    assert!(rest.ends_with("cangauge: interrupted\n"), "{rest}");
     assert!(bench.text("r.xml").contains(" errors=\"1\""));
 }

@@ -6,7 +6,8 @@
 //! sample goes unjudged.
 
 use super::bind::{Bound, Offers, unit_of};
-use super::case::{Case, Silence, Standing, Verdict};
+use super::case::Case;
+use super::verdict::{Silence, Standing, Verdict};
 use super::{Expression, ExpressionError};
 use crate::bus::Mono;
 use crate::canopen::id::NodeId;

@@ -15,7 +15,7 @@
 //! does I/O or reads a clock, and every text is either an expression or an error that points at a character.
 
 pub mod bind;
-pub mod case;
+mod case;
 mod dimension;
 mod evaluate;
 pub mod judge;
@@ -25,6 +25,7 @@ mod rules;
 #[cfg(test)]
 mod tests;
 pub mod tree;
+pub mod verdict;
 
 use crate::measure::decode::Wanted;
 use std::fmt;

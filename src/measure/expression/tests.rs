@@ -1,7 +1,7 @@
 use super::bind::Offers;
-use super::case::{Ruling, Silence, Verdict};
 use super::judge::Jury;
 use super::tree::{At, Comparison, Condition, Function, Operator, Quantity, SignalName};
+use super::verdict::{Ruling, Silence, Verdict};
 use super::{Expression, ExpressionError};
 use crate::bus::{Mono, Stamp, Wall};
 use crate::canopen::id::NodeId;
