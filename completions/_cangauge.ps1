@@ -46,6 +46,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('nmt', 'nmt', [CompletionResultType]::ParameterValue, 'Send NMT commands and tell states')
             [CompletionResult]::new('sdo', 'sdo', [CompletionResultType]::ParameterValue, 'Read and write objects of the object dictionary')
             [CompletionResult]::new('log', 'log', [CompletionResultType]::ParameterValue, 'Record measurements as CSV or JSON Lines')
+            [CompletionResult]::new('check', 'check', [CompletionResultType]::ParameterValue, 'Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data')
             [CompletionResult]::new('bus', 'bus', [CompletionResultType]::ParameterValue, 'List CAN interfaces, switch them on and off, find the bit rate of a bus')
             [CompletionResult]::new('autozero', 'autozero', [CompletionResultType]::ParameterValue, 'Make the present reading of a channel zero (6125h), with checks before and after')
             [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Let devices keep their settings beyond power off (1010h)')
@@ -490,6 +491,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('-o', '-o', [CompletionResultType]::ParameterName, 'Write to a file instead of stdout')
             [CompletionResult]::new('--output', '--output', [CompletionResultType]::ParameterName, 'Write to a file instead of stdout')
             [CompletionResult]::new('--summary', '--summary', [CompletionResultType]::ParameterName, 'Write the summary as JSON to a file; - for stdout')
+            [CompletionResult]::new('--expect', '--expect', [CompletionResultType]::ParameterName, 'Exit with 1 at the end unless this held: ''pressure in 9..11 bar'', see cangauge check --help')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
@@ -497,6 +499,34 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--passive', '--passive', [CompletionResultType]::ParameterName, 'Send nothing at all')
             [CompletionResult]::new('--no-nmt', '--no-nmt', [CompletionResultType]::ParameterName, 'Leave the nodes'' NMT states alone')
             [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, 'Overwrite files that exist')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;check' {
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('--for', '--for', [CompletionResultType]::ParameterName, 'Judge all samples that come in this time')
+            [CompletionResult]::new('--sync', '--sync', [CompletionResultType]::ParameterName, 'Send SYNC at this interval')
+            [CompletionResult]::new('--poll', '--poll', [CompletionResultType]::ParameterName, 'Read by SDO at this interval')
+            [CompletionResult]::new('--junit', '--junit', [CompletionResultType]::ParameterName, 'Write the verdicts as JUnit XML, for CI servers: one test case per expression')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, 'Overwrite a file that exists')
             [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
@@ -780,6 +810,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('nmt', 'nmt', [CompletionResultType]::ParameterValue, 'Send NMT commands and tell states')
             [CompletionResult]::new('sdo', 'sdo', [CompletionResultType]::ParameterValue, 'Read and write objects of the object dictionary')
             [CompletionResult]::new('log', 'log', [CompletionResultType]::ParameterValue, 'Record measurements as CSV or JSON Lines')
+            [CompletionResult]::new('check', 'check', [CompletionResultType]::ParameterValue, 'Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data')
             [CompletionResult]::new('bus', 'bus', [CompletionResultType]::ParameterValue, 'List CAN interfaces, switch them on and off, find the bit rate of a bus')
             [CompletionResult]::new('autozero', 'autozero', [CompletionResultType]::ParameterValue, 'Make the present reading of a channel zero (6125h), with checks before and after')
             [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Let devices keep their settings beyond power off (1010h)')
@@ -802,6 +833,9 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;help;log' {
+            break
+        }
+        'cangauge;help;check' {
             break
         }
         'cangauge;help;bus' {

@@ -4,6 +4,7 @@
 pub mod args;
 mod autozero;
 mod bus;
+mod check;
 mod completions;
 mod each;
 pub mod exit;
@@ -137,6 +138,8 @@ pub(crate) enum Command {
     Sdo(sdo::Sdo),
     /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data
+    Check(check::Check),
     /// List CAN interfaces, switch them on and off, find the bit rate of a bus
     Bus(bus::BusCommand),
     /// Make the present reading of a channel zero (6125h), with checks before and after
@@ -209,6 +212,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Check(command) => command.run(&cli.global),
         Command::Bus(command) => command.run(&cli.global),
         Command::Autozero(command) => command.run(&cli.global),
         Command::Store(command) => command.run(&cli.global),

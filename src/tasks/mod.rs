@@ -1,6 +1,7 @@
 //! The procedures that users think in. They return reports and print nothing.
 
 pub mod autozero;
+pub mod check;
 pub mod detect;
 pub mod failure;
 pub mod host;

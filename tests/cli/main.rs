@@ -4,6 +4,7 @@
 mod args;
 mod autozero;
 mod bus;
+mod check;
 mod examples;
 mod log;
 mod log_end;
