@@ -5,12 +5,14 @@
 //! and says what happened. Everything that blocks is built on it.
 
 mod company;
+pub mod lss;
 mod machine;
 mod request;
 mod sdo;
 mod send;
 pub mod transfer;
 
+pub use lss::{Lss, LssError};
 pub use request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, Way, read_object, write_object};
 

@@ -1,0 +1,241 @@
+//! Fastscan: the address of a slave without a node-ID, bit by bit (CiA 305, 7.5.3.5).
+//!
+//! A step asks whether there is a slave whose number has these upper bits; it is answered, or it is not. So an
+//! answer that comes too late says the wrong thing twice. Therefore each number found is checked as a whole,
+//! once without consequences, so that a late answer is not taken for a yes, and once to go on with the next.
+//! Where a check fails the number is looked for again, with more patience.
+//!
+//! Slaves are no choir: where two answer one after the other, the second answer must not be taken for one to
+//! the next step. Once more than one answer came to a step, every step waits for its time to be over.
+
+use super::{LssAddress, Part, Request};
+use crate::canopen::frame::Frame;
+
+/// How often one number is looked for.
+const TRIES: u8 = 4;
+
+/// How often everything begins anew because a slave that had been there did not go on.
+const RESTARTS: u8 = 3;
+
+/// A number that no step asks for: nobody who follows the protocol answers it.
+const NOBODY: u32 = u32::MAX;
+
+/// What is being waited for after a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wait {
+    /// Whether anybody is there: the longest wait for an answer, and the measure of how fast they are.
+    Everybody,
+    /// Silence, or an answer in the time it usually takes.
+    Bit,
+    /// An answer, which may take its time.
+    Check,
+}
+
+/// The next thing to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// What is sent.
+    pub request: Request,
+    /// What is waited for.
+    pub wait: Wait,
+    /// Whether to wait for the time to be over even if an answer is there.
+    pub to_the_end: bool,
+    /// How often the usual time was found too short: 0, 1, 2 …
+    pub impatience: u8,
+}
+
+/// The end of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// The next step.
+    Continue,
+    /// The slave with this address is in configuration state.
+    Found(LssAddress),
+    /// There is no slave without a node-ID.
+    Nobody,
+    /// It does not work.
+    Failed(FastscanError),
+}
+
+/// Why no address was found although somebody answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FastscanError {
+    /// Answers come to what nobody can answer.
+    #[error("a device answers every fastscan frame, whatever is asked")]
+    Babbler,
+    /// The number does not come together.
+    #[error("the answers about the {} contradict each other", name(*.0))]
+    Unsettled(Part),
+}
+
+fn name(part: Part) -> &'static str {
+    match part {
+        Part::Vendor => "vendor-ID",
+        Part::Product => "product code",
+        Part::Revision => "revision number",
+        Part::Serial => "serial number",
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Everybody is asked, and everybody's scan begins anew.
+    Everybody,
+    /// Something is asked that nobody can answer: those who begin compare the vendor-ID.
+    Probe,
+    /// The bit, 31 to 0.
+    Bit(u8),
+    /// The number found, without consequences.
+    Check,
+    /// The number found; whoever fits compares the next part, after the last one it is in configuration state.
+    Advance,
+}
+
+/// A scan in progress.
+#[derive(Clone, Debug)]
+pub struct Fastscan {
+    phase: Phase,
+    /// How often everybody may still be asked.
+    retries: u32,
+    /// The numbers found.
+    known: [Option<u32>; 4],
+    part: Part,
+    number: u32,
+    tries: u8,
+    restarts: u8,
+    /// Several answers came to one step.
+    crowded: bool,
+    /// How often the usual time was too short.
+    impatience: u8,
+    /// Whether the probe has been silent.
+    probed: bool,
+}
+
+impl Fastscan {
+    /// A scan in which everybody is asked again `retries` times.
+    pub fn new(retries: u32) -> Fastscan {
+        Fastscan {
+            phase: Phase::Everybody,
+            retries,
+            known: [None; 4],
+            part: Part::Vendor,
+            number: 0,
+            tries: 0,
+            restarts: 0,
+            crowded: false,
+            impatience: 0,
+            probed: false,
+        }
+    }
+
+    /// Whether a frame is an answer to a step.
+    pub fn is_answer(frame: &Frame) -> bool {
+        super::Answer::parse(frame, super::Service::Fastscan).is_some()
+    }
+
+    /// What to send and what to wait for.
+    pub fn step(&self) -> Step {
+        let ask = |number, bit_check, sub, next| Request::Fastscan { number, bit_check, sub, next };
+        let (request, wait) = match self.phase {
+            Phase::Everybody => (ask(0, Request::EVERYBODY, Part::Vendor, Part::Vendor), Wait::Everybody),
+            Phase::Probe => (ask(NOBODY, 0, Part::Product, Part::Product), Wait::Bit),
+            Phase::Bit(bit) => (ask(self.number, bit, self.part, self.part), Wait::Bit),
+            Phase::Check => (ask(self.number, 0, self.part, self.part), Wait::Check),
+            Phase::Advance => {
+                let next = Part::from_number(self.part.number() + 1).unwrap_or(Part::Vendor);
+                (ask(self.number, 0, self.part, next), Wait::Check)
+            }
+        };
+        // A probe that is not answered in time proves nothing if the time is short.
+        let to_the_end = match self.phase {
+            Phase::Everybody => true,
+            Phase::Probe => false,
+            Phase::Bit(_) | Phase::Check | Phase::Advance => self.crowded,
+        };
+        Step { request, wait, to_the_end, impatience: self.impatience }
+    }
+
+    /// The time of a step is over, or its answer is there: so many answers came.
+    pub fn on_end(&mut self, answers: usize) -> Progress {
+        self.crowded |= answers > 1;
+        let answered = answers > 0;
+        match self.phase {
+            Phase::Everybody if answered => {
+                if self.probed {
+                    self.look_at(Part::Vendor);
+                } else {
+                    self.phase = Phase::Probe;
+                }
+            }
+            Phase::Everybody if self.retries > 0 => self.retries -= 1,
+            Phase::Everybody if self.restarts > 0 => return self.unsettled(),
+            Phase::Everybody => return Progress::Nobody,
+            Phase::Probe if answered => return Progress::Failed(FastscanError::Babbler),
+            Phase::Probe => {
+                self.probed = true;
+                self.look_at(Part::Vendor);
+            }
+            Phase::Bit(bit) => {
+                if !answered {
+                    self.number |= 1 << bit;
+                }
+                self.phase = bit.checked_sub(1).map_or(Phase::Check, Phase::Bit);
+            }
+            Phase::Check if answered => self.phase = Phase::Advance,
+            Phase::Check => {
+                self.tries += 1;
+                if self.tries >= TRIES {
+                    return self.unsettled();
+                }
+                self.lose_patience();
+                self.search();
+            }
+            Phase::Advance if answered => {
+                self.known[usize::from(self.part.number())] = Some(self.number);
+                let Some(next) = Part::from_number(self.part.number() + 1) else {
+                    return Progress::Found(LssAddress::new(self.known.map(Option::unwrap_or_default)));
+                };
+                self.look_at(next);
+            }
+            Phase::Advance => {
+                // Whether it has gone on is not known: everything from the start, the numbers found at one go.
+                self.restarts += 1;
+                if self.restarts > RESTARTS {
+                    return self.unsettled();
+                }
+                if self.known[usize::from(self.part.number())].take().is_some() {
+                    self.known = [None; 4];
+                }
+                self.lose_patience();
+                self.phase = Phase::Everybody;
+            }
+        }
+        Progress::Continue
+    }
+
+    fn look_at(&mut self, part: Part) {
+        self.part = part;
+        self.tries = 0;
+        match self.known[usize::from(part.number())] {
+            Some(number) => {
+                self.number = number;
+                self.phase = Phase::Advance;
+            }
+            None => self.search(),
+        }
+    }
+
+    fn search(&mut self) {
+        self.number = 0;
+        self.phase = Phase::Bit(31);
+    }
+
+    fn lose_patience(&mut self) {
+        self.impatience = self.impatience.saturating_add(1);
+        self.crowded = true;
+    }
+
+    fn unsettled(&self) -> Progress {
+        Progress::Failed(FastscanError::Unsettled(self.part))
+    }
+}
