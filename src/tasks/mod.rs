@@ -2,6 +2,7 @@
 
 pub mod failure;
 pub mod log;
+pub mod lss;
 pub mod nmt;
 pub mod read;
 pub mod scan;
