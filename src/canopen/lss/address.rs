@@ -170,3 +170,63 @@ impl FromStr for LssRange {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn addresses_and_ranges_as_people_type_them() {
+        let dps = LssAddress::new([0x362, 0x0044_3150, 0x0001_0000, 20002]);
+        for text in ["0x362:0x443150:0x10000:20002", "866:4469072:65536:0x4E22"] {
+            assert_eq!(text.parse(), Ok(dps), "{text}");
+        }
+        assert_eq!(dps.to_string(), "0x362:0x443150:0x10000:20002");
+        for text in ["", "1:2:3", "1:2:3:4:5", "1:2:3:", "1:2:3:x", "1:2:3:-4", "1:2:3:4294967296", "1:2:3:4-5"] {
+            assert_eq!(text.parse::<LssAddress>(), Err(LssAddressError::Address(text.to_owned())), "{text}");
+        }
+        let range = LssRange { revision: (0, u32::MAX), serial: (5, 7), ..LssRange::from(dps) };
+        assert_eq!("0x362:0x443150:0-0xffffffff:5-7".parse(), Ok(range));
+        assert_eq!(range.to_string(), "0x362:0x443150:0x0-0xFFFFFFFF:5-7");
+        assert_eq!("0x362:0x443150:0x10000:20002".parse(), Ok(LssRange::from(dps)));
+        for text in ["1:2:3-:4", "1:2:-3:4", "1-2:2:3:4", "1:2:3-4-5:6"] {
+            assert_eq!(text.parse::<LssRange>(), Err(LssAddressError::Range(text.to_owned())), "{text}");
+        }
+        let reversed = LssAddressError::Reversed("7".to_owned(), "5".to_owned());
+        assert_eq!("1:2:3:7-5".parse::<LssRange>(), Err(reversed));
+    }
+
+    #[test]
+    fn the_first_and_the_last_have_one_neighbour() {
+        let with_serial =
+            |serial| LssAddress::new([1, 2, 3, serial]).neighbours().map(|range| range.map(|it| it.serial));
+        assert_eq!(with_serial(0), [None, Some((1, u32::MAX))]);
+        assert_eq!(with_serial(7), [Some((0, 6)), Some((8, u32::MAX))]);
+        assert_eq!(with_serial(u32::MAX), [Some((0, u32::MAX - 1)), None]);
+    }
+
+    proptest! {
+        #[test]
+        fn text_round_trips(parts: [u32; 4], more: (u32, u32)) {
+            let address = LssAddress::new(parts);
+            prop_assert_eq!(address.to_string().parse(), Ok(address));
+            let range = LssRange {
+                revision: (address.revision.min(more.0), address.revision.max(more.0)),
+                serial: (address.serial.min(more.1), address.serial.max(more.1)),
+                ..LssRange::from(address)
+            };
+            prop_assert_eq!(range.to_string().parse(), Ok(range));
+            prop_assert!(range.contains(&address));
+        }
+
+        /// Between them, the neighbours and the other revisions are all but the address itself.
+        #[test]
+        fn nobody_of_the_kind_is_forgotten(revision in 0u32..4, serial in 0u32..4, other in (0u32..4, 0u32..4)) {
+            let address = LssAddress { vendor: 1, product: 2, revision, serial };
+            let other = LssAddress { revision: other.0, serial: other.1, ..address };
+            let found = address.neighbours().into_iter().chain(address.revisions()).flatten();
+            prop_assert_eq!(found.filter(|range| range.contains(&other)).count(), usize::from(other != address));
+        }
+    }
+}

@@ -54,3 +54,22 @@ impl fmt::Display for Spoken {
         if self.code.code == ErrorCode::SPECIFIC { write!(f, ": {}", self.code.specific) } else { Ok(()) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_code_means_something_else_to_each_service() {
+        for (code, specific, service, words) in [
+            (1, 0, Service::ConfigureNodeId, "error 1, node-ID out of range"),
+            (1, 0, Service::ConfigureBitTiming, "error 1, bit rate not supported"),
+            (1, 0, Service::Store, "error 1, storing not supported"),
+            (2, 0, Service::Store, "error 2, the memory cannot be written"),
+            (2, 0, Service::ConfigureNodeId, "error 2"),
+            (255, 3, Service::Store, "error 255, an error of the manufacturer's own: 3"),
+        ] {
+            assert_eq!(ErrorCode { code, specific }.spoken(service).to_string(), words);
+        }
+    }
+}

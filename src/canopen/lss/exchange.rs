@@ -107,3 +107,59 @@ impl Exchange {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::canopen::lss::Part;
+
+    /// The outcome after being asked `asked` times and hearing these frames.
+    fn outcome(request: Request, asked: usize, heard: &[&str]) -> Result<Answer, ExchangeError> {
+        let mut exchange = Exchange::new(request);
+        for _ in 0..asked {
+            assert_eq!(exchange.ask(), [request.frame()]);
+        }
+        for text in heard {
+            exchange.on_frame(&text.parse().expect("a frame"));
+        }
+        exchange.one()
+    }
+
+    #[test]
+    fn several_are_told_from_one() {
+        let serial = Request::Inquire(Part::Serial);
+        let (a, b) = ("7E4#5D01000000000000", "7E4#5D02000000000000");
+        let several = |frames: &[&str]| {
+            Err(ExchangeError::Several(frames.iter().map(|text| text.parse().expect("a frame")).collect()))
+        };
+        assert_eq!(outcome(serial, 1, &[a]), Ok(Answer::Number(1)));
+        assert_eq!(outcome(serial, 1, &[a, b]), several(&[a, b]));
+        assert_eq!(outcome(serial, 1, &[a, a]), several(&[a]));
+        // Asked twice, one slave may answer twice.
+        assert_eq!(outcome(serial, 2, &[a, a]), Ok(Answer::Number(1)));
+        assert_eq!(outcome(serial, 2, &[a, a, a]), several(&[a]));
+        assert_eq!(outcome(serial, 1, &["7E4#1100000000000000", "701#00", a]), Ok(Answer::Number(1)));
+        assert_eq!(outcome(serial, 1, &[]), Err(ExchangeError::NoAnswer));
+        assert_eq!(outcome(Request::IdentifyUnconfigured, 1, &["7E4#50", "7E4#5000000000000000"]), Ok(Answer::Here));
+    }
+
+    #[test]
+    fn half_an_acknowledge_is_none() {
+        let half = "7E4#17".parse().expect("a frame");
+        let violation = Err(ExchangeError::Violation(Violation::Short, half));
+        assert_eq!(outcome(Request::Store, 1, &["7E4#17"]), violation);
+        let refused = Err(ExchangeError::Refused(ErrorCode { code: 1, specific: 0 }));
+        assert_eq!(outcome(Request::Store, 1, &["7E4#1701000000000000"]), refused);
+    }
+
+    #[test]
+    fn a_babbler_is_not_kept_for_ever() {
+        let mut exchange = Exchange::new(Request::Inquire(Part::Serial));
+        exchange.ask();
+        for number in 0..1000u32 {
+            let [a, b, c, d] = number.to_le_bytes();
+            exchange.on_frame(&Frame::full(crate::canopen::id::CanId::LSS_SLAVE, [0x5d, a, b, c, d, 0, 0, 0]));
+        }
+        assert_eq!((exchange.answers().len(), exchange.is_crowded()), (KEPT, true));
+    }
+}

@@ -239,3 +239,115 @@ impl Fastscan {
         Progress::Failed(FastscanError::Unsettled(self.part))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A slave as CiA 305 describes it: which part it compares next, and whether it has been found.
+    struct Slave {
+        address: LssAddress,
+        compares: Part,
+        found: bool,
+    }
+
+    impl Slave {
+        fn new(address: LssAddress) -> Slave {
+            Slave { address, compares: Part::Vendor, found: false }
+        }
+
+        fn hears(&mut self, request: Request) -> bool {
+            let Request::Fastscan { number, bit_check, sub, next } = request else { return false };
+            if bit_check == Request::EVERYBODY {
+                (self.compares, self.found) = (Part::Vendor, false);
+                return true;
+            }
+            let fits = (self.address.part(sub) ^ number).checked_shr(bit_check.into()) == Some(0);
+            if self.found || sub != self.compares || !fits {
+                return false;
+            }
+            if bit_check == 0 {
+                self.found = next < sub;
+                self.compares = next;
+            }
+            true
+        }
+    }
+
+    /// Plays a scan; `late` says of each step whether its answers come in the next one.
+    fn scan(slaves: &mut [Slave], late: &mut dyn FnMut(Step) -> bool) -> (Progress, usize) {
+        let (mut scan, mut steps, mut left_over) = (Fastscan::new(1), 0, 0);
+        loop {
+            let step = scan.step();
+            steps += 1;
+            let answers = slaves.iter_mut().filter_map(|slave| slave.hears(step.request).then_some(())).count();
+            let (now, later) = if late(step) { (0, answers) } else { (answers, 0) };
+            let progress = scan.on_end(now + std::mem::replace(&mut left_over, later));
+            if progress != Progress::Continue {
+                return (progress, steps);
+            }
+            assert!(steps < 10_000);
+        }
+    }
+
+    #[test]
+    fn nobody_and_one_who_answers_everything() {
+        assert_eq!(scan(&mut [], &mut |_| false), (Progress::Nobody, 2));
+        let mut babbled = Fastscan::new(1);
+        let mut ends = (0..1000).map(|_| babbled.on_end(1));
+        let end = ends.find(|progress| *progress != Progress::Continue);
+        assert_eq!(end, Some(Progress::Failed(FastscanError::Babbler)));
+    }
+
+    #[test]
+    fn one_who_falls_silent_in_the_middle() {
+        let address = LssAddress::new([0x362, 0x0044_3150, 0x0001_0000, 20002]);
+        for last in 2..138 {
+            let mut slave = Slave::new(address);
+            let (mut scan, mut step) = (Fastscan::new(1), 0);
+            let end = loop {
+                step += 1;
+                let answered = slave.hears(scan.step().request) && step <= last;
+                match scan.on_end(usize::from(answered)) {
+                    Progress::Continue => {}
+                    end => break end,
+                }
+            };
+            assert!(matches!(end, Progress::Failed(FastscanError::Unsettled(_))), "{last}: {end:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn one_is_found_in_138_steps(parts: [u32; 4]) {
+            let address = LssAddress::new(parts);
+            let found = scan(&mut [Slave::new(address)], &mut |_| false);
+            prop_assert_eq!(found, (Progress::Found(address), 138));
+        }
+
+        #[test]
+        fn one_of_several_is_found(parts in proptest::collection::vec([0u32..8, 0u32..8, 0u32..8, 0u32..99], 1..5)) {
+            let mut slaves: Vec<Slave> = parts.into_iter().map(|parts| Slave::new(LssAddress::new(parts))).collect();
+            let (end, _) = scan(&mut slaves, &mut |_| false);
+            let found: Vec<LssAddress> = slaves.iter().filter(|slave| slave.found).map(|slave| slave.address).collect();
+            prop_assert!(found.windows(2).all(|pair| pair[0] == pair[1]));
+            prop_assert_eq!(Some(end), found.first().map(|&address| Progress::Found(address)));
+        }
+
+        /// Answers that come a step too late make the scan longer or end it; they never make up an address.
+        #[test]
+        fn late_answers_make_up_nothing(parts: [u32; 4], late in proptest::collection::vec(0u8..40, 1..600)) {
+            let address = LssAddress::new(parts);
+            let mut slaves = [Slave::new(address)];
+            let mut late = late.into_iter().map(|one_in| one_in == 0);
+            // A check is waited for long enough.
+            let (end, _) = scan(&mut slaves, &mut |step| step.wait == Wait::Bit && late.next().unwrap_or(false));
+            match end {
+                Progress::Found(found) => prop_assert!(found == address && slaves[0].found),
+                // The answer to the probe's predecessor, or too many late ones.
+                end => prop_assert!(matches!(end, Progress::Failed(_)), "{end:?}"),
+            }
+        }
+    }
+}

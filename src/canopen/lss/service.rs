@@ -330,3 +330,138 @@ impl Answer {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn frame(text: &str) -> Frame {
+        text.parse().expect("a frame")
+    }
+
+    #[test]
+    fn every_request_as_the_standard_has_it() {
+        let node = NodeId::new(0x7e).ok();
+        for (request, text) in [
+            (Request::SwitchGlobal(Mode::Waiting), "7E5#0400000000000000"),
+            (Request::SwitchGlobal(Mode::Configuration), "7E5#0401000000000000"),
+            (Request::Select(Part::Vendor, 0x362), "7E5#4062030000000000"),
+            (Request::Select(Part::Product, 0x0044_3150), "7E5#4150314400000000"),
+            (Request::Select(Part::Revision, 0x0001_0000), "7E5#4200000100000000"),
+            (Request::Select(Part::Serial, 20002), "7E5#43224E0000000000"),
+            (Request::ConfigureNodeId(node), "7E5#117E000000000000"),
+            (Request::ConfigureNodeId(None), "7E5#11FF000000000000"),
+            (Request::ConfigureBitTiming { table: 0, index: 4 }, "7E5#1300040000000000"),
+            (Request::ActivateBitTiming { delay_ms: 1000 }, "7E5#15E8030000000000"),
+            (Request::Store, "7E5#1700000000000000"),
+            (Request::Inquire(Part::Vendor), "7E5#5A00000000000000"),
+            (Request::Inquire(Part::Serial), "7E5#5D00000000000000"),
+            (Request::InquireNodeId, "7E5#5E00000000000000"),
+            (Request::Identify(Limit::Vendor, 0x362), "7E5#4662030000000000"),
+            (Request::Identify(Limit::SerialHigh, u32::MAX), "7E5#4BFFFFFFFF000000"),
+            (Request::IdentifyUnconfigured, "7E5#4C00000000000000"),
+            (
+                Request::Fastscan { number: 0, bit_check: Request::EVERYBODY, sub: Part::Vendor, next: Part::Vendor },
+                "7E5#5100000000800000",
+            ),
+            (
+                Request::Fastscan { number: 0x1234_5678, bit_check: 0, sub: Part::Vendor, next: Part::Product },
+                "7E5#5178563412000001",
+            ),
+        ] {
+            assert_eq!(request.frame(), frame(text));
+            assert_eq!(Request::parse(&frame(text)), Some(request), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_request() {
+        for text in [
+            "7E5#",
+            "7E5#04",
+            "7E5#0402",
+            "7E5#1100",
+            "7E5#1180",
+            "7E5#1300",
+            "7E5#15E8",
+            "7E5#40620300",
+            "7E5#4B620300",
+            "7E5#51000000008000",
+            "7E5#5100000000200000",
+            "7E5#5100000000000400",
+            "7E5#4400000000000000",
+            "7E4#0401000000000000",
+            "000007E5#0401000000000000",
+            "7E5#R8",
+        ] {
+            assert_eq!(Request::parse(&frame(text)), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_means_something_must_be_there() {
+        let acknowledge = |code, specific| Ok(Answer::Acknowledge(ErrorCode { code, specific }));
+        for (service, text, answer) in [
+            (Service::SwitchSelective, "7E4#4400000000000000", Ok(Answer::Selected)),
+            (Service::SwitchSelective, "7E4#4401000000000000", Ok(Answer::Selected)),
+            (Service::ConfigureNodeId, "7E4#1100000000000000", acknowledge(0, 0)),
+            (Service::ConfigureNodeId, "7E4#1100", acknowledge(0, 0)),
+            (Service::ConfigureNodeId, "7E4#1101000000000000", acknowledge(1, 0)),
+            (Service::ConfigureNodeId, "7E4#11FF030000000000", acknowledge(0xff, 3)),
+            (Service::ConfigureNodeId, "7E4#11FF", Err(Violation::Short)),
+            (Service::ConfigureNodeId, "7E4#11", Err(Violation::Short)),
+            (Service::ConfigureBitTiming, "7E4#13", Err(Violation::Short)),
+            (Service::Store, "7E4#17", Err(Violation::Short)),
+            (Service::Inquire(Part::Serial), "7E4#5D224E0000000000", Ok(Answer::Number(20002))),
+            (Service::Inquire(Part::Serial), "7E4#5D224E0000", Ok(Answer::Number(20002))),
+            (Service::Inquire(Part::Serial), "7E4#5D224E00", Err(Violation::Short)),
+            (Service::InquireNodeId, "7E4#5E7F", Ok(Answer::NodeId(Some(NodeId::MAX)))),
+            (Service::InquireNodeId, "7E4#5EFF000000000000", Ok(Answer::NodeId(None))),
+            (Service::InquireNodeId, "7E4#5E00000000000000", Err(Violation::NodeId(0))),
+            (Service::InquireNodeId, "7E4#5E", Err(Violation::Short)),
+            (Service::Identify, "7E4#4F00000000000000", Ok(Answer::Here)),
+            (Service::IdentifyUnconfigured, "7E4#5000000000000000", Ok(Answer::Here)),
+        ] {
+            assert_eq!(Answer::parse(&frame(text), service), Some(answer), "{text}");
+        }
+    }
+
+    #[test]
+    fn answers_to_something_else() {
+        for (service, text) in [
+            (Service::ConfigureNodeId, "7E4#1700000000000000"),
+            (Service::ConfigureNodeId, "7E5#1100000000000000"),
+            (Service::ConfigureNodeId, "000007E4#1100000000000000"),
+            (Service::ConfigureNodeId, "7E4#"),
+            (Service::ConfigureNodeId, "7E4#R8"),
+            (Service::Inquire(Part::Vendor), "7E4#5B00000000000000"),
+            (Service::IdentifyUnconfigured, "7E4#4F00000000000000"),
+            (Service::SwitchGlobal, "7E4#0400000000000000"),
+            (Service::ActivateBitTiming, "7E4#1500000000000000"),
+        ] {
+            assert_eq!(Answer::parse(&frame(text), service), None, "{text}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_comes_is_read(bytes in proptest::collection::vec(any::<u8>(), 0..=8), part in 0u8..4) {
+            let part = Part::from_number(part).expect("a part");
+            for id in [CanId::LSS_MASTER, CanId::LSS_SLAVE] {
+                let frame = Frame::new(id, &bytes).expect("a frame");
+                if let Some(request) = Request::parse(&frame) {
+                    // What is understood is what was sent, but for bytes that mean nothing.
+                    prop_assert_eq!(Request::parse(&request.frame()), Some(request));
+                }
+                for service in [Service::Store, Service::InquireNodeId, Service::Inquire(part), Service::Fastscan] {
+                    if let Some(Ok(answer)) = Answer::parse(&frame, service) {
+                        prop_assert_eq!(id, CanId::LSS_SLAVE);
+                        let success = Answer::Acknowledge(ErrorCode { code: 0, specific: 0 });
+                        prop_assert!(answer != success || bytes.get(..2) == Some(&[0x17, 0]));
+                    }
+                }
+            }
+        }
+    }
+}

@@ -24,9 +24,10 @@ struct Pace {
 }
 
 impl Pace {
-    /// Twice the slowest answer so far and some more; three times as long each time that was too short.
+    /// Half as long again as the slowest answer so far, and some more; three times as long each time that was too
+    /// short.
     fn usual(self, impatience: u8) -> Duration {
-        let usual = SHORTEST.max(self.slowest * 2 + MARGIN);
+        let usual = SHORTEST.max(self.slowest * 3 / 2 + MARGIN);
         usual.saturating_mul(3u32.saturating_pow(impatience.into())).min(self.timeout.max(SHORTEST))
     }
 }
