@@ -39,7 +39,10 @@ pub fn bring_up(name: &str, bit_rate: Option<u32>, mode: Mode) -> Result<Change,
     let after = match bit_rate {
         Some(bit_rate) => {
             is_possible(name, &before, bit_rate)?;
-            if before.up && before.bit_rate() == Some(bit_rate) && listens_only(&before) == (mode == Mode::ListenOnly) {
+            if before.up
+                && before.bit_rate().is_some_and(|now| is_near(now, bit_rate))
+                && listens_only(&before) == (mode == Mode::ListenOnly)
+            {
                 before.clone()
             } else {
                 retime(name, &before, bit_rate, mode, &mut || ())?
@@ -102,7 +105,7 @@ pub(super) fn retime(
             .map_err(|refusal| explain(refusal, &doing, name, bit_rate, listens))?;
         let now = switch(name, before, true)?;
         let made = now.bit_rate().unwrap_or(0);
-        if u64::from(made.abs_diff(bit_rate)) * 1000 > u64::from(bit_rate) * TOLERANCE {
+        if !is_near(made, bit_rate) {
             let why = format!("it comes no nearer than {made} bit/s");
             return Err(BusError::BitRate { name: name.to_owned(), bit_rate, why });
         }
@@ -154,6 +157,11 @@ fn switch(name: &str, link: &Link, up: bool) -> Result<Link, BusError> {
     netlink::switch(link, up).map_err(|refusal| refusal.into_error(&format!("bring {name} {direction}"), name))?;
     let now = self::link(name)?;
     if now.up == up { Ok(now) } else { Err(unchanged(name, &format!("it did not go {direction}"))) }
+}
+
+/// Whether an interface that makes one rate is at the other, which was asked for.
+fn is_near(made: u32, bit_rate: u32) -> bool {
+    u64::from(made.abs_diff(bit_rate)) * 1000 <= u64::from(bit_rate) * TOLERANCE
 }
 
 fn is_possible(name: &str, link: &Link, bit_rate: u32) -> Result<(), BusError> {
@@ -224,7 +232,8 @@ mod tests {
 
     #[test]
     fn the_right_to_set_interfaces() {
-        let status = |effective: &str| format!("Name:\tcat\nCapPrm:\t000001ffffffffff\nCapEff:\t{effective}\nCapBnd:\t0\n");
+        let status =
+            |effective: &str| format!("Name:\tcat\nCapPrm:\t000001ffffffffff\nCapEff:\t{effective}\nCapBnd:\t0\n");
         assert_eq!(has_net_admin(&status("000001ffffffffff")), Some(true));
         assert_eq!(has_net_admin(&status("0000000000001000")), Some(true));
         assert_eq!(has_net_admin(&status("0000000000000000")), Some(false));

@@ -164,7 +164,9 @@ impl Link {
             listen_only: can.and_then(|can| mode(can.get(CONTROL_MODE)?)),
             can_listen_only: supported.map(|modes| modes & LISTEN_ONLY != 0),
             restart_ms: can.and_then(|can| can.u32(RESTART_MS)),
-            errors: can.and_then(|can| can.get(ERROR_COUNTERS)).and_then(|data| Some((u16_at(data, 0)?, u16_at(data, 2)?))),
+            errors: can
+                .and_then(|can| can.get(ERROR_COUNTERS))
+                .and_then(|data| Some((u16_at(data, 0)?, u16_at(data, 2)?))),
             fixed_rates: rates.map(|rates| rates.iter().map(|rate| u32::from_ne_bytes(*rate)).collect()),
             rate_max: can.and_then(|can| can.u32(RATE_MAX)).filter(|&rate| rate > 0),
         }
