@@ -59,12 +59,21 @@ pub trait Bus {
     }
 
     /// Takes this side of the bus to another bit rate in bit/s: the interface goes down and comes up at the new
-    /// one. Frames that wait to be sent are lost.
+    /// one. Frames that wait to be sent, and received ones that nobody has asked for yet, are lost.
     ///
     /// # Errors
-    /// What the interface says; it may then be down.
+    /// What the interface says; where it says no it is left as it was, as far as it can be put back.
     fn set_bit_rate(&mut self, _bit_rate: u32, _mode: Mode) -> Result<(), BusError> {
         self.can_set_bit_rate()
+    }
+
+    /// Puts the interface back as it was before the first [`Bus::set_bit_rate`]: bit rate, mode, switched off
+    /// where it was. Nothing where none was set.
+    ///
+    /// # Errors
+    /// What the interface says; it is then as the error tells.
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        Ok(())
     }
 
     /// Writes out what is still buffered (a trace). To be called when the work is done: dropping a
@@ -113,6 +122,10 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 
     fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
         (**self).set_bit_rate(bit_rate, mode)
+    }
+
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        (**self).put_back_bit_rate()
     }
 
     fn finish(&mut self) -> Result<(), BusError> {
@@ -266,6 +279,16 @@ pub enum BusError {
     /// This bus only receives.
     #[error("{0} is receive only")]
     ReceiveOnly(String),
+    /// The interface cannot do that bit rate; it is as it was.
+    #[error("{name} cannot do {bit_rate} bit/s: {why}")]
+    BitRate {
+        /// The interface.
+        name: String,
+        /// The bit rate asked for.
+        bit_rate: u32,
+        /// What the driver says.
+        why: String,
+    },
     /// This system or this build has no such bus.
     #[error("{0}")]
     Unsupported(String),

@@ -86,6 +86,10 @@ impl<B: Bus> Bus for Traced<B> {
         self.bus.set_bit_rate(bit_rate, mode)
     }
 
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        self.bus.put_back_bit_rate()
+    }
+
     fn now(&self) -> Stamp {
         self.bus.now()
     }

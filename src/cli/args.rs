@@ -24,6 +24,30 @@ impl FromStr for Duration {
     }
 }
 
+/// A bit rate in bit/s: `250k`, `1M`, `125000`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rate(pub u32);
+
+/// The bit rates of classic CAN, in bit/s.
+const RATES: std::ops::RangeInclusive<u32> = 1_000..=1_000_000;
+
+impl FromStr for Rate {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Rate, String> {
+        let (number, factor) = match text.strip_suffix(['k', 'K']) {
+            Some(number) => (number, 1_000),
+            None => text.strip_suffix('M').map_or((text, 1), |number| (number, 1_000_000)),
+        };
+        let digits = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+        let rate = number.parse::<u32>().ok().filter(|_| digits).and_then(|number| number.checked_mul(factor));
+        match rate.filter(|rate| RATES.contains(rate)) {
+            Some(rate) => Ok(Rate(rate)),
+            None => Err(format!("\"{text}\" is not a bit rate of CAN (250k, 1M, 125000)")),
+        }
+    }
+}
+
 /// Which nodes: `5`, `0x7f`, `1-16`, `1,5,0x10-0x1f`, `all`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Nodes {
@@ -148,6 +172,21 @@ impl FromStr for BusSpec {
     }
 }
 
+/// The name of an interface: `can0`, `socketcan:can0`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InterfaceName(pub String);
+
+impl FromStr for InterfaceName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<InterfaceName, String> {
+        match text.parse()? {
+            BusSpec::SocketCan(name) => Ok(InterfaceName(name)),
+            BusSpec::Sim(_) => Err(format!("\"{text}\" is no interface of this machine (can0)")),
+        }
+    }
+}
+
 fn interface(name: &str) -> Result<BusSpec, String> {
     let fits = (1..16).contains(&name.len()) && !name.contains(['/', ' ', '\0']);
     if fits {
@@ -216,6 +255,17 @@ mod tests {
         assert_eq!(object("Vendor-ID"), Ok(ObjectArg::Name("vendor-id".into())));
         assert_eq!(object("ai-input-pv:1"), Ok(ObjectArg::Name("ai-input-pv:1".into())));
         assert!(object("vendor id").is_err() && object("ai-input-pv:300").is_err() && object("12345").is_err());
+    }
+
+    #[test]
+    fn bit_rates() {
+        let rate = |text: &str| text.parse::<Rate>().ok().map(|rate| rate.0);
+        assert_eq!(rate("250k"), Some(250_000));
+        assert_eq!(rate("1M"), Some(1_000_000));
+        assert_eq!(rate("125000"), Some(125_000));
+        for wrong in ["", "k", "0", "0k", "2M", "1m", "250", "+250k", "-1", "250 k", "83.3k", "5000000k", "auto"] {
+            assert_eq!(rate(wrong), None, "{wrong}");
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //! it gets.
 
 pub mod args;
+mod bus;
 mod completions;
 pub mod exit;
 mod file;
@@ -125,6 +126,7 @@ pub(crate) enum Command {
     Nmt(nmt::Nmt),
     Sdo(sdo::Sdo),
     Log(log::Log),
+    Bus(bus::BusCommand),
     Sim(sim::Sim),
     Completions(completions::Completions),
 }
@@ -187,6 +189,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Bus(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }
