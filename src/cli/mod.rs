@@ -7,6 +7,7 @@ mod completions;
 pub mod exit;
 mod file;
 mod log;
+mod lss;
 mod nmt;
 mod open;
 mod read;
@@ -31,6 +32,7 @@ Examples, on the simulated bus; leave `-b sim` out where one CAN interface is up
   cangauge -b sim log 1-3,127 --sync 10ms --duration 1h -o run.csv
   cangauge -b sim sdo read 1 0x1018:1                    one object, bare
   cangauge -b sim nmt reset 1                            restart it, wait for the boot-up
+  cangauge -b sim lss set-id 127 12                      give it a node-ID, and see it come back
 
 Exit codes:
   0  done                                    5  the bus fails: interface missing, down, bus-off
@@ -126,6 +128,7 @@ pub(crate) enum Command {
     Nmt(nmt::Nmt),
     Sdo(sdo::Sdo),
     Log(log::Log),
+    Lss(lss::LssCommand),
     Bus(bus::BusCommand),
     Sim(sim::Sim),
     Completions(completions::Completions),
@@ -189,6 +192,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Lss(command) => command.run(&cli.global),
         Command::Bus(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),

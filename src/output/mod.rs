@@ -3,6 +3,7 @@
 pub mod console;
 pub mod interfaces;
 pub mod json;
+pub mod json_lss;
 pub mod progress;
 pub mod rows;
 pub mod summary;

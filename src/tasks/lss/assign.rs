@@ -5,11 +5,11 @@ use super::confirm::{Confirmed, confirm};
 use super::objects::by_objects;
 use super::presence::taken;
 use super::progress::{Done, Stage};
-use super::retime::{Host, retime};
+use super::retime::{Host, Retiming};
 use super::session::{prepared, put_back};
 use super::subject::{Knowledge, Subject, subject};
 use super::ways::{PlannedRate, Rate, plan_rate, way};
-use super::{Listening, Note, Target, Tell, Via};
+use super::{Note, Target, Tell, Via};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
 use crate::device::assign::{AssignEntry, AssignWay, RateSource, RateTable, spoken_rate};
@@ -41,6 +41,20 @@ pub struct Job<'a> {
     pub overrides: &'a Overrides,
     /// The description that the user named for whichever device is meant.
     pub given: Option<Arc<Model>>,
+}
+
+impl Job<'_> {
+    /// Several slaves that all say yes are what `force` was asked for.
+    fn forced(&self, result: Result<(), LssError>) -> Result<(), LssError> {
+        match result {
+            Err(LssError::Several { frames, .. })
+                if self.force && frames.iter().all(|frame| frame.data().get(1) == Some(&0)) =>
+            {
+                Ok(())
+            }
+            result => result,
+        }
+    }
 }
 
 /// What became of it.
@@ -81,7 +95,10 @@ pub fn assign(master: &mut Master<'_>, job: &Job<'_>, tell: Tell<'_>) -> Result<
     let description = subject.model.as_ref().map(|model| &model.description);
     let rate = job.rate.map(|rate| plan_rate(description, rate, way.way)).transpose()?;
     if let (Some(Rate::Bits(_)), RateSource::Standard) = (job.rate, RateTable::of(description).source) {
-        tell(Note::Step(format!("{}: its own table of bit rates is not known; that of CiA 305 is taken", subject.name())));
+        tell(Note::Step(format!(
+            "{}: its own table of bit rates is not known; that of CiA 305 is taken",
+            subject.name()
+        )));
     }
     check_free(master, job, &subject)?;
     tell(Note::Step(introduction(&subject, job)));
@@ -92,7 +109,7 @@ pub fn assign(master: &mut Master<'_>, job: &Job<'_>, tell: Tell<'_>) -> Result<
 
 fn check_free(master: &mut Master<'_>, job: &Job<'_>, subject: &Subject) -> Result<(), Failure> {
     let Some(new) = job.id.filter(|new| subject.node != Some(*new) || !subject.alone) else { return Ok(()) };
-    let Some(sign) = taken(master, new, Listening::ForHeartbeats)? else { return Ok(()) };
+    let Some(sign) = taken(master, new)? else { return Ok(()) };
     let message = format!("node-ID {new} is taken ({sign}): nothing was changed");
     Err(subject.failure(Kind::CheckFailed, message).hint("who has which: cangauge lss scan"))
 }
@@ -130,7 +147,7 @@ fn carry_out(
     let host = Host::of(master, rate);
     let follows = job.retime && host.is_left_behind();
     if let (true, Some(rate)) = (follows, rate) {
-        let complete = retime(master, job, subject, way, rate, done, tell)?;
+        let complete = Retiming::new(master, job, subject, way, rate)?.carry_out(master, done, tell)?;
         (report.retimed, report.confirmed) = (true, Confirmed::Identity);
         if complete {
             if let Some(new) = job.id {
@@ -184,7 +201,7 @@ fn by_lss(
     tell: Tell<'_>,
 ) -> Result<bool, Failure> {
     let old_rate = old_index(master, subject);
-    let ((), before) = prepared(master, subject, way, tell, &mut |lss| {
+    let session = prepared(master, subject, way, tell, |lss| {
         let result = configure(lss, job, rate, done).map_err(|error| subject.lss_failure(error));
         if result.is_err() && done.is_pending() {
             undo(lss, subject, old_rate, done);
@@ -193,9 +210,9 @@ fn by_lss(
     })?;
     // A reset puts the NMT state to rights by itself.
     if job.id.is_none() {
-        put_back(master, before, tell);
+        put_back(master, session.before, tell);
     }
-    Ok(false)
+    Ok(job.id.is_some_and(|id| session.booted.contains(&id)))
 }
 
 /// The index of the bit rate at which the device works at the moment.
@@ -204,27 +221,19 @@ fn old_index(master: &Master<'_>, subject: &Subject) -> Option<u8> {
     master.bus().bit_rate().and_then(|rate| RateTable::of(description).index_of(rate))
 }
 
-fn configure(
-    lss: &mut Lss<'_, '_>,
-    job: &Job<'_>,
-    rate: Option<PlannedRate>,
-    done: &mut Done,
-) -> Result<(), LssError> {
+fn configure(lss: &mut Lss<'_, '_>, job: &Job<'_>, rate: Option<PlannedRate>, done: &mut Done) -> Result<(), LssError> {
     if let Some((id, stage)) = &mut done.id {
-        *stage = Stage::Sent;
-        let result = lss.configure_node_id(Some(*id));
+        let result = job.forced(lss.configure_node_id(Some(*id)));
         *stage = stage_of(&result);
         result?;
     }
     if let (Some(rate), Some((_, _, stage))) = (rate, &mut done.rate) {
-        *stage = Stage::Sent;
-        let result = lss.configure_bit_timing(0, rate.index);
+        let result = job.forced(lss.configure_bit_timing(0, rate.index));
         *stage = stage_of(&result);
         result?;
     }
     if job.store {
-        done.stored = Stage::Sent;
-        let result = lss.store();
+        let result = job.forced(lss.store());
         done.stored = stage_of(&result);
         result?;
     }

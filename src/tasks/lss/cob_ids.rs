@@ -53,9 +53,8 @@ pub(super) fn cob_ids(
 ) -> Result<CobIds, Error> {
     master.listen(&Filters::All)?;
     let described = |number: u16| {
-        TpdoNumber::new(number).filter(|number| {
-            model.is_none_or(|model| model.dictionary.has_index(number.communication(0).index))
-        })
+        TpdoNumber::new(number)
+            .filter(|number| model.is_none_or(|model| model.dictionary.has_index(number.communication(0).index)))
     };
     let tpdos: Vec<(TpdoNumber, u32)> =
         FUNCTIONS.iter().filter_map(|&(number, function)| Some((described(number)?, function))).collect();

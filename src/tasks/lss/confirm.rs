@@ -68,11 +68,7 @@ pub(super) fn confirm(
     }
 }
 
-fn boot_up(
-    master: &mut Master<'_>,
-    new: NodeId,
-    begun: crate::bus::Mono,
-) -> Result<Option<Duration>, Failure> {
+fn boot_up(master: &mut Master<'_>, new: NodeId, begun: crate::bus::Mono) -> Result<Option<Duration>, Failure> {
     let until = begun + BOOT_TIME.max(master.timing().timeout);
     loop {
         match next(master, until)? {
@@ -86,12 +82,7 @@ fn boot_up(
 }
 
 /// Where a device is that does not show itself as `new`.
-fn lost(
-    master: &mut Master<'_>,
-    subject: &Subject,
-    new: NodeId,
-    reset: Option<NodeId>,
-) -> Result<Failure, Failure> {
+fn lost(master: &mut Master<'_>, subject: &Subject, new: NodeId, reset: Option<NodeId>) -> Result<Failure, Failure> {
     if let Some(old) = reset.filter(|old| *old != new)
         && let Presence::One(found) = presence(master, old)?
         && subject.address.is_none_or(|address| address == found)

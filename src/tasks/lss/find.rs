@@ -49,7 +49,8 @@ pub fn scan(master: &mut Master<'_>, tell: Tell<'_>) -> Result<Vec<Slave>, Failu
     left?;
     if let Some(address) = unconfigured {
         tell(Note::Step(
-            "fastscan finds one device without a node-ID at a time: once that one has been given one, ask again".to_owned(),
+            "fastscan finds one device without a node-ID at a time: once that one has been given one, ask again"
+                .to_owned(),
         ));
         let model = catalog::by_identity(address.vendor, address.product);
         found.push(Slave { node: None, address: Some(address), model });

@@ -75,15 +75,6 @@ impl fmt::Display for Target {
     }
 }
 
-/// How long signs of life are waited for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Listening {
-    /// Until an SDO server would have answered.
-    Shortly,
-    /// Until the usual heartbeat would have come.
-    ForHeartbeats,
-}
-
 /// By which means node-ID and bit rate are set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Via {

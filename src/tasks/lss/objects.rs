@@ -117,14 +117,7 @@ fn read(master: &mut Master<'_>, node: NodeId, at: Option<AssignPlace>) -> Resul
     }
 }
 
-fn undo(
-    master: &mut Master<'_>,
-    subject: &Subject,
-    node: NodeId,
-    id: Number,
-    rate: Number,
-    done: &mut Done,
-) {
+fn undo(master: &mut Master<'_>, subject: &Subject, node: NodeId, id: Number, rate: Number, done: &mut Done) {
     let is_open = |stage: Stage| matches!(stage, Stage::Sent | Stage::Done);
     let id = id.zip(done.id.as_mut().map(|(_, stage)| stage));
     let rate = rate.zip(done.rate.as_mut().map(|(_, _, stage)| stage));

@@ -6,7 +6,8 @@ use super::subject::{Knowledge, Subject, everybody};
 use super::{Note, Tell};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::{LssAddress, Part};
-use crate::master::{Gathered, Lss, LssError, Master, Others};
+use crate::master::lss::{Gathered, Others};
+use crate::master::{Lss, LssError, Master};
 use crate::tasks::{Failure, Kind};
 
 /// What the slaves tell when all of them are asked at once.
@@ -48,15 +49,15 @@ pub(super) fn only(
         Some(Presence::Nameless | Presence::Nobody(_)) | None => None,
     };
     let alone = node.is_some() && another.is_none();
-    let mut subject =
-        Subject { address: by_sdo, node, unconfigured: false, alone, model: None, reach: Reach::Global };
+    let mut subject = Subject { address: by_sdo, node, unconfigured: false, alone, model: None, reach: Reach::Global };
     refuse(&subject, another.as_deref(), force)?;
     let told = configured(master, &subject, |lss| {
         inquire(lss, by_sdo).map_err(|error| match error {
             LssError::Master(error) => error.into(),
             error => Failure::from(error),
         })
-    })?;
+    })?
+    .done;
     another = another.or(told.another);
     if let (Some(by_sdo), Some(by_lss)) = (by_sdo, told.address)
         && by_sdo != by_lss

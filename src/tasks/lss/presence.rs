@@ -1,6 +1,5 @@
 //! Who answers under a node-ID: one device, none, or more than one.
 
-use super::Listening;
 use crate::bus::{BusError, Fault, Filters};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
@@ -164,18 +163,11 @@ pub(super) fn next(master: &mut Master<'_>, until: crate::bus::Mono) -> Result<H
 ///
 /// # Errors
 /// What stops everything.
-pub(super) fn taken(
-    master: &mut Master<'_>,
-    node: NodeId,
-    listening: Listening,
-) -> Result<Option<&'static str>, Failure> {
+pub(super) fn taken(master: &mut Master<'_>, node: NodeId) -> Result<Option<&'static str>, Failure> {
     master.listen(&Filters::All)?;
     let wait = master.timing().timeout.min(LISTEN / 3);
     let begun = master.now();
-    let until = match listening {
-        Listening::ForHeartbeats => begun + LISTEN,
-        Listening::Shortly => begun,
-    };
+    let until = begun + LISTEN;
     // Asked twice: one request or its answer may be lost.
     let requests = [(); 2].map(|()| Request::read(node, DEVICE_TYPE).once().within(wait));
     let tickets = requests.map(|request| master.start(request));

@@ -1,8 +1,8 @@
 //! What has been done and what not, for whoever has to go on from there.
 
 use super::subject::Subject;
-use crate::device::assign::spoken_rate;
 use crate::canopen::id::NodeId;
+use crate::device::assign::spoken_rate;
 use crate::tasks::{Failure, Kind};
 
 /// How far one step has come.
@@ -34,7 +34,7 @@ pub(super) struct Done {
 
 impl Done {
     /// Nothing yet of what is to be set.
-    pub fn of(id: Option<NodeId>, rate: Option<(Option<u32>, u8)>) -> Done {
+    pub(super) fn of(id: Option<NodeId>, rate: Option<(Option<u32>, u8)>) -> Done {
         Done {
             id: id.map(|id| (id, Stage::No)),
             rate: rate.map(|(bits, index)| (bits, index, Stage::No)),
@@ -47,17 +47,19 @@ impl Done {
     }
 
     /// Whether the device may hold something new that does not last.
-    pub fn is_pending(&self) -> bool {
+    pub(super) fn is_pending(&self) -> bool {
         self.stored == Stage::No && self.stages().any(|stage| matches!(stage, Stage::Sent | Stage::Done))
     }
 
     /// Whether the device certainly is as it was.
-    pub fn is_untouched(&self) -> bool {
-        self.stored == Stage::No && !self.retimed && self.stages().all(|stage| matches!(stage, Stage::No | Stage::Undone))
+    pub(super) fn is_untouched(&self) -> bool {
+        self.stored == Stage::No
+            && !self.retimed
+            && self.stages().all(|stage| matches!(stage, Stage::No | Stage::Undone))
     }
 
     /// What has been done, in words: `node-ID 12 configured, not stored`.
-    pub fn spoken(&self) -> String {
+    pub(super) fn spoken(&self) -> String {
         let word = |what: String, stage: Stage| match stage {
             Stage::No => format!("{what} not configured"),
             Stage::Sent => format!("whether {what} was taken is not known"),
@@ -78,7 +80,7 @@ impl Done {
     }
 
     /// The failure together with what has been done, and how to go on.
-    pub fn explain(&self, failure: Failure, subject: &Subject) -> Failure {
+    pub(super) fn explain(&self, failure: Failure, subject: &Subject) -> Failure {
         let Failure { message, hint, .. } = &failure;
         if self.is_untouched() {
             let rest = if message.ends_with("nothing was changed") { "" } else { ": nothing was changed" };
@@ -90,10 +92,13 @@ impl Done {
                 "whether it lasts shows only after power off and on: cangauge scan; or do it again: cangauge lss store {}",
                 subject.argument()
             ),
-            (_, Kind::Interrupted) => "until it is reset it works as before; power off and on undoes the rest".to_owned(),
+            (_, Kind::Interrupted) => {
+                "until it is reset it works as before; power off and on undoes the rest".to_owned()
+            }
             _ => "power off and on undoes what is not stored; then do it again".to_owned(),
         };
-        let hint = Some(hint.clone().filter(|_| self.stored == Stage::No && failure.kind == Kind::Refused).unwrap_or(way_on));
+        let hint =
+            Some(hint.clone().filter(|_| self.stored == Stage::No && failure.kind == Kind::Refused).unwrap_or(way_on));
         Failure { message: format!("{message}; {}", self.spoken()), hint, ..failure }
     }
 }

@@ -5,7 +5,7 @@ use super::assign::{Job, stage_of};
 use super::objects::by_objects;
 use super::presence::{LISTEN, Presence, next, presence};
 use super::progress::{Done, Stage};
-use super::session::{Before, configured, prepared, put_back};
+use super::session::{configured, prepared, put_back};
 use super::subject::{Subject, everybody};
 use super::ways::PlannedRate;
 use super::{Note, Tell};
@@ -38,64 +38,184 @@ pub(super) struct Host {
 
 impl Host {
     /// As it is before anything is changed.
-    pub fn of(master: &Master<'_>, new: Option<PlannedRate>) -> Host {
+    pub(super) fn of(master: &Master<'_>, new: Option<PlannedRate>) -> Host {
         Host { old: master.bus().bit_rate(), new }
     }
 
     /// Whether the device goes to a bit rate that is not the host's, or may.
-    pub fn is_left_behind(self) -> bool {
+    pub(super) fn is_left_behind(self) -> bool {
         self.new.is_some_and(|new| new.bits.is_none() || new.bits != self.old)
     }
 }
 
-/// The two bit rates in bit/s.
-#[derive(Clone, Copy, Debug)]
-struct Rates {
+/// Device and host to a new bit rate.
+pub(super) struct Retiming<'a> {
+    job: &'a Job<'a>,
+    subject: &'a Subject,
+    way: &'a AssignEntry,
+    index: u8,
+    /// In bit/s.
     old: u32,
+    /// In bit/s.
     new: u32,
 }
 
-/// Takes the device and the host to a new bit rate. Returns whether that was all there was to do: a device that has to
-/// store first stores the node-ID, too.
-///
-/// # Errors
-/// Somebody else on the bus, no privilege, a device that is not heard at the new rate. The host is then back at the
-/// old one.
-pub(super) fn retime(
-    master: &mut Master<'_>,
-    job: &Job<'_>,
-    subject: &Subject,
-    way: &AssignEntry,
-    rate: PlannedRate,
-    done: &mut Done,
-    tell: Tell<'_>,
-) -> Result<bool, Failure> {
-    let rates = check(master, subject, rate)?;
-    nobody_else(master, subject)?;
-    match way.way {
-        AssignWay::Lss => {
-            by_lss(master, job, subject, way, rate, rates, done, tell)?;
-            Ok(job.id.is_none())
+impl<'a> Retiming<'a> {
+    /// What has to be so before anything is changed.
+    ///
+    /// # Errors
+    /// A bit rate that is not known, no privilege, somebody else on the bus.
+    pub(super) fn new(
+        master: &mut Master<'_>,
+        job: &'a Job<'a>,
+        subject: &'a Subject,
+        way: &'a AssignEntry,
+        rate: PlannedRate,
+    ) -> Result<Retiming<'a>, Failure> {
+        let refuse = |why: &str| {
+            subject
+                .failure(Kind::CheckFailed, format!("{why}, so that this side cannot follow: nothing was changed"))
+                .hint("without --retime, and the interface by hand")
+        };
+        let new = rate.bits.ok_or_else(|| refuse("what bit rate that is, is not known"))?;
+        let old = master.bus().bit_rate().ok_or_else(|| refuse("the interface has no bit rate"))?;
+        let name = master.bus().name().to_owned();
+        master.bus().can_set_bit_rate().map_err(|error| not_set(error, &by_hand(&name, Some(new))))?;
+        if way.way == AssignWay::Objects && (way.applies == Applies::Power || !job.store) {
+            let why =
+                if job.store { "it takes the new rate at power on" } else { "it takes the new rate after storing" };
+            return Err(refuse(why));
         }
-        AssignWay::Objects => {
-            by_storing(master, job, subject, way, rates, done, tell)?;
-            Ok(true)
-        }
+        nobody_else(master, subject)?;
+        Ok(Retiming { job, subject, way, index: rate.index, old, new })
     }
-}
 
-/// What has to be so before anything is changed.
-fn check(master: &Master<'_>, subject: &Subject, rate: PlannedRate) -> Result<Rates, Failure> {
-    let refuse = |why: &str| {
-        subject
-            .failure(Kind::CheckFailed, format!("{why}, so that this side cannot follow: nothing was changed"))
-            .hint("without --retime, and the interface by hand")
-    };
-    let new = rate.bits.ok_or_else(|| refuse("what bit rate that is, is not known"))?;
-    let old = master.bus().bit_rate().ok_or_else(|| refuse("the interface has no bit rate"))?;
-    let name = master.bus().name().to_owned();
-    master.bus().can_set_bit_rate().map_err(|error| not_set(error, &by_hand(&name, Some(new))))?;
-    Ok(Rates { old, new })
+    /// Takes the device and the host to the new bit rate. Returns whether that was all there was to do: a device that
+    /// has to store first stores the node-ID, too.
+    ///
+    /// # Errors
+    /// A device that is not heard at the new rate. The host is then back at the old one.
+    pub(super) fn carry_out(&self, master: &mut Master<'_>, done: &mut Done, tell: Tell<'_>) -> Result<bool, Failure> {
+        match self.way.way {
+            AssignWay::Lss => self.by_lss(master, done, tell)?,
+            AssignWay::Objects => self.by_storing(master, done, tell)?,
+        }
+        Ok(self.job.id.is_none() || self.way.way == AssignWay::Objects)
+    }
+
+    fn by_lss(&self, master: &mut Master<'_>, done: &mut Done, tell: Tell<'_>) -> Result<(), Failure> {
+        let subject = self.subject;
+        let mut activated = None;
+        let session = prepared(master, subject, self.way, tell, |lss| {
+            let result = lss.configure_bit_timing(0, self.index);
+            if let Some((_, _, stage)) = &mut done.rate {
+                *stage = stage_of(&result);
+            }
+            result.map_err(|error| subject.lss_failure(error))?;
+            lss.activate(DELAY_MS).map_err(|error| subject.lss_failure(error))?;
+            activated = Some(lss.master().now());
+            Ok(())
+        });
+        let before = match (session, activated) {
+            (Ok(session), Some(_)) => session.before,
+            (Ok(_), None) => return Err(subject.failure(Kind::Unexpected, "it was not activated")),
+            (Err(failure), None) => return Err(failure),
+            (Err(failure), Some(_)) => return Err(self.go_back(master, failure, done)),
+        };
+        let begun = activated.unwrap_or_else(|| master.now());
+        let (name, new) = (subject.name(), spoken_rate(self.new));
+        tell(Note::Step(format!("{name} goes to {new} in {DELAY_MS} ms, this side too")));
+        if let Err(failure) = self.follow(master, begun) {
+            return Err(self.go_back(master, failure, done));
+        }
+        done.retimed = true;
+        tell(Note::Step(format!("{name} answers at {new}")));
+        if self.job.id.is_some() {
+            return Ok(());
+        }
+        let stored = if self.job.store { self.store(master, done) } else { Ok(()) };
+        put_back(master, before, tell);
+        stored
+    }
+
+    /// Stores what has been proved. The device stays at its new rate in any case.
+    fn store(&self, master: &mut Master<'_>, done: &mut Done) -> Result<(), Failure> {
+        configured(master, self.subject, |lss| {
+            let result = lss.store();
+            done.stored = stage_of(&result);
+            result.map_err(|error| self.subject.lss_failure(error))
+        })
+        .map(|_| ())
+    }
+
+    /// Follows the device to the new rate, and looks for it there.
+    fn follow(&self, master: &mut Master<'_>, begun: Mono) -> Result<(), Failure> {
+        wait(master, begun + DELAY + MARGIN)?;
+        set(master, self.new)?;
+        wait(master, begun + DELAY * 2 + MARGIN)?;
+        if is_there(master, self.subject, self.subject.node)? {
+            return Ok(());
+        }
+        let message = format!("it does not answer at {}", spoken_rate(self.new));
+        Err(self.subject.failure(Kind::NoAnswer, message))
+    }
+
+    /// The host back to the old rate; what became of the device, and what brings it back.
+    fn go_back(&self, master: &mut Master<'_>, failure: Failure, done: &mut Done) -> Failure {
+        let (subject, old, new) = (self.subject, spoken_rate(self.old), spoken_rate(self.new));
+        if master.bus().bit_rate() != Some(self.old)
+            && let Err(error) = set(master, self.old)
+        {
+            let message =
+                format!("{}; and this side could not be set back to {old}: {}", failure.message, error.message);
+            return Failure { message, ..failure }.hint(by_hand(master.bus().name(), Some(self.old)));
+        }
+        if !matches!(is_there(master, subject, subject.node), Ok(true)) {
+            let message = format!("{}; this side is back at {old}", failure.message);
+            let hint = format!("nothing was stored: power off and on brings the device back to {old}");
+            return Failure { message, ..failure }.hint(hint);
+        }
+        // It has stayed. What waits in it would come with the next reset.
+        let description = subject.model.as_ref().map(|model| &model.description);
+        let index = RateTable::of(description).index_of(self.old);
+        let undone = index.is_some_and(|index| {
+            let undo = configured(master, subject, |lss| {
+                lss.configure_bit_timing(0, index).map_err(|error| subject.lss_failure(error))
+            });
+            undo.is_ok()
+        });
+        if let (true, Some((_, _, stage))) = (undone, &mut done.rate) {
+            *stage = Stage::Undone;
+        }
+        let message = format!("{}: it answers at {old} still, and this side is back there", failure.message);
+        Failure { message, ..failure }.hint(format!("whether it has {new} at all, its manual tells"))
+    }
+
+    /// The way of devices that have to store before the new rate is in force.
+    fn by_storing(&self, master: &mut Master<'_>, done: &mut Done, tell: Tell<'_>) -> Result<(), Failure> {
+        let (subject, new) = (self.subject, spoken_rate(self.new));
+        tell(Note::Warning(format!(
+            "{} stores before it goes to {new}: there is no way back from here",
+            subject.name()
+        )));
+        by_objects(master, subject, self.way, true, done)?;
+        master.send(NmtCommand::ResetNode.frame(subject.node));
+        let settled = master.now() + MARGIN;
+        wait(master, settled)?;
+        set(master, self.new)?;
+        done.retimed = true;
+        if is_there(master, subject, self.job.id.or(subject.node))? {
+            return Ok(());
+        }
+        let back = match set(master, self.old) {
+            Ok(()) => format!("this side is back at {}", spoken_rate(self.old)),
+            Err(error) => format!("this side is at {new}: {}", error.message),
+        };
+        done.retimed = false;
+        let message = format!("stored and reset, and it does not answer at {new}; {back}");
+        let hint = format!("find its rate: cangauge bus detect {} --active", master.bus().name());
+        Err(subject.failure(Kind::NoAnswer, message).hint(hint))
+    }
 }
 
 /// Refuses where anybody else shows himself: he would be left alone at the old rate, and disturbed at the new one.
@@ -129,87 +249,6 @@ fn is_of(id: CanId, node: Option<NodeId>) -> bool {
     own || id == CanId::LSS_SLAVE
 }
 
-#[allow(clippy::too_many_arguments)]
-fn by_lss(
-    master: &mut Master<'_>,
-    job: &Job<'_>,
-    subject: &Subject,
-    way: &AssignEntry,
-    rate: PlannedRate,
-    rates: Rates,
-    done: &mut Done,
-    tell: Tell<'_>,
-) -> Result<(), Failure> {
-    let mut activated = None;
-    let stage = |done: &mut Done, stage: Stage| {
-        if let Some((_, _, place)) = &mut done.rate {
-            *place = stage;
-        }
-    };
-    let prepared = prepared(master, subject, way, tell, &mut |lss| {
-        stage(done, Stage::Sent);
-        let result = lss.configure_bit_timing(0, rate.index);
-        stage(done, stage_of(&result));
-        result.map_err(|error| subject.lss_failure(error))?;
-        lss.activate(DELAY_MS).map_err(|error| subject.lss_failure(error))?;
-        activated = Some(lss.master().now());
-        Ok(())
-    });
-    let (before, begun) = match (prepared, activated) {
-        (Ok(((), before)), Some(begun)) => (before, begun),
-        (Ok(_), None) => return Err(subject.failure(Kind::Unexpected, "it was not activated")),
-        (Err(failure), None) => return Err(failure),
-        (Err(failure), Some(_)) => return Err(go_back(master, subject, rates, failure, done)),
-    };
-    tell(Note::Step(format!("{} goes to {} in {DELAY_MS} ms, this side too", subject.name(), spoken_rate(rates.new))));
-    if let Err(failure) = follow(master, subject, rates, begun) {
-        return Err(go_back(master, subject, rates, failure, done));
-    }
-    done.retimed = true;
-    tell(Note::Step(format!("{} answers at {}", subject.name(), spoken_rate(rates.new))));
-    if job.id.is_some() {
-        return Ok(());
-    }
-    store(master, job, subject, before, done, tell)
-}
-
-/// Stores what has been proved. The device stays at its new rate in any case.
-fn store(
-    master: &mut Master<'_>,
-    job: &Job<'_>,
-    subject: &Subject,
-    before: Option<Before>,
-    done: &mut Done,
-    tell: Tell<'_>,
-) -> Result<(), Failure> {
-    let stored = if job.store {
-        configured(master, subject, |lss| {
-            done.stored = Stage::Sent;
-            let result = lss.store();
-            done.stored = stage_of(&result);
-            result.map_err(|error| subject.lss_failure(error))
-        })
-    } else {
-        Ok(())
-    };
-    put_back(master, before, tell);
-    stored
-}
-
-/// Follows the device to the new rate, and looks for it there.
-fn follow(master: &mut Master<'_>, subject: &Subject, rates: Rates, begun: Mono) -> Result<(), Failure> {
-    wait(master, begun + DELAY + MARGIN)?;
-    set(master, rates.new)?;
-    wait(master, begun + DELAY * 2 + MARGIN)?;
-    match is_there(master, subject, subject.node)? {
-        true => Ok(()),
-        false => {
-            let message = format!("it does not answer at {}", spoken_rate(rates.new));
-            Err(subject.failure(Kind::NoAnswer, message))
-        }
-    }
-}
-
 fn set(master: &mut Master<'_>, bit_rate: u32) -> Result<(), Failure> {
     let name = master.bus().name().to_owned();
     master.set_bit_rate(bit_rate).map_err(|error| not_set(error, &by_hand(&name, Some(bit_rate))))
@@ -237,7 +276,7 @@ fn is_there(master: &mut Master<'_>, subject: &Subject, node: Option<NodeId>) ->
                 Presence::Nameless => subject.address.is_none(),
                 Presence::Several(_) | Presence::Nobody(_) => false,
             }),
-            None => configured(master, subject, |_| Ok(())).map(|()| true),
+            None => configured(master, subject, |_| Ok(())).map(|_| true),
         };
         match found {
             Ok(true) => return Ok(true),
@@ -253,73 +292,3 @@ fn is_there(master: &mut Master<'_>, subject: &Subject, node: Option<NodeId>) ->
         wait(master, now + MARGIN)?;
     }
 }
-
-/// The host back to the old rate; what became of the device, and what brings it back.
-fn go_back(master: &mut Master<'_>, subject: &Subject, rates: Rates, failure: Failure, done: &mut Done) -> Failure {
-    let (old, new) = (spoken_rate(rates.old), spoken_rate(rates.new));
-    if master.bus().bit_rate() != Some(rates.old)
-        && let Err(error) = set(master, rates.old)
-    {
-        let message = format!("{}; and this side could not be set back to {old}: {}", failure.message, error.message);
-        return Failure { message, hint: Some(by_hand(master.bus().name(), Some(rates.old))), ..failure };
-    }
-    let found = is_there(master, subject, subject.node);
-    if !matches!(found, Ok(true)) {
-        let message = format!("{}; this side is back at {old}", failure.message);
-        let hint = format!("nothing was stored: power off and on brings the device back to {old}");
-        return Failure { message, ..failure }.hint(hint);
-    }
-    // It has stayed. What waits in it would come with the next reset.
-    let description = subject.model.as_ref().map(|model| &model.description);
-    let index = RateTable::of(description).index_of(rates.old);
-    let undone = index.is_some_and(|index| {
-        let undo = configured(master, subject, |lss| {
-            lss.configure_bit_timing(0, index).map_err(|error| subject.lss_failure(error))
-        });
-        undo.is_ok()
-    });
-    if let (true, Some((_, _, stage))) = (undone, &mut done.rate) {
-        *stage = Stage::Undone;
-    }
-    let message = format!("{}: it answers at {old} still, and this side is back there", failure.message);
-    Failure { message, ..failure }.hint(format!("whether it has {new} at all, its manual tells"))
-}
-
-/// The way of devices that have to store before the new rate is in force.
-fn by_storing(
-    master: &mut Master<'_>,
-    job: &Job<'_>,
-    subject: &Subject,
-    way: &AssignEntry,
-    rates: Rates,
-    done: &mut Done,
-    tell: Tell<'_>,
-) -> Result<(), Failure> {
-    let new = spoken_rate(rates.new);
-    if way.applies == Applies::Power || !job.store {
-        let why = if job.store { "it takes the new rate at power on" } else { "it takes the new rate after storing" };
-        return Err(subject
-            .failure(Kind::CheckFailed, format!("{why}, which --retime cannot wait for: nothing was changed"))
-            .hint("without --retime, and the interface by hand"));
-    }
-    let message = format!("{} stores before it goes to {new}: there is no way back from here", subject.name());
-    tell(Note::Warning(message));
-    by_objects(master, subject, way, true, done)?;
-    master.send(NmtCommand::ResetNode.frame(subject.node));
-    wait(master, master.now() + MARGIN)?;
-    set(master, rates.new)?;
-    done.retimed = true;
-    let node = job.id.or(subject.node);
-    if is_there(master, subject, node)? {
-        return Ok(());
-    }
-    let back = set(master, rates.old).err().map_or_else(
-        || format!("this side is back at {}", spoken_rate(rates.old)),
-        |error| format!("this side is at {new}: {}", error.message),
-    );
-    done.retimed = false;
-    let message = format!("stored and reset, and it does not answer at {new}; {back}");
-    let name = master.bus().name().to_owned();
-    Err(subject.failure(Kind::NoAnswer, message).hint(format!("find its rate: cangauge bus detect {name} --active")))
-}
-

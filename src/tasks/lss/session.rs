@@ -6,9 +6,10 @@ use crate::canopen::id::NodeId;
 use crate::canopen::lss::{LssAddress, Mode};
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::device::assign::{AssignEntry, AssignState};
-use crate::master::{Error, Lss, LssError, Master};
+use crate::master::{Lss, LssError, Master};
 use crate::tasks::nmt::states;
 use crate::tasks::{Failure, Kind};
+use std::collections::BTreeSet;
 
 /// How LSS reaches a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +20,16 @@ pub(super) enum Reach {
     Global,
 }
 
+/// What was done in configuration state.
+pub(super) struct Session<T> {
+    /// What came of it.
+    pub done: T,
+    /// Who has booted meanwhile: a device that had no node-ID boots when it leaves configuration state with one.
+    pub booted: BTreeSet<NodeId>,
+    /// The NMT state to be put back.
+    pub before: Option<Before>,
+}
+
 /// Does something in configuration state, and leaves it again however that ends.
 ///
 /// # Errors
@@ -27,7 +38,7 @@ pub(super) fn configured<T>(
     master: &mut Master<'_>,
     subject: &Subject,
     work: impl FnOnce(&mut Lss<'_, '_>) -> Result<T, Failure>,
-) -> Result<T, Failure> {
+) -> Result<Session<T>, Failure> {
     let mut lss = master.lss();
     let entered = match subject.reach {
         Reach::Global => lss.switch_global(Mode::Configuration),
@@ -41,12 +52,12 @@ pub(super) fn configured<T>(
         let message = format!("{}; the device may still be in configuration state", failure.message);
         Failure { message, ..failure }.hint("power off and on brings it out")
     })?;
-    Ok(done)
+    Ok(Session { done, booted: lss.boot_ups().keys().copied().collect(), before: None })
 }
 
 impl Subject {
     /// An error of LSS with the device's name.
-    pub fn lss_failure(&self, error: LssError) -> Failure {
+    pub(super) fn lss_failure(&self, error: LssError) -> Failure {
         match error {
             LssError::Master(error) => error.into(),
             error => {
@@ -119,34 +130,27 @@ pub(super) fn prepared<T>(
     way: &AssignEntry,
     tell: Tell<'_>,
     mut work: impl FnMut(&mut Lss<'_, '_>) -> Result<T, Failure>,
-) -> Result<(T, Option<Before>), Failure> {
+) -> Result<Session<T>, Failure> {
     let before = prepare(master, subject, way.state)?;
     let mut entered = false;
-    let mut tried = |master: &mut Master<'_>| {
-        configured(master, subject, |lss| {
-            entered = true;
-            work(lss)
-        })
-    };
-    let first = tried(master);
-    let silent = matches!(&first, Err(failure) if failure.kind == Kind::NoAnswer);
-    let (done, before) = if silent && way.retry_stopped && subject.alone && !entered {
+    let first = configured(master, subject, |lss| {
+        // To a global switch nobody answers.
+        entered = subject.reach != Reach::Global;
+        work(lss)
+    });
+    let silent = matches!(&first, Err(failure) if failure.kind == Kind::NoAnswer) && !entered;
+    let (done, before) = if silent && way.retry_stopped && subject.alone {
         tell(Note::Step(format!("{}: silent; once more in STOPPED", subject.name())));
         let stopped = prepare(master, subject, Some(AssignState::Stopped))?;
-        (configured(master, subject, &mut work), before.or(stopped))
+        (configured(master, subject, work), before.or(stopped))
     } else {
         (first, before)
     };
     match done {
-        Ok(done) => Ok((done, before)),
+        Ok(session) => Ok(Session { before, ..session }),
         Err(failure) => {
             put_back(master, before, tell);
             Err(failure)
         }
     }
-}
-
-/// Whether it was the user who ended it.
-pub(super) fn is_interrupted(error: &LssError) -> bool {
-    matches!(error, LssError::Master(Error::Interrupted))
 }

@@ -46,14 +46,15 @@ pub fn inquire(
 ) -> Result<Inquired, Failure> {
     let subject = find(master, target, named, false, tell)?;
     let way = way(&subject, Via::Lss, tell)?;
-    let (told, before) = prepared(master, &subject, &way, tell, &mut |lss| {
+    let session = prepared(master, &subject, &way, tell, |lss| {
         let failed = |error| subject.lss_failure(error);
         let address = unless_silent(lss.inquire_address()).map_err(failed)?;
         let node = unless_silent(lss.inquire_node_id()).map_err(failed)?;
         let node = node.and_then(|told| told.answers.first().copied());
         Ok(Inquired { address, node })
     })?;
-    put_back(master, before, tell);
+    put_back(master, session.before, tell);
+    let told = session.done;
     if told.address.is_none() && told.node.is_none() {
         let message = "it does not know the LSS inquiries (5Ah to 5Eh)";
         return Err(subject.failure(Kind::NoAnswer, message).hint("its identity by SDO: cangauge scan"));
@@ -118,9 +119,7 @@ fn service(
 ) -> Result<(), Failure> {
     let subject = find(master, target, named, force, tell)?;
     let way = way(&subject, Via::Lss, tell)?;
-    let ((), before) =
-        prepared(master, &subject, &way, tell, &mut |lss| work(lss).map_err(|error| subject.lss_failure(error)))?;
-    put_back(master, before, tell);
+    let session = prepared(master, &subject, &way, tell, |lss| work(lss).map_err(|error| subject.lss_failure(error)))?;
+    put_back(master, session.before, tell);
     Ok(())
 }
-

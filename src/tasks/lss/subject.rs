@@ -38,7 +38,7 @@ pub(super) struct Subject {
 
 impl Subject {
     /// What it is called: `node 5`, `0x47:0x1:0x10007:10001`.
-    pub fn name(&self) -> String {
+    pub(super) fn name(&self) -> String {
         match (self.node, self.address) {
             (Some(node), _) => format!("node {node}"),
             (None, Some(address)) => address.to_string(),
@@ -47,7 +47,7 @@ impl Subject {
     }
 
     /// What it is, for people: `node 127 is Honeywell DPS, serial 20002`.
-    pub fn title(&self) -> String {
+    pub(super) fn title(&self) -> String {
         match (&self.model, self.address) {
             (Some(model), Some(address)) => format!("{}, serial {}", model.description.title, address.serial),
             (Some(model), None) => model.description.title.clone(),
@@ -57,7 +57,7 @@ impl Subject {
     }
 
     /// How to name it in the next command: its node-ID, else its identity.
-    pub fn argument(&self) -> String {
+    pub(super) fn argument(&self) -> String {
         match (self.node.filter(|_| self.alone), self.address) {
             (Some(node), _) => node.to_string(),
             (None, Some(address)) => address.to_string(),
@@ -66,7 +66,7 @@ impl Subject {
     }
 
     /// A failure of this device.
-    pub fn failure(&self, kind: Kind, message: impl fmt::Display) -> Failure {
+    pub(super) fn failure(&self, kind: Kind, message: impl fmt::Display) -> Failure {
         Failure { node: self.node, ..Failure::new(kind, format!("{}: {message}", self.name())) }
     }
 }
@@ -85,7 +85,7 @@ impl Knowledge<'_> {
     ///
     /// # Errors
     /// What stops everything.
-    pub fn model(&self, master: &mut Master<'_>, subject: &Subject) -> Result<Option<Arc<Model>>, Failure> {
+    pub(super) fn model(&self, master: &mut Master<'_>, subject: &Subject) -> Result<Option<Arc<Model>>, Failure> {
         if let Some(given) = self.given {
             return Ok(Some(Arc::clone(given)));
         }
@@ -159,7 +159,7 @@ fn addressed(
         told = node.and_then(|node| node.answers.first().copied());
         Ok(())
     }) {
-        Ok(()) => None,
+        Ok(_) => None,
         Err(failure) if failure.kind == Kind::NoAnswer => Some(failure),
         Err(failure) => return Err(failure),
     };

@@ -15,8 +15,8 @@ pub enum Rate {
     Bits(u32),
     /// The device finds it out.
     Auto,
-    /// What stands at this index in the device's own table, whatever that is.
-    Index(u8),
+    /// What stands at this index in the device's own table, and what the user says that is.
+    Index(u8, Option<u32>),
 }
 
 /// A bit rate as the device takes it.
@@ -43,14 +43,16 @@ pub(super) fn way(subject: &Subject, via: Via, tell: Tell<'_>) -> Result<AssignE
             let entry = description.and_then(|description| description.assign_by(AssignWay::Objects)).cloned();
             Some(entry.ok_or_else(|| {
                 let message = "no source at hand says which objects of this device take node-ID and bit rate";
-                subject.failure(Kind::CheckFailed, format!("{message}: nothing was changed"))
+                subject
+                    .failure(Kind::CheckFailed, format!("{message}: nothing was changed"))
                     .hint("by LSS: --via lss; with another description: --device NAME")
             })?)
         }
     };
     let entry = entry.unwrap_or_else(AssignEntry::lss);
     if entry.way == AssignWay::Objects && (subject.node.is_none() || !subject.alone) {
-        let message = "its objects cannot be reached: SDO under its node-ID does not reach it alone; nothing was changed";
+        let message =
+            "its objects cannot be reached: SDO under its node-ID does not reach it alone; nothing was changed";
         return Err(subject.failure(Kind::CheckFailed, message).hint("connect it alone, or by LSS: --via lss"));
     }
     if entry.unverified {
@@ -72,11 +74,7 @@ pub(super) fn way(subject: &Subject, via: Via, tell: Tell<'_>) -> Result<AssignE
 ///
 /// # Errors
 /// [`Kind::Usage`] with the list of what the device offers.
-pub(super) fn plan_rate(
-    description: Option<&Description>,
-    rate: Rate,
-    way: AssignWay,
-) -> Result<PlannedRate, Failure> {
+pub(super) fn plan_rate(description: Option<&Description>, rate: Rate, way: AssignWay) -> Result<PlannedRate, Failure> {
     let table = RateTable::of(description);
     let title = description.map_or("CiA 305", |description| &description.title);
     let refuse = |what: String| {
@@ -87,16 +85,15 @@ pub(super) fn plan_rate(
         Failure::new(Kind::Usage, format!("{title} has no bit rate {what}: nothing was changed"))
             .hint(format!("{source} has {list}; another by its index: --table-index N"))
     };
-    if way == AssignWay::Objects && table.source == RateSource::Standard && !matches!(rate, Rate::Index(_)) {
+    if way == AssignWay::Objects && table.source == RateSource::Standard && !matches!(rate, Rate::Index(..)) {
         let message = format!("the codes that {title} has for bit rates are not known: nothing was changed");
         return Err(Failure::new(Kind::Usage, message).hint("look it up in its manual: --table-index N"));
     }
     match rate {
-        Rate::Index(index) => Ok(PlannedRate { index, bits: table.rate_of(index) }),
-        Rate::Auto => table
-            .auto()
-            .map(|index| PlannedRate { index, bits: None })
-            .ok_or_else(|| refuse("auto".to_owned())),
+        Rate::Index(index, bits) => Ok(PlannedRate { index, bits: bits.or_else(|| table.rate_of(index)) }),
+        Rate::Auto => {
+            table.auto().map(|index| PlannedRate { index, bits: None }).ok_or_else(|| refuse("auto".to_owned()))
+        }
         Rate::Bits(bits) => table
             .index_of(bits)
             .map(|index| PlannedRate { index, bits: Some(bits) })
