@@ -335,9 +335,39 @@ pub struct SimEntry {
     pub overload_percent: f64,
     /// The emergency of an overload, if it raises one.
     pub overload_emcy: Option<u16>,
+    /// What its LSS slave knows.
+    #[serde(default)]
+    pub lss: SimLss,
     /// The measured quantities, one per signal.
     #[serde(default, rename = "channel")]
     pub channels: Vec<SimChannel>,
+}
+
+/// What the LSS slave of a simulated device knows.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimLss {
+    /// The services, by the command specifier of the request; all of CiA 305 if there are none.
+    #[serde(default)]
+    pub services: Vec<u8>,
+    /// The NMT states in which it listens to LSS; all if there are none.
+    #[serde(default)]
+    pub states: Vec<SimState>,
+    /// Whether the answer to the selective switch tells the mode (44h 01h) instead of nothing.
+    #[serde(default)]
+    pub tells_mode: bool,
+}
+
+/// An NMT state of a simulated device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SimState {
+    /// STOPPED.
+    Stopped,
+    /// PRE-OPERATIONAL.
+    PreOperational,
+    /// OPERATIONAL.
+    Operational,
 }
 
 /// How a simulated quantity moves: a slow sine with noise.

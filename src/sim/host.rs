@@ -25,8 +25,11 @@ pub fn run(
     until: Option<Mono>,
 ) -> Result<Vec<Box<dyn Station>>, BusError> {
     let mut host = Host { places: stations.into_iter().map(|station| (station, Outbox::default())).collect() };
-    let now = bus.now().mono;
-    host.places.iter_mut().for_each(|(station, out)| station.power_on(now, out));
+    let (now, bit_rate) = (bus.now().mono, bus.bit_rate());
+    for (station, out) in &mut host.places {
+        bit_rate.into_iter().for_each(|bit_rate| station.told_bit_rate(bit_rate));
+        station.power_on(now, out);
+    }
     loop {
         let now = bus.now().mono;
         host.wake(now);

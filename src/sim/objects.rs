@@ -68,6 +68,8 @@ pub(super) enum Group {
     All,
     Communication,
     Application,
+    /// What only the manufacturer knows; none of the entries with a value.
+    Other,
 }
 
 impl Group {
@@ -77,6 +79,7 @@ impl Group {
             1 => Group::All,
             2 => Group::Communication,
             3 => Group::Application,
+            4..=0x7f => Group::Other,
             _ => return None,
         })
     }
@@ -193,11 +196,6 @@ impl Objects {
             self.saved.insert(object, bytes.clone());
             self.values.insert(object, bytes);
         }
-    }
-
-    /// What is saved of an entry, if it differs from what was delivered.
-    pub(super) fn saved(&self, object: ObjectId) -> Option<&[u8]> {
-        self.saved.get(&object).map(Vec::as_slice)
     }
 
     /// Whether the entry exists and can be written.
@@ -323,6 +321,11 @@ impl Spec {
     /// Bytes of a person's number in the entry's type.
     pub(super) fn encode(&self, value: &Scalar, node: NodeId) -> Result<Vec<u8>, String> {
         value.encode(self.data_type, node).map_err(|error| error.to_string())
+    }
+
+    /// Whether it is written with the signature "set" behind the value.
+    pub(super) fn takes_set(&self) -> bool {
+        self.signature == Some(Signature::Set)
     }
 
     fn check_limits(&self, bytes: &[u8]) -> Result<(), Abort> {

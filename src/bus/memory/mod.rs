@@ -5,12 +5,12 @@ mod clock;
 mod station;
 
 use super::time::{Mono, Stamp};
-use super::{Bus, BusError, Event, Filters, Received, TimestampSource};
+use super::{Bus, BusError, Event, Filters, Mode, Received, TimestampSource};
 use crate::canopen::frame::Frame;
 use crate::canopen::wire_length::{INTERMISSION, bit_time, frame_bits, priority};
 use clock::TimeLine;
 pub use clock::{Clock, Sleeper, Uninterrupted, VIRTUAL_EPOCH};
-pub use station::{Outbox, Station};
+pub use station::{Outbox, Station, Tuning};
 use std::any::Any;
 use std::collections::{BTreeSet, VecDeque};
 
@@ -29,6 +29,8 @@ pub const BIT_RATE: u32 = 250_000;
 pub struct MemoryBus {
     name: String,
     bit_rate: u32,
+    /// Whether the program may change the bit rate.
+    can_retime: bool,
     queue_length: usize,
     time_line: TimeLine,
     /// How far the bus has been played.
@@ -72,6 +74,7 @@ impl MemoryBus {
         MemoryBus {
             name: "sim".to_owned(),
             bit_rate: BIT_RATE,
+            can_retime: true,
             queue_length: QUEUE_LENGTH,
             time_line: TimeLine::open(clock),
             now: Mono::START,
@@ -91,6 +94,12 @@ impl MemoryBus {
         self
     }
 
+    /// The same bus, whose bit rate the program may or may not change.
+    pub fn with_retiming(mut self, allowed: bool) -> MemoryBus {
+        self.can_retime = allowed;
+        self
+    }
+
     /// The same bus with another length of the program's transmit queue.
     pub fn with_queue_length(mut self, length: usize) -> MemoryBus {
         self.queue_length = length;
@@ -106,8 +115,17 @@ impl MemoryBus {
     /// Connects a station and switches its power on.
     pub fn attach(&mut self, station: impl Station) {
         let mut place = Place { station: Box::new(station), out: Outbox::default() };
+        place.station.told_bit_rate(self.bit_rate);
         place.station.power_on(self.now, &mut place.out);
         self.places.push(place);
+    }
+
+    /// Switches the power of every station off and on.
+    pub fn power_cycle(&mut self) {
+        for place in &mut self.places {
+            place.out.clear();
+            place.station.power_on(self.now, &mut place.out);
+        }
     }
 
     /// The stations of one kind, in the order in which they were attached.
@@ -247,6 +265,20 @@ impl Bus for MemoryBus {
         // What was complete before now was received under the old filters.
         self.catch_up();
         self.filters = filters.clone();
+        Ok(())
+    }
+
+    fn can_set_bit_rate(&self) -> Result<(), BusError> {
+        let what = || format!("change the bit rate of {}", self.name);
+        if self.can_retime { Ok(()) } else { Err(BusError::Permission(what())) }
+    }
+
+    fn set_bit_rate(&mut self, bit_rate: u32, _mode: Mode) -> Result<(), BusError> {
+        self.can_set_bit_rate()?;
+        self.catch_up();
+        self.queue.clear();
+        self.bit_rate = bit_rate.max(1);
+        self.places.iter_mut().for_each(|place| place.station.told_bit_rate(bit_rate));
         Ok(())
     }
 
