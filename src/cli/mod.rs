@@ -8,6 +8,7 @@ mod file;
 mod log;
 mod nmt;
 mod open;
+pub mod parse;
 mod read;
 mod scan;
 mod sdo;
@@ -117,15 +118,24 @@ pub(crate) enum When {
     Never,
 }
 
-/// What to do. The help of each stands with its arguments.
+/// What to do. The first line of each command's own help, which is made up only when it is chosen, stands
+/// here again.
 #[derive(Debug, Subcommand)]
+#[command(defer = true)]
 pub(crate) enum Command {
+    /// List every node that answers, with its state, identity and recognised device
     Scan(scan::Scan),
+    /// Read measured values now, scaled, with unit and status
     Read(read::Read),
+    /// Send NMT commands and tell states
     Nmt(nmt::Nmt),
+    /// Read and write objects of the object dictionary
     Sdo(sdo::Sdo),
+    /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
+    /// Print the completions for a shell
     Completions(completions::Completions),
 }
 
