@@ -2,6 +2,7 @@
 //!
 //! Unknown keys are errors, so that a typing error in a description is never silently ignored.
 
+use super::assign::AssignEntry;
 use crate::canopen::id::{NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
@@ -39,6 +40,9 @@ pub struct Description {
     pub bit_rates: BTreeMap<String, u32>,
     /// Index that stands for automatic bit rate detection, if the device has one.
     pub auto_bit_rate: Option<u8>,
+    /// The ways to a new node-ID and bit rate, the one to take first.
+    #[serde(default)]
+    pub assign: Vec<AssignEntry>,
     /// Which object decides who starts it after power on.
     pub startup: Option<Startup>,
     /// What it measures.
@@ -67,7 +71,8 @@ pub struct Startup {
     pub auto: u32,
 }
 
-/// What a device answers that tells its kind; everything given must agree.
+/// What a device answers that tells its kind; everything given must agree. Where nothing is given nothing is
+/// recognised: such a description is taken only when it is named.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identify {
@@ -82,6 +87,15 @@ pub struct Identify {
     /// Objects to read where all of the above is not proof enough, and what they must hold.
     #[serde(default)]
     pub confirm: BTreeMap<ObjectId, Scalar>,
+}
+
+impl Identify {
+    /// Whether nothing is given: then nothing is recognised.
+    pub fn is_empty(&self) -> bool {
+        let Identify { device_type, vendor_id, product_code, device_name, confirm } = self;
+        let numbers = [device_type, vendor_id, product_code];
+        numbers.iter().all(|number| number.is_none()) && device_name.is_none() && confirm.is_empty()
+    }
 }
 
 /// The settings of a new device.
@@ -394,7 +408,7 @@ pub struct SimChannel {
     pub field: Option<[f64; 2]>,
 }
 
-fn from_text<'de, D, T>(deserializer: D) -> Result<T, D::Error>
+pub(super) fn from_text<'de, D, T>(deserializer: D) -> Result<T, D::Error>
 where
     D: serde::Deserializer<'de>,
     T: std::str::FromStr,
