@@ -64,11 +64,11 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
             [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
             [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
-            [CompletionResult]::new('--passive', '--passive', [CompletionResultType]::ParameterName, 'Send nothing: list who shows itself within 3 s')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--passive', '--passive', [CompletionResultType]::ParameterName, 'Send nothing: list who shows itself within 3 s')
             [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
@@ -76,7 +76,6 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;read' {
-            [CompletionResult]::new('--in', '--in', [CompletionResultType]::ParameterName, 'Convert to this unit: bar, mbar, kPa, MPa, psi, degC, degF, K')
             [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
@@ -89,6 +88,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
             [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
             [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('--in', '--in', [CompletionResultType]::ParameterName, 'Convert to this unit: bar, mbar, kPa, MPa, psi, degC, degF, K')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
@@ -465,15 +465,6 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;log' {
-            [CompletionResult]::new('-d', '-d', [CompletionResultType]::ParameterName, 'End after this time')
-            [CompletionResult]::new('--duration', '--duration', [CompletionResultType]::ParameterName, 'End after this time')
-            [CompletionResult]::new('-n', '-n', [CompletionResultType]::ParameterName, 'End after this many rows')
-            [CompletionResult]::new('--count', '--count', [CompletionResultType]::ParameterName, 'End after this many rows')
-            [CompletionResult]::new('--sync', '--sync', [CompletionResultType]::ParameterName, 'Send SYNC at this interval')
-            [CompletionResult]::new('--poll', '--poll', [CompletionResultType]::ParameterName, 'Read by SDO at this interval')
-            [CompletionResult]::new('-o', '-o', [CompletionResultType]::ParameterName, 'Write to a file instead of stdout')
-            [CompletionResult]::new('--output', '--output', [CompletionResultType]::ParameterName, 'Write to a file instead of stdout')
-            [CompletionResult]::new('--summary', '--summary', [CompletionResultType]::ParameterName, 'Write the summary as JSON to a file; - for stdout')
             [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
@@ -486,13 +477,22 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
             [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
             [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
-            [CompletionResult]::new('--passive', '--passive', [CompletionResultType]::ParameterName, 'Send nothing at all')
-            [CompletionResult]::new('--no-nmt', '--no-nmt', [CompletionResultType]::ParameterName, 'Leave the nodes'' NMT states alone')
-            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, 'Overwrite files that exist')
+            [CompletionResult]::new('-d', '-d', [CompletionResultType]::ParameterName, 'End after this time')
+            [CompletionResult]::new('--duration', '--duration', [CompletionResultType]::ParameterName, 'End after this time')
+            [CompletionResult]::new('-n', '-n', [CompletionResultType]::ParameterName, 'End after this many rows')
+            [CompletionResult]::new('--count', '--count', [CompletionResultType]::ParameterName, 'End after this many rows')
+            [CompletionResult]::new('--sync', '--sync', [CompletionResultType]::ParameterName, 'Send SYNC at this interval')
+            [CompletionResult]::new('--poll', '--poll', [CompletionResultType]::ParameterName, 'Read by SDO at this interval')
+            [CompletionResult]::new('-o', '-o', [CompletionResultType]::ParameterName, 'Write to a file instead of stdout')
+            [CompletionResult]::new('--output', '--output', [CompletionResultType]::ParameterName, 'Write to a file instead of stdout')
+            [CompletionResult]::new('--summary', '--summary', [CompletionResultType]::ParameterName, 'Write the summary as JSON to a file; - for stdout')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--passive', '--passive', [CompletionResultType]::ParameterName, 'Send nothing at all')
+            [CompletionResult]::new('--no-nmt', '--no-nmt', [CompletionResultType]::ParameterName, 'Leave the nodes'' NMT states alone')
+            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, 'Overwrite files that exist')
             [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
@@ -563,49 +563,9 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;help;nmt' {
-            [CompletionResult]::new('start', 'start', [CompletionResultType]::ParameterValue, 'To OPERATIONAL: the nodes send their TPDOs')
-            [CompletionResult]::new('stop', 'stop', [CompletionResultType]::ParameterValue, 'To STOPPED: only NMT, heartbeat and LSS')
-            [CompletionResult]::new('preop', 'preop', [CompletionResultType]::ParameterValue, 'To PRE-OPERATIONAL: everything but PDOs')
-            [CompletionResult]::new('reset', 'reset', [CompletionResultType]::ParameterValue, 'Restart the application (reset node)')
-            [CompletionResult]::new('reset-comm', 'reset-comm', [CompletionResultType]::ParameterValue, 'Restart the communication')
-            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it')
-            [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Follow heartbeats, boot-ups and losses until Ctrl-C')
-            [CompletionResult]::new('startup', 'startup', [CompletionResultType]::ParameterValue, 'Tell or set who starts a device after power on: wait for the master, or auto (by itself)')
-            break
-        }
-        'cangauge;help;nmt;start' {
-            break
-        }
-        'cangauge;help;nmt;stop' {
-            break
-        }
-        'cangauge;help;nmt;preop' {
-            break
-        }
-        'cangauge;help;nmt;reset' {
-            break
-        }
-        'cangauge;help;nmt;reset-comm' {
-            break
-        }
-        'cangauge;help;nmt;state' {
-            break
-        }
-        'cangauge;help;nmt;watch' {
-            break
-        }
-        'cangauge;help;nmt;startup' {
             break
         }
         'cangauge;help;sdo' {
-            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects: the value as it is, never scaled; several print "OBJECT VALUE" lines')
-            [CompletionResult]::new('write', 'write', [CompletionResultType]::ParameterValue, 'Write an object, or several OBJECT=VALUE')
-            break
-        }
-        'cangauge;help;sdo;read' {
-            break
-        }
-        'cangauge;help;sdo;write' {
             break
         }
         'cangauge;help;log' {

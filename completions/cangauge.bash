@@ -64,36 +64,6 @@ _cangauge() {
             cangauge__subcmd__help,sim)
                 cmd="cangauge__subcmd__help__subcmd__sim"
                 ;;
-            cangauge__subcmd__help__subcmd__nmt,preop)
-                cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__preop"
-                ;;
-            cangauge__subcmd__help__subcmd__nmt,reset)
-                cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__reset"
-                ;;
-            cangauge__subcmd__help__subcmd__nmt,reset-comm)
-                cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__reset__subcmd__comm"
-                ;;
-            cangauge__subcmd__help__subcmd__nmt,start)
-                cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__start"
-                ;;
-            cangauge__subcmd__help__subcmd__nmt,startup)
-                cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__startup"
-                ;;
-            cangauge__subcmd__help__subcmd__nmt,state)
-                cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__state"
-                ;;
-            cangauge__subcmd__help__subcmd__nmt,stop)
-                cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__stop"
-                ;;
-            cangauge__subcmd__help__subcmd__nmt,watch)
-                cmd="cangauge__subcmd__help__subcmd__nmt__subcmd__watch"
-                ;;
-            cangauge__subcmd__help__subcmd__sdo,read)
-                cmd="cangauge__subcmd__help__subcmd__sdo__subcmd__read"
-                ;;
-            cangauge__subcmd__help__subcmd__sdo,write)
-                cmd="cangauge__subcmd__help__subcmd__sdo__subcmd__write"
-                ;;
             cangauge__subcmd__nmt,help)
                 cmd="cangauge__subcmd__nmt__subcmd__help"
                 ;;
@@ -353,120 +323,8 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__help__subcmd__nmt)
-            opts="start stop preop reset reset-comm state watch startup"
+            opts=""
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
-                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-                return 0
-            fi
-            case "${prev}" in
-                *)
-                    COMPREPLY=()
-                    ;;
-            esac
-            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-            return 0
-            ;;
-        cangauge__subcmd__help__subcmd__nmt__subcmd__preop)
-            opts=""
-            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
-                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-                return 0
-            fi
-            case "${prev}" in
-                *)
-                    COMPREPLY=()
-                    ;;
-            esac
-            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-            return 0
-            ;;
-        cangauge__subcmd__help__subcmd__nmt__subcmd__reset)
-            opts=""
-            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
-                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-                return 0
-            fi
-            case "${prev}" in
-                *)
-                    COMPREPLY=()
-                    ;;
-            esac
-            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-            return 0
-            ;;
-        cangauge__subcmd__help__subcmd__nmt__subcmd__reset__subcmd__comm)
-            opts=""
-            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
-                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-                return 0
-            fi
-            case "${prev}" in
-                *)
-                    COMPREPLY=()
-                    ;;
-            esac
-            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-            return 0
-            ;;
-        cangauge__subcmd__help__subcmd__nmt__subcmd__start)
-            opts=""
-            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
-                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-                return 0
-            fi
-            case "${prev}" in
-                *)
-                    COMPREPLY=()
-                    ;;
-            esac
-            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-            return 0
-            ;;
-        cangauge__subcmd__help__subcmd__nmt__subcmd__startup)
-            opts=""
-            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
-                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-                return 0
-            fi
-            case "${prev}" in
-                *)
-                    COMPREPLY=()
-                    ;;
-            esac
-            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-            return 0
-            ;;
-        cangauge__subcmd__help__subcmd__nmt__subcmd__state)
-            opts=""
-            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
-                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-                return 0
-            fi
-            case "${prev}" in
-                *)
-                    COMPREPLY=()
-                    ;;
-            esac
-            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-            return 0
-            ;;
-        cangauge__subcmd__help__subcmd__nmt__subcmd__stop)
-            opts=""
-            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
-                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-                return 0
-            fi
-            case "${prev}" in
-                *)
-                    COMPREPLY=()
-                    ;;
-            esac
-            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-            return 0
-            ;;
-        cangauge__subcmd__help__subcmd__nmt__subcmd__watch)
-            opts=""
-            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
             fi
@@ -507,36 +365,8 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__help__subcmd__sdo)
-            opts="read write"
+            opts=""
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
-                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-                return 0
-            fi
-            case "${prev}" in
-                *)
-                    COMPREPLY=()
-                    ;;
-            esac
-            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-            return 0
-            ;;
-        cangauge__subcmd__help__subcmd__sdo__subcmd__read)
-            opts=""
-            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
-                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-                return 0
-            fi
-            case "${prev}" in
-                *)
-                    COMPREPLY=()
-                    ;;
-            esac
-            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
-            return 0
-            ;;
-        cangauge__subcmd__help__subcmd__sdo__subcmd__write)
-            opts=""
-            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
             fi
@@ -563,48 +393,12 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__log)
-            opts="-d -n -o -b -t -f -q -v -h -V --duration --count --sync --poll --passive --no-nmt --output --force --summary --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -d -n -o -h -V --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --duration --count --sync --poll --passive --no-nmt --output --force --summary --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
             fi
             case "${prev}" in
-                --duration)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
-                -d)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
-                --count)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
-                -n)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
-                --sync)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
-                --poll)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
-                --output)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
-                -o)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
-                --summary)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
                 --bus)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
@@ -651,6 +445,42 @@ _cangauge() {
                     ;;
                 --color)
                     COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
+                    return 0
+                    ;;
+                --duration)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -d)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --count)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -n)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sync)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --poll)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --output)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -o)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --summary)
+                    COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
                 *)
@@ -1367,16 +1197,12 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__read)
-            opts="-b -t -f -q -v -h -V --in --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --in --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
             fi
             case "${prev}" in
-                --in)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
                 --bus)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
@@ -1425,6 +1251,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
                     return 0
                     ;;
+                --in)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 *)
                     COMPREPLY=()
                     ;;
@@ -1433,7 +1263,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__scan)
-            opts="-b -t -f -q -v -h -V --passive --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --passive --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0

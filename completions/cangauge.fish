@@ -66,12 +66,11 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l passive -d 'Send nothing: list who shows itself within 3 s'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s q -l quiet -d 'Say less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l passive -d 'Send nothing: list who shows itself within 3 s'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l in -d 'Convert to this unit: bar, mbar, kPa, MPa, psi, degC, degF, K' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
@@ -87,6 +86,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l in -d 'Convert to this unit: bar, mbar, kPa, MPa, psi, degC, degF, K' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s q -l quiet -d 'Say less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s h -l help -d 'Print help (see more with \'--help\')'
@@ -371,12 +371,6 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from help" -f -a "read" -d 'Read objects: the value as it is, never scaled; several print "OBJECT VALUE" lines'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from help" -f -a "write" -d 'Write an object, or several OBJECT=VALUE'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s d -l duration -d 'End after this time' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s n -l count -d 'End after this many rows' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sync -d 'Send SYNC at this interval' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l poll -d 'Read by SDO at this interval' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s o -l output -d 'Write to a file instead of stdout' -r -F
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l summary -d 'Write the summary as JSON to a file; - for stdout' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
@@ -392,11 +386,17 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s d -l duration -d 'End after this time' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s n -l count -d 'End after this many rows' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sync -d 'Send SYNC at this interval' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l poll -d 'Read by SDO at this interval' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s o -l output -d 'Write to a file instead of stdout' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l summary -d 'Write the summary as JSON to a file; - for stdout' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l passive -d 'Send nothing at all'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Leave the nodes\' NMT states alone'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite files that exist'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s q -l quiet -d 'Say less on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
@@ -445,13 +445,3 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log sim completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log sim completions help" -f -a "completions" -d 'Print the completions for a shell'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log sim completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "start" -d 'To OPERATIONAL: the nodes send their TPDOs'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "stop" -d 'To STOPPED: only NMT, heartbeat and LSS'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "preop" -d 'To PRE-OPERATIONAL: everything but PDOs'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "reset" -d 'Restart the application (reset node)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "reset-comm" -d 'Restart the communication'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "state" -d 'Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "watch" -d 'Follow heartbeats, boot-ups and losses until Ctrl-C'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "startup" -d 'Tell or set who starts a device after power on: wait for the master, or auto (by itself)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from sdo" -f -a "read" -d 'Read objects: the value as it is, never scaled; several print "OBJECT VALUE" lines'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from sdo" -f -a "write" -d 'Write an object, or several OBJECT=VALUE'

@@ -10,7 +10,7 @@ use crate::canopen::lss::{LssAddress, LssRange};
 use crate::device::catalog::Model;
 use crate::master::Master;
 use crate::measure::survey::Overrides;
-use crate::output::{json_lss, table};
+use crate::output::{csv, json_lss, table};
 use crate::tasks::lss::{Named, Note, Slave, Target, activate, identify, inquire, scan, store};
 use crate::tasks::{Failure, Kind};
 use clap::{Args, Subcommand};
@@ -222,10 +222,8 @@ fn print(found: &[Slave], format: Format) -> io::Result<()> {
     match format {
         Format::Json => found.iter().try_for_each(|slave| json_lss::slave(&mut out, slave))?,
         Format::Csv => {
-            let mut csv = csv::Writer::from_writer(&mut out);
-            csv.write_record(HEAD.map(str::to_lowercase))?;
-            found.iter().try_for_each(|slave| csv.write_record(row(slave, "")))?;
-            csv.flush()?;
+            let head = ["node", "device", "vendor", "product", "revision", "serial"];
+            csv::write(&mut out, &head, found.iter().map(|slave| row(slave, "")))?;
         }
         Format::Text if found.is_empty() => {}
         Format::Text => {

@@ -10,6 +10,7 @@ mod log;
 mod lss;
 mod nmt;
 mod open;
+pub mod parse;
 mod read;
 mod scan;
 mod sdo;
@@ -120,17 +121,28 @@ pub(crate) enum When {
     Never,
 }
 
-/// What to do. The help of each stands with its arguments.
+/// What to do. The first line of each command's own help, which is made up only when it is chosen, stands
+/// here again.
 #[derive(Debug, Subcommand)]
+#[command(defer = true)]
 pub(crate) enum Command {
+    /// List every node that answers, with its state, identity and recognised device
     Scan(scan::Scan),
+    /// Read measured values now, scaled, with unit and status
     Read(read::Read),
+    /// Send NMT commands and tell states
     Nmt(nmt::Nmt),
+    /// Read and write objects of the object dictionary
     Sdo(sdo::Sdo),
+    /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device's own)
     Lss(lss::LssCommand),
+    /// List CAN interfaces, switch them on and off, find the bit rate of a bus
     Bus(bus::BusCommand),
+    /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
+    /// Print the completions for a shell
     Completions(completions::Completions),
 }
 

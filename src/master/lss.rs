@@ -10,10 +10,10 @@ mod scan;
 pub use error::LssError;
 
 use super::{Error, Happening, Master};
-use crate::bus::{BusError, Fault, Mono, Received, Stamp};
+use crate::bus::{BusError, Fault, Filters, Mono, Received, Stamp};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
-use crate::canopen::lss::{Answer, Exchange, ExchangeError, LssAddress, LssRange, Mode, Part, Request};
+use crate::canopen::lss::{Answer, Exchange, ExchangeError, LssAddress, LssRange, Mode, Part, Request, Service};
 use crate::canopen::nmt::Life;
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -102,6 +102,17 @@ impl<'bus> Lss<'_, 'bus> {
         self.master
     }
 
+    /// Wants nothing but LSS and signs of life: on a bus full of other traffic all of that would have to be read
+    /// and thrown away, and a fastscan waits for little else than the clock. SDO answers are wanted no longer.
+    ///
+    /// # Errors
+    /// The bus's own.
+    pub fn listen(&mut self) -> Result<(), LssError> {
+        let lives = NodeId::all().map(CanId::heartbeat);
+        let ids = [CanId::LSS_SLAVE, CanId::LSS_MASTER].into_iter().chain(lives).collect();
+        Ok(self.master.listen(&Filters::Only(ids))?)
+    }
+
     /// Whether a slave may be in configuration state.
     pub fn is_configuring(&self) -> bool {
         self.is_configuring
@@ -138,7 +149,8 @@ impl<'bus> Lss<'_, 'bus> {
     }
 
     /// 40h to 43h: the slave with this address to configuration state. Whoever is in that state already stays
-    /// there: see [`Lss::switch_global`].
+    /// there and says nothing: see [`Lss::switch_global`]. So everybody is sent to waiting state before the
+    /// address is repeated.
     ///
     /// # Errors
     /// No slave has the address, or more than one.
@@ -297,7 +309,7 @@ impl<'bus> Lss<'_, 'bus> {
     /// The longest wait for one answer.
     fn patience(&self, exchange: &Exchange) -> Duration {
         let timeout = self.master.timing.timeout;
-        if exchange.service() == crate::canopen::lss::Service::Store { timeout.max(STORE_TIME) } else { timeout }
+        if exchange.service() == Service::Store { timeout.max(STORE_TIME) } else { timeout }
     }
 
     /// Asks, and again where nobody answers.
@@ -307,6 +319,11 @@ impl<'bus> Lss<'_, 'bus> {
         self.faults.clear();
         let patience = self.patience(exchange);
         for attempt in 0..=retries {
+            // A slave whose answer was lost is in configuration state, where an address says nothing to it.
+            if attempt > 0 && exchange.service() == Service::SwitchSelective {
+                self.put_out(Request::SwitchGlobal(Mode::Waiting).frame())?;
+                self.pause(LONG_PAUSE)?;
+            }
             let mut sent = Mono::START;
             for (index, frame) in exchange.ask().into_iter().enumerate() {
                 if index > 0 {

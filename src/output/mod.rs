@@ -1,6 +1,7 @@
 //! Rows and text: what goes to stdout, stderr and files. Knows no bus and no command line.
 
 pub mod console;
+pub mod csv;
 pub mod interfaces;
 pub mod json;
 pub mod json_lss;

@@ -323,11 +323,6 @@ impl Spec {
         value.encode(self.data_type, node).map_err(|error| error.to_string())
     }
 
-    /// Whether it is written with the signature "set" behind the value.
-    pub(super) fn takes_set(&self) -> bool {
-        self.signature == Some(Signature::Set)
-    }
-
     fn check_limits(&self, bytes: &[u8]) -> Result<(), Abort> {
         let Some(number) = self.data_type.decode(bytes).ok().and_then(|value| value.as_f64()) else {
             return Ok(());

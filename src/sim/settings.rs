@@ -3,6 +3,7 @@
 use super::objects::Objects;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
+use crate::device::assign::{Applies, AssignEntry, AssignPlace, AssignWay};
 use crate::device::description::Description;
 
 /// The bit timing table 0 of CiA 305, in bit/s; 5 is reserved.
@@ -48,6 +49,8 @@ struct Place {
     object: ObjectId,
     /// What has to be written for it to last; none where writing is enough.
     store: Option<ObjectId>,
+    /// Whether only power on brings it into force.
+    needs_power: bool,
 }
 
 impl Settings {
@@ -61,9 +64,12 @@ impl Settings {
             codes = STANDARD.map(|(code, rate)| (code, Rate::At(rate))).to_vec();
         }
         codes.extend(description.auto_bit_rate.map(|code| (code, Rate::Auto)));
-        let place = |name: &str| {
-            let (object, _) = objects.specs().find(|(_, spec)| spec.takes_set() && spec.name == name)?;
-            Some(Place { object, store: Some(ObjectId::new(0x1010, 1)) })
+        let way = description.assign.iter().find(|entry| entry.way == AssignWay::Objects);
+        let place = |place: fn(&AssignEntry) -> Option<AssignPlace>| {
+            let entry = way?;
+            let object = place(entry)?.object;
+            let needs_power = entry.applies == Applies::Power;
+            objects.has(object).then_some(Place { object, store: entry.store, needs_power })
         };
         Settings {
             active: pair,
@@ -71,8 +77,8 @@ impl Settings {
             persistent: pair,
             wire: None,
             codes,
-            node_at: place("node-id"),
-            rate_at: place("bit-rate"),
+            node_at: place(|entry| entry.node_id),
+            rate_at: place(|entry| entry.bit_rate),
         }
     }
 
@@ -134,16 +140,21 @@ impl Settings {
     pub(super) fn keep(&mut self, written: ObjectId, objects: &Objects) {
         let number = |place: Option<Place>| {
             let place = place.filter(|place| place.store.unwrap_or(place.object) == written)?;
-            objects.bytes(place.object)?.first().copied()
+            Some((*objects.bytes(place.object)?.first()?, place.needs_power))
         };
-        let (node, rate) = (number(self.node_at), number(self.rate_at));
-        if let Some(node) = node.and_then(|number| NodeId::new(number).ok()) {
-            (self.pending.node, self.persistent.node) = (Some(node), Some(node));
+        let (node, rate, shown) = (number(self.node_at), number(self.rate_at), self.shown_rate());
+        if let Some((number, needs_power)) = node
+            && let Ok(node) = NodeId::new(number)
+        {
+            self.persistent.node = Some(node);
+            self.pending.node = if needs_power { self.pending.node } else { Some(node) };
         }
         // An object that shows the rate found does not turn automatic detection off.
-        let shown = self.shown_rate();
-        if let Some(rate) = rate.filter(|code| Some(*code) != shown).and_then(|code| self.rate(code)) {
-            (self.pending.rate, self.persistent.rate) = (rate, rate);
+        if let Some((code, needs_power)) = rate.filter(|(code, _)| Some(*code) != shown)
+            && let Some(rate) = self.rate(code)
+        {
+            self.persistent.rate = rate;
+            self.pending.rate = if needs_power { self.pending.rate } else { rate };
         }
     }
 

@@ -2,6 +2,7 @@
 
 mod fastscan;
 mod services;
+mod simulated;
 mod slave;
 
 use cangauge::bus::Mono;

@@ -11,6 +11,7 @@
 mod frames;
 mod link;
 mod load;
+mod lss;
 
 use cangauge::bus::socketcan::SocketCan;
 use cangauge::bus::{Bus, Event, Mono};

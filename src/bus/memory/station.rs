@@ -58,6 +58,11 @@ impl Outbox {
         self.frames.push_back(frame);
     }
 
+    /// Puts back a frame that has to be sent again.
+    pub(super) fn put_back(&mut self, frame: Frame) {
+        self.frames.push_front(frame);
+    }
+
     /// The next frame to send, left in place.
     pub fn front(&self) -> Option<&Frame> {
         self.frames.front()

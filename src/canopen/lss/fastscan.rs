@@ -1,9 +1,9 @@
 //! Fastscan: the address of a slave without a node-ID, bit by bit (CiA 305, 7.5.3.5).
 //!
 //! A step asks whether there is a slave whose number has these upper bits; it is answered, or it is not. So an
-//! answer that comes too late says the wrong thing twice. Therefore each number found is checked as a whole,
-//! once without consequences, so that a late answer is not taken for a yes, and once to go on with the next.
-//! Where a check fails the number is looked for again, with more patience.
+//! answer that comes too late says the wrong thing twice. Therefore what was found is asked for again after every
+//! eight bits, and once more to go on with the next number; so a late answer is not taken for a yes. Where such a
+//! check fails the eight bits are looked for again, with more patience, and then the whole number.
 //!
 //! Slaves are no choir: where two answer one after the other, the second answer must not be taken for one to
 //! the next step. Once more than one answer came to a step, every step waits for its time to be over.
@@ -11,8 +11,14 @@
 use super::{LssAddress, Part, Request};
 use crate::canopen::frame::Frame;
 
-/// How often one number is looked for.
-const TRIES: u8 = 4;
+/// How many checks of one number may fail.
+const TRIES: u8 = 6;
+
+/// How often somebody has to answer what nobody can answer: once may be a late answer to something else.
+const PROBES: u8 = 3;
+
+/// After how many bits is checked.
+const CHECK_EVERY: u8 = 8;
 
 /// How often everything begins anew because a slave that had been there did not go on.
 const RESTARTS: u8 = 3;
@@ -27,8 +33,10 @@ pub enum Wait {
     Everybody,
     /// Silence, or an answer in the time it usually takes.
     Bit,
-    /// An answer, which may take its time.
+    /// An answer, in some more time than that.
     Check,
+    /// An answer, which may take the longest wait: without it everything begins anew.
+    Advance,
 }
 
 /// The next thing to do.
@@ -85,8 +93,8 @@ enum Phase {
     Probe,
     /// The bit, 31 to 0.
     Bit(u8),
-    /// The number found, without consequences.
-    Check,
+    /// The number found down to this bit, without consequences.
+    Check(u8),
     /// The number found; whoever fits compares the next part, after the last one it is in configuration state.
     Advance,
 }
@@ -109,6 +117,8 @@ pub struct Fastscan {
     impatience: u8,
     /// Whether the probe has been silent.
     probed: bool,
+    /// How often it has not.
+    babbled: u8,
 }
 
 impl Fastscan {
@@ -125,6 +135,7 @@ impl Fastscan {
             crowded: false,
             impatience: 0,
             probed: false,
+            babbled: 0,
         }
     }
 
@@ -140,19 +151,13 @@ impl Fastscan {
             Phase::Everybody => (ask(0, Request::EVERYBODY, Part::Vendor, Part::Vendor), Wait::Everybody),
             Phase::Probe => (ask(NOBODY, 0, Part::Product, Part::Product), Wait::Bit),
             Phase::Bit(bit) => (ask(self.number, bit, self.part, self.part), Wait::Bit),
-            Phase::Check => (ask(self.number, 0, self.part, self.part), Wait::Check),
+            Phase::Check(bit) => (ask(self.number, bit, self.part, self.part), Wait::Check),
             Phase::Advance => {
                 let next = Part::from_number(self.part.number() + 1).unwrap_or(Part::Vendor);
-                (ask(self.number, 0, self.part, next), Wait::Check)
+                (ask(self.number, 0, self.part, next), Wait::Advance)
             }
         };
-        // A probe that is not answered in time proves nothing if the time is short.
-        let to_the_end = match self.phase {
-            Phase::Everybody => true,
-            Phase::Probe => false,
-            Phase::Bit(_) | Phase::Check | Phase::Advance => self.crowded,
-        };
-        Step { request, wait, to_the_end, impatience: self.impatience }
+        Step { request, wait, to_the_end: self.crowded, impatience: self.impatience }
     }
 
     /// The time of a step is over, or its answer is there: so many answers came.
@@ -170,7 +175,12 @@ impl Fastscan {
             Phase::Everybody if self.retries > 0 => self.retries -= 1,
             Phase::Everybody if self.restarts > 0 => return self.unsettled(),
             Phase::Everybody => return Progress::Nobody,
-            Phase::Probe if answered => return Progress::Failed(FastscanError::Babbler),
+            Phase::Probe if answered => {
+                self.babbled += 1;
+                if self.babbled >= PROBES {
+                    return Progress::Failed(FastscanError::Babbler);
+                }
+            }
             Phase::Probe => {
                 self.probed = true;
                 self.look_at(Part::Vendor);
@@ -179,18 +189,27 @@ impl Fastscan {
                 if !answered {
                     self.number |= 1 << bit;
                 }
-                self.phase = bit.checked_sub(1).map_or(Phase::Check, Phase::Bit);
+                self.phase = if bit % CHECK_EVERY == 0 { Phase::Check(bit) } else { Phase::Bit(bit - 1) };
             }
-            Phase::Check if answered => self.phase = Phase::Advance,
-            Phase::Check => {
+            Phase::Check(bit) if answered => self.phase = bit.checked_sub(1).map_or(Phase::Advance, Phase::Bit),
+            Phase::Check(bit) => {
                 self.tries += 1;
                 if self.tries >= TRIES {
                     return self.unsettled();
                 }
-                self.lose_patience();
-                self.search();
+                self.impatience += 1;
+                if self.tries % 2 == 1 {
+                    let (above, top) = (bit + CHECK_EVERY, bit + CHECK_EVERY - 1);
+                    self.number &= u32::MAX.checked_shl(above.into()).unwrap_or(0);
+                    self.phase = Phase::Bit(top);
+                } else {
+                    // The check before may have been passed by a late answer, or slaves answer at their leisure.
+                    self.crowded = true;
+                    self.search();
+                }
             }
             Phase::Advance if answered => {
+                self.impatience = 0;
                 self.known[usize::from(self.part.number())] = Some(self.number);
                 let Some(next) = Part::from_number(self.part.number() + 1) else {
                     return Progress::Found(LssAddress::new(self.known.map(Option::unwrap_or_default)));
@@ -206,7 +225,8 @@ impl Fastscan {
                 if self.known[usize::from(self.part.number())].take().is_some() {
                     self.known = [None; 4];
                 }
-                self.lose_patience();
+                self.impatience = self.restarts;
+                self.crowded = true;
                 self.phase = Phase::Everybody;
             }
         }
@@ -228,11 +248,6 @@ impl Fastscan {
     fn search(&mut self) {
         self.number = 0;
         self.phase = Phase::Bit(31);
-    }
-
-    fn lose_patience(&mut self) {
-        self.impatience = self.impatience.saturating_add(1);
-        self.crowded = true;
     }
 
     fn unsettled(&self) -> Progress {
@@ -303,7 +318,7 @@ mod tests {
     #[test]
     fn one_who_falls_silent_in_the_middle() {
         let address = LssAddress::new([0x362, 0x0044_3150, 0x0001_0000, 20002]);
-        for last in 2..138 {
+        for last in 2..150 {
             let mut slave = Slave::new(address);
             let (mut scan, mut step) = (Fastscan::new(1), 0);
             let end = loop {
@@ -320,10 +335,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn one_is_found_in_138_steps(parts: [u32; 4]) {
+        fn one_is_found_in_150_steps(parts: [u32; 4]) {
             let address = LssAddress::new(parts);
             let found = scan(&mut [Slave::new(address)], &mut |_| false);
-            prop_assert_eq!(found, (Progress::Found(address), 138));
+            prop_assert_eq!(found, (Progress::Found(address), 150));
         }
 
         #[test]

@@ -9,6 +9,9 @@ use std::time::Duration;
 /// costs a part of the scan.
 const SHORTEST: Duration = Duration::from_millis(4);
 
+/// The shortest wait for an answer that should come.
+const CHECK: Duration = Duration::from_millis(50);
+
 /// What the program, its host and the wire take beside the device.
 const MARGIN: Duration = Duration::from_millis(2);
 
@@ -18,17 +21,29 @@ const GATHERING: Duration = Duration::from_millis(20);
 /// How fast the slaves answer.
 #[derive(Clone, Copy, Debug)]
 struct Pace {
-    /// The longest wait that led to an answer to a bit.
+    /// About the slowest of the latest answers.
     slowest: Duration,
     timeout: Duration,
 }
 
 impl Pace {
-    /// Half as long again as the slowest answer so far, and some more; three times as long each time that was too
-    /// short.
+    /// An answer came after this time. What was slow once is forgotten after some answers.
+    fn note(&mut self, latency: Duration) {
+        self.slowest = latency.max(self.slowest * 7 / 8);
+    }
+
+    /// Half as long again as the slowest answer, and some more; twice as long each time that was too short.
     fn usual(self, impatience: u8) -> Duration {
-        let usual = SHORTEST.max(self.slowest * 3 / 2 + MARGIN);
-        usual.saturating_mul(3u32.saturating_pow(impatience.into())).min(self.timeout.max(SHORTEST))
+        self.stretched(SHORTEST.max(self.slowest * 3 / 2 + MARGIN), impatience)
+    }
+
+    /// For an answer that should come.
+    fn check(self, impatience: u8) -> Duration {
+        self.stretched(CHECK.max(self.usual(0) * 4), impatience)
+    }
+
+    fn stretched(self, length: Duration, impatience: u8) -> Duration {
+        length.saturating_mul(2u32.saturating_pow(impatience.into())).min(self.timeout.max(SHORTEST))
     }
 }
 
@@ -70,7 +85,8 @@ impl Lss<'_, '_> {
         let sent = self.put_out(step.request.frame())?;
         let usual = sent + pace.usual(step.impatience);
         let mut deadline = match step.wait {
-            Wait::Everybody | Wait::Check => sent + pace.timeout,
+            Wait::Everybody | Wait::Advance => sent + pace.timeout,
+            Wait::Check => sent + pace.check(step.impatience),
             Wait::Bit => usual,
         };
         let mut answers = 0;
@@ -80,9 +96,7 @@ impl Lss<'_, '_> {
             }
             answers += 1;
             let at = received.at.mono;
-            if step.wait != Wait::Check || at < usual {
-                pace.slowest = pace.slowest.max(at.since(sent));
-            }
+            pace.note(at.since(sent));
             deadline = match step.wait {
                 Wait::Everybody => deadline.min(end_of_gathering(sent, at)),
                 _ if step.to_the_end => deadline.min(usual.max(at)),

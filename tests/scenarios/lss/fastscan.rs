@@ -142,6 +142,42 @@ fn lost_answers_make_up_nobody() {
     assert!(given_up * 10 < found, "{found} found, {given_up} given up");
 }
 
+/// Answers that come when they like, of one to three slaves: whoever is found is there, and alone in configuration
+/// state.
+#[test]
+fn answers_at_leisure_make_up_nobody() {
+    let (mut found, mut given_up) = (0, 0);
+    let mut random = 1u64;
+    let mut next = |below: u64| {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 33) % below
+    };
+    for run in 0..240u32 {
+        let identities = [DPS, [0x362, 0x0044_3150, 0x0001_0000, run], [0x47, 1, 0x0001_0007, 99]];
+        let slaves = &identities[..1 + run as usize % 3];
+        let slaves: Vec<Slave> = slaves
+            .iter()
+            .map(|&identity| {
+                // Mostly at once; now and then the host has something else to do.
+                let latencies: Vec<u64> =
+                    (0..97).map(|_| if next(30) == 0 { next(40_000) } else { next(1500) }).collect();
+                Slave::new(identity, 0xff).slow(&latencies)
+            })
+            .collect();
+        let (end, configuring) = scan(&mut bus_of(slaves));
+        match end {
+            Ok(Some(address)) => {
+                assert_eq!(configuring, [address.parts()], "{run}");
+                found += 1;
+            }
+            Ok(None) => panic!("{run}: somebody is there"),
+            Err(LssError::Fastscan(FastscanError::Babbler)) => panic!("{run}: nobody talks too much"),
+            Err(_) => given_up += 1,
+        }
+    }
+    assert!(given_up * 10 < found, "{found} found, {given_up} given up");
+}
+
 /// Ctrl-C at any moment leaves nobody in configuration state.
 #[test]
 fn nobody_is_left_in_configuration_state() {

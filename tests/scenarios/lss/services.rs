@@ -58,10 +58,12 @@ fn only_the_slave_that_was_addressed_is_told_anything() {
 fn an_address_is_repeated_from_its_first_part() {
     let mut slave = Slave::new(ONE, 5);
     slave.loses = [0].into();
-    let mut bus = bus_of([slave]);
-    // In configuration state already, it does not answer the second time: it is sent back before.
+    let mut bus = bus_of([slave, Slave::new(OTHER, 6)]);
+    run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();
+    assert_eq!(bus.stations::<Slave>().map(|slave| slave.node).collect::<Vec<_>>(), [12, 6]);
+    let mut bus = bus_of([Slave::new(OTHER, 6)]);
     let error = run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap_err();
-    assert!(matches!(error, LssError::NoAnswer { service: Service::SwitchSelective, .. }), "{error}");
+    assert_eq!(error.to_string(), "LSS switch state selective: no answer within 500 ms");
     assert_eq!(bus.stations::<Slave>().map(|slave| slave.told).sum::<usize>(), 0);
 }
 

@@ -218,3 +218,62 @@ fn some_do_not_come_back() {
         play(&mut bus, &[("605#4000100000000000", "585#4300100094018200")]);
     }
 }
+
+#[test]
+fn those_that_keep_what_is_written_by_itself() {
+    let mut bus = bus([still("hydac-old", 5, 1.0)]);
+    ask(&mut bus, "605#2301200007736574");
+    assert_eq!((device(&mut bus).node(), device(&mut bus).stored().0), (Some(node(5)), Some(node(7))));
+    bus.power_cycle();
+    assert_eq!(hear(&mut bus, ms(300)), ["707#00"]);
+}
+
+#[test]
+fn those_that_keep_it_by_1010h() {
+    let mut bus = bus([still("baumer", 5, 1.0)]);
+    play(
+        &mut bus,
+        &[
+            ("605#2201210007000000", "705#00 585#6001210000000000"),
+            ("605#2200210009000000", "585#8000210030000906"),
+            ("605#2200210005000000", "585#6000210000000000"),
+        ],
+    );
+    assert_eq!(device(&mut bus).stored(), (Some(node(5)), Some(250_000)));
+    ask(&mut bus, "605#2210100173617665");
+    assert_eq!(device(&mut bus).stored(), (Some(node(7)), Some(500_000)));
+    ask(&mut bus, "000#8105");
+    assert_eq!((device(&mut bus).node(), device(&mut bus).bit_rate()), (Some(node(7)), Some(500_000)));
+}
+
+#[test]
+fn those_that_keep_it_by_a_sub_index_of_its_own() {
+    let entry = |at: &str, name: &str, kind: &str, more: &str| {
+        format!("[[object]]\nat = \"{at}\"\nname = \"{name}\"\ntype = \"{kind}\"\naccess = \"rw\"\n{more}\n")
+    };
+    let text = [
+        "name = \"own\"\ntitle = \"\"\nvendor = \"\"\nsource = \"\"\n[identify]\n[bit_rates]\n3 = 250000\n4 = 125000\n",
+        "[[assign]]\nway = \"objects\"\nstore = \"0x1010:4\"\n",
+        "node_id = { object = \"0x2003:2\", type = \"u8\" }\nbit_rate = { object = \"0x2004:2\", type = \"u16\" }\n",
+        &entry("0x1010:1", "store-all", "u32", "signature = \"save\""),
+        &entry("0x1010:4", "store-lss", "u32", "signature = \"save\""),
+        &entry("0x2003:2", "pending-node-id", "u8", ""),
+        &entry("0x2004:2", "pending-bit-rate", "u16", ""),
+    ]
+    .concat();
+    let model = Arc::new(Model::from_toml(&text).expect("a description"));
+    let mut bus = bus([Setup::new(model, node(5))]);
+    play(
+        &mut bus,
+        &[
+            ("605#4003200200000000", "705#00 585#4F03200205000000"),
+            ("605#4004200200000000", "585#4B04200203000000"),
+            ("605#2F03200207000000", "585#6003200200000000"),
+            ("605#2B04200204000000", "585#6004200200000000"),
+            ("605#2310100173617665", "585#6010100100000000"),
+        ],
+    );
+    assert_eq!(device(&mut bus).stored(), (Some(node(5)), Some(250_000)), "1010h:1 leaves them");
+    play(&mut bus, &[("605#2310100473617665", "585#6010100400000000")]);
+    assert_eq!(device(&mut bus).stored(), (Some(node(7)), Some(125_000)));
+}
