@@ -48,6 +48,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "read" -d 'Read me
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "nmt" -d 'Send NMT commands and tell states'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sdo" -d 'Read and write objects of the object dictionary'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "bus" -d 'List CAN interfaces, switch them on and off, find the bit rate of a bus'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "completions" -d 'Print the completions for a shell'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
@@ -399,6 +400,114 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Lea
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite files that exist'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -f -a "list" -d 'List the CAN interfaces of this machine with bit rate, state and error counters'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -f -a "up" -d 'Switch an interface on, at a bit rate'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -f -a "down" -d 'Switch an interface off'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -f -a "detect" -d 'Find the bit rate of a running bus by listening only; prints it in bit/s'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l listen-only -d 'Only listen: no frame, no acknowledge, no error flag'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l for -d 'How long each bit rate is tried; the default hears a heartbeat of once a second' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l active -d 'Where nothing is heard, ask: every node-ID for its device type, at one rate after the other. Only for a bench with one device: at a wrong rate this disturbs every frame on the bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from help" -f -a "list" -d 'List the CAN interfaces of this machine with bit rate, state and error counters'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from help" -f -a "up" -d 'Switch an interface on, at a bit rate'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from help" -f -a "down" -d 'Switch an interface off'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from help" -f -a "detect" -d 'Find the bit rate of a running bus by listening only; prints it in bit/s'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
@@ -437,11 +546,12 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s q -l q
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log sim completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log sim completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log sim completions help" -f -a "nmt" -d 'Send NMT commands and tell states'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log sim completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log sim completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log sim completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log sim completions help" -f -a "completions" -d 'Print the completions for a shell'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log sim completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "nmt" -d 'Send NMT commands and tell states'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "bus" -d 'List CAN interfaces, switch them on and off, find the bit rate of a bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "completions" -d 'Print the completions for a shell'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'

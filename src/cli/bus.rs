@@ -28,17 +28,20 @@ enum Action {
     /// List the CAN interfaces of this machine with bit rate, state and error counters
     List,
     /// Switch an interface on, at a bit rate
+    ///
+    /// One that is up at this rate is left alone; one that is up at another goes down for a moment. Only the
+    /// bit rate, the listen-only mode and the switch are set. What was set is read back.
     Up(Up),
     /// Switch an interface off
     Down(Down),
     /// Find the bit rate of a running bus by listening only; prints it in bit/s
+    ///
+    /// The usual bit rates are tried one after the other, the interface's own first, until valid frames are
+    /// heard. Nothing is sent, acknowledged or disturbed. At the end, on Ctrl-C too, the interface is put
+    /// back as it was. A device alone with this machine is not heard like that: nobody acknowledges its frames.
     Detect(Detect),
 }
 
-/// Switch an interface on, at a bit rate
-///
-/// One that is up at this rate is left alone; one that is up at another goes down for a moment. Only the
-/// bit rate, the listen-only mode and the switch are set. What was set is read back.
 #[derive(Debug, Args)]
 struct Up {
     /// Which interface: can0
@@ -56,15 +59,11 @@ struct Down {
     interface: InterfaceName,
 }
 
-/// Find the bit rate of a running bus by listening only; prints it in bit/s
-///
-/// The usual bit rates are tried one after the other, the interface's own first, until valid frames are
-/// heard. Nothing is sent, acknowledged or disturbed. At the end, on Ctrl-C too, the interface is put back
-/// as it was. A device alone with this machine is not heard like that: nobody acknowledges its frames.
 #[derive(Debug, Args)]
 struct Detect {
     /// Which bus: can0, sim:FILE.toml; not given: --bus
-    bus: Option<BusSpec>,
+    #[arg(value_name = "BUS")]
+    on: Option<BusSpec>,
     /// Where nothing is heard, ask: every node-ID for its device type, at one rate after the other. Only
     /// for a bench with one device: at a wrong rate this disturbs every frame on the bus
     #[arg(long)]
@@ -119,7 +118,7 @@ fn print(all: &[Interface], format: Format) -> io::Result<()> {
 
 impl Detect {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let Some(spec) = self.bus.as_ref().or(global.bus.as_ref()) else {
+        let Some(spec) = self.on.as_ref().or(global.bus.as_ref()) else {
             let hint = "see what is there: cangauge bus list";
             return Err(Failure::new(Kind::Usage, "which bus?").hint(hint).into());
         };

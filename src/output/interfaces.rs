@@ -1,7 +1,8 @@
 //! CAN interfaces, and what came of looking for a bit rate.
 
 use super::json::line;
-use super::table::{self, Align};
+use super::table::Align;
+use super::{csv, table};
 use crate::tasks::detect::{By, Detection, How};
 use serde::Serialize;
 use std::io::{self, Write};
@@ -62,10 +63,8 @@ pub fn json(out: &mut dyn Write, interfaces: &[Interface]) -> io::Result<()> {
 
 /// Interfaces as CSV.
 pub fn csv(out: &mut dyn Write, interfaces: &[Interface]) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(HEAD.map(|head| head.to_ascii_lowercase()))?;
-    interfaces.iter().try_for_each(|interface| csv.write_record(interface.row("")))?;
-    csv.flush()
+    let head = HEAD.map(str::to_ascii_lowercase);
+    csv::write(out, &head.each_ref().map(String::as_str), interfaces.iter().map(|interface| interface.row("")))
 }
 
 /// Interfaces as a table; nothing where there are none.
@@ -121,11 +120,8 @@ pub fn detection_json(out: &mut dyn Write, name: &str, detection: &Detection) ->
 
 /// What a detection found, as CSV.
 pub fn detection_csv(out: &mut dyn Write, name: &str, detection: &Detection) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(["interface", "bit_rate", "by"])?;
     let (rate, by) = detection.found.map(|(rate, by)| (rate.to_string(), by_name(by))).unwrap_or_default();
-    csv.write_record([name, &rate, by])?;
-    csv.flush()
+    csv::write(out, &["interface", "bit_rate", "by"], [vec![name.to_owned(), rate, by.to_owned()]])
 }
 
 fn by_name(by: By) -> &'static str {

@@ -114,7 +114,7 @@ impl From<BusError> for Failure {
                 Some(format!("bring it up: sudo ip link set {name} up type can bitrate 250000 (the sensors' bit rate)"))
             }
             BusError::NoInterface(_) | BusError::NotCan(_) => {
-                Some("see what is there: ip -br link show type can; without hardware: --bus sim".to_owned())
+                Some("see what is there: cangauge bus list; without hardware: --bus sim".to_owned())
             }
             BusError::Unsupported(_) => Some("without it: --bus sim".to_owned()),
             _ => None,

@@ -2,6 +2,7 @@
 //! frames. Benches go by the virtual clock, so that waiting takes no time.
 
 mod args;
+mod bus;
 mod examples;
 mod log;
 mod log_end;

@@ -224,7 +224,7 @@ fn without_the_right_nothing_is_touched() {
 #[test]
 fn interrupted_at_any_moment_it_is_put_back() {
     // Listening takes 13.5 s, asking as long again.
-    for millis in (0..27_000).step_by(700) {
+    for millis in (0..27_000).step_by(1900) {
         let mut wire = Wire { heartbeat: false, answers: false, ..Wire::at(83_333) };
         wire.interrupt = Some(Mono::at(Duration::from_millis(millis)));
         assert_eq!(run(&mut wire, true).unwrap_err().kind, Kind::Interrupted, "{millis} ms");
