@@ -204,10 +204,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
-<<<<<<< HEAD
         Command::Lss(command) => command.run(&cli.global),
-=======
->>>>>>> 8f8346a2a0246b851fb5f724d794905ece062895
         Command::Bus(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
