@@ -75,11 +75,11 @@ pub(super) fn only(
         subject.node = told.node.flatten();
         subject.alone = subject.node.is_some();
     }
-    if subject.address.is_none() && subject.node.is_none() {
+    if subject.address.is_none() && subject.node.is_none() && another.is_none() {
         return Err(Failure::new(Kind::NoAnswer, "nobody answers, neither by SDO nor by LSS: nothing was changed")
             .hint("check power, wiring and bit rate: cangauge scan"));
     }
-    if told.address.is_none() || told.unproven {
+    if another.is_none() && (told.address.is_none() || told.unproven) {
         let what = if told.address.is_none() { "inquiries (5Ah to 5Dh)" } else { "question for others (46h to 4Bh)" };
         tell(Note::Warning(format!(
             "the device does not know the LSS {what}: that no other slave is there rests on what answers SDO, and a \

@@ -5,7 +5,7 @@ use super::assign::{Job, stage_of};
 use super::objects::by_objects;
 use super::presence::{LISTEN, Presence, next, presence};
 use super::progress::{Done, Stage};
-use super::session::{configured, prepared, put_back};
+use super::session::{Before, Reach, configured, prepared, put_back};
 use super::subject::{Subject, everybody};
 use super::ways::PlannedRate;
 use super::{Note, Tell};
@@ -120,13 +120,13 @@ impl<'a> Retiming<'a> {
             (Ok(session), Some(_)) => session.before,
             (Ok(_), None) => return Err(subject.failure(Kind::Unexpected, "it was not activated")),
             (Err(failure), None) => return Err(failure),
-            (Err(failure), Some(_)) => return Err(self.go_back(master, failure, done)),
+            (Err(failure), Some(_)) => return Err(self.go_back(master, failure, None, done, tell)),
         };
         let begun = activated.unwrap_or_else(|| master.now());
         let (name, new) = (subject.name(), spoken_rate(self.new));
         tell(Note::Step(format!("{name} goes to {new} in {DELAY_MS} ms, this side too")));
         if let Err(failure) = self.follow(master, begun) {
-            return Err(self.go_back(master, failure, done));
+            return Err(self.go_back(master, failure, before, done, tell));
         }
         done.retimed = true;
         tell(Note::Step(format!("{name} answers at {new}")));
@@ -161,7 +161,14 @@ impl<'a> Retiming<'a> {
     }
 
     /// The host back to the old rate; what became of the device, and what brings it back.
-    fn go_back(&self, master: &mut Master<'_>, failure: Failure, done: &mut Done) -> Failure {
+    fn go_back(
+        &self,
+        master: &mut Master<'_>,
+        failure: Failure,
+        before: Option<Before>,
+        done: &mut Done,
+        tell: Tell<'_>,
+    ) -> Failure {
         let (subject, old, new) = (self.subject, spoken_rate(self.old), spoken_rate(self.new));
         if master.bus().bit_rate() != Some(self.old)
             && let Err(error) = set(master, self.old)
@@ -184,6 +191,7 @@ impl<'a> Retiming<'a> {
             });
             undo.is_ok()
         });
+        put_back(master, before, tell);
         if let (true, Some((_, _, stage))) = (undone, &mut done.rate) {
             *stage = Stage::Undone;
         }
@@ -265,18 +273,23 @@ fn wait(master: &mut Master<'_>, until: Mono) -> Result<(), Failure> {
     }
 }
 
-/// Whether the device answers at the bit rate that the bus has now.
+/// Whether the device answers at the bit rate that the bus has now: by SDO, or where it is stopped and has none by LSS.
 fn is_there(master: &mut Master<'_>, subject: &Subject, node: Option<NodeId>) -> Result<bool, Failure> {
     let until = master.now() + PROBE;
     master.listen(&Filters::All)?;
     loop {
-        let found = match node {
-            Some(node) => presence(master, node).map(|found| match found {
-                Presence::One(found) => subject.address.is_none_or(|address| address == found),
-                Presence::Nameless => subject.address.is_none(),
-                Presence::Several(_) | Presence::Nobody(_) => false,
-            }),
-            None => configured(master, subject, |_| Ok(())).map(|_| true),
+        let by_sdo = node.map(|node| presence(master, node));
+        let by_lss = |master: &mut Master<'_>| {
+            let Some(address) = subject.address else { return Ok(false) };
+            let named = Subject { reach: Reach::Selective(address), ..subject.clone() };
+            configured(master, &named, |_| Ok(())).map(|_| true)
+        };
+        let found = match by_sdo {
+            Some(Ok(Presence::One(found))) => Ok(subject.address.is_none_or(|address| address == found)),
+            Some(Ok(Presence::Nameless)) => Ok(subject.address.is_none()),
+            Some(Ok(Presence::Several(_))) => Ok(false),
+            Some(Err(failure)) => Err(failure),
+            Some(Ok(Presence::Nobody(_))) | None => by_lss(master),
         };
         match found {
             Ok(true) => return Ok(true),
