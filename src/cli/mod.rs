@@ -10,6 +10,7 @@ mod each;
 pub mod exit;
 mod file;
 mod log;
+mod lss;
 mod nmt;
 mod open;
 pub mod parse;
@@ -36,6 +37,7 @@ Examples, on the simulated bus; leave `-b sim` out where one CAN interface is up
   cangauge -b sim log 1-3,127 --sync 10ms --duration 1h -o run.csv
   cangauge -b sim sdo read 1 0x1018:1                    one object, bare
   cangauge -b sim nmt reset 1                            restart it, wait for the boot-up
+  cangauge -b sim lss set-id 127 12                      give it a node-ID, and see it come back
 
 Exit codes:
   0  done                                    5  the bus fails: interface missing, down, bus-off
@@ -140,6 +142,8 @@ pub(crate) enum Command {
     Log(log::Log),
     /// Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data
     Check(check::Check),
+    /// Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device's own)
+    Lss(lss::LssCommand),
     /// List CAN interfaces, switch them on and off, find the bit rate of a bus
     Bus(bus::BusCommand),
     /// Make the present reading of a channel zero (6125h), with checks before and after
@@ -213,6 +217,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
         Command::Check(command) => command.run(&cli.global),
+        Command::Lss(command) => command.run(&cli.global),
         Command::Bus(command) => command.run(&cli.global),
         Command::Autozero(command) => command.run(&cli.global),
         Command::Store(command) => command.run(&cli.global),

@@ -5,6 +5,7 @@ pub mod csv;
 mod elapsed;
 pub mod interfaces;
 pub mod json;
+pub mod json_lss;
 pub mod junit;
 pub mod limits;
 pub mod progress;

@@ -7,6 +7,7 @@ pub mod failure;
 pub mod host;
 mod kept;
 pub mod log;
+pub mod lss;
 pub mod nmt;
 pub mod read;
 pub mod restore;

@@ -9,6 +9,7 @@ mod examples;
 mod log;
 mod log_end;
 mod log_file;
+mod lss;
 mod nmt;
 mod output;
 mod read;
