@@ -9,6 +9,7 @@ mod log;
 mod nmt;
 mod open;
 pub mod parse;
+mod pdo;
 mod read;
 mod scan;
 mod sdo;
@@ -133,6 +134,8 @@ pub(crate) enum Command {
     Sdo(sdo::Sdo),
     /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// Show, change and watch what the nodes' transmit PDOs carry
+    Pdo(pdo::Pdo),
     /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
     /// Print the completions for a shell
@@ -197,6 +200,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Pdo(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }

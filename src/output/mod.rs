@@ -3,6 +3,7 @@
 pub mod console;
 pub mod csv;
 pub mod json;
+pub mod pdo;
 pub mod progress;
 pub mod rows;
 pub mod summary;

@@ -3,6 +3,7 @@
 pub mod failure;
 pub mod log;
 pub mod nmt;
+pub mod pdo;
 pub mod read;
 pub mod scan;
 pub mod sdo;
