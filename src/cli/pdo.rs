@@ -230,7 +230,7 @@ impl WatchArgs {
         let mut failed = None;
         let mut out = io::stdout().lock();
         if global.format == Format::Csv {
-            writeln!(out, "{}", output::WATCHED).map_err(stdout)?;
+            output::watched_head(&mut out).map_err(stdout)?;
         }
         global.with_master(|master| {
             let nodes = open::nodes(master, global, &self.nodes)?;

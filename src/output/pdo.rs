@@ -60,24 +60,12 @@ pub fn json(out: &mut dyn Write, shown: &Shown) -> io::Result<()> {
 
 /// Comma-separated, with a header.
 pub fn csv(out: &mut dyn Write, all: &[Shown]) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(out);
-    csv.write_record([
-        "node",
-        "pdo",
-        "cob_id",
-        "valid",
-        "rtr",
-        "transmission",
-        "event_timer_ms",
-        "inhibit_us",
-        "mapping",
-    ])?;
-    for shown in all {
+    let head = ["node", "pdo", "cob_id", "valid", "rtr", "transmission", "event_timer_ms", "inhibit_us", "mapping"];
+    let number = |number: Option<u32>| number.map(|number| number.to_string()).unwrap_or_default();
+    let row = |shown: &Shown| {
         let settings = &shown.settings;
-        let number = |number: Option<u32>| number.map(|number| number.to_string()).unwrap_or_default();
-        let mapping: Vec<String> =
-            settings.mapping.iter().map(|entry| format!("{}/{}", entry.object, entry.bits)).collect();
-        csv.write_record([
+        let mapping = settings.mapping.iter().map(|entry| format!("{}/{}", entry.object, entry.bits));
+        vec![
             shown.node.to_string(),
             settings.number.get().to_string(),
             identifier(shown),
@@ -86,10 +74,10 @@ pub fn csv(out: &mut dyn Write, all: &[Shown]) -> io::Result<()> {
             settings.transmission().to_string(),
             number(settings.event_timer_ms.map(u32::from)),
             number(settings.inhibit_100us.map(|inhibit| 100 * u32::from(inhibit))),
-            mapping.join(" "),
-        ])?;
-    }
-    csv.flush()
+            mapping.collect::<Vec<_>>().join(" "),
+        ]
+    };
+    super::csv::write(out, &head, all.iter().map(row))
 }
 
 /// A table for people.
@@ -131,8 +119,14 @@ fn entry_text(carried: &Carried) -> String {
     text
 }
 
-/// The columns of [`watched_csv`].
-pub const WATCHED: &str = "time,node,pdo,signal,value,unit,status,raw";
+/// The header of [`watched_csv`].
+///
+/// # Errors
+/// Those of `out`.
+pub fn watched_head(out: &mut dyn Write) -> io::Result<()> {
+    let head = ["time", "node", "pdo", "signal", "value", "unit", "status", "raw"];
+    super::csv::write(out, &head, std::iter::empty())
+}
 
 /// One TPDO as it came, one JSON object; nothing for what is no TPDO.
 pub fn watched_json(out: &mut dyn Write, seen: &Line<'_>) -> io::Result<()> {
@@ -169,10 +163,9 @@ pub fn watched_json(out: &mut dyn Write, seen: &Line<'_>) -> io::Result<()> {
 /// One TPDO as it came, one line a value.
 pub fn watched_csv(out: &mut dyn Write, seen: &Line<'_>) -> io::Result<()> {
     let Line::Pdo { at, node, number, samples, sources } = seen else { return Ok(()) };
-    let mut csv = csv::Writer::from_writer(out);
-    for sample in *samples {
-        let Some(source) = sources.get(sample.source) else { continue };
-        csv.write_record([
+    let row = |sample: &Sample| {
+        let source = sources.get(sample.source)?;
+        Some(vec![
             text::utc(at.wall),
             node.to_string(),
             number.get().to_string(),
@@ -181,9 +174,9 @@ pub fn watched_csv(out: &mut dyn Write, seen: &Line<'_>) -> io::Result<()> {
             source.unit.to_string(),
             sample.status.map_or("", Status::as_str).to_owned(),
             sample.raw.to_string(),
-        ])?;
-    }
-    csv.flush()
+        ])
+    };
+    super::csv::write(out, &[], samples.iter().filter_map(row))
 }
 
 /// One TPDO as it came, on one line for people.

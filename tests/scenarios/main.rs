@@ -3,6 +3,7 @@
 mod answers;
 mod full_queue;
 mod garbage;
+mod pdo_map;
 mod scan;
 mod second_master;
 mod second_sync;

@@ -169,7 +169,8 @@ impl Change<'_, '_, '_> {
             Ok(()) => {}
             Err(trouble) => self.undo(trouble)?,
         }
-        self.put_state_back();
+        let said = self.put_state_back();
+        self.warnings.extend(said);
         self.advise();
         Ok(())
     }
@@ -263,14 +264,15 @@ impl Change<'_, '_, '_> {
             match self.put_back(&trouble) {
                 Ok(Left::New) => return Ok(()),
                 Ok(Left::Old) => {
-                    self.put_state_back();
-                    let number = self.old.number;
-                    return Err(self.failure(&trouble, &format!("{number} has its old mapping and parameters")));
+                    let said = self.put_state_back().map(|said| format!("; {said}")).unwrap_or_default();
+                    let end = format!("{} has its old mapping and parameters{said}", self.old.number);
+                    return Err(self.failure(&trouble, &end));
                 }
                 Err(Trouble::Stopped(Error::Interrupted)) if deaf > 0 => deaf -= 1,
                 Err(last @ (Trouble::Lost(_) | Trouble::Restarted)) if !waited => {
                     waited = true;
-                    if !self.device.restarted && !matches!(self.device.wait_for_life(BOOT_TIME), Ok(true)) {
+                    // Seen or not, it is tried once more: most devices without heartbeat boot for so long.
+                    if !self.device.restarted && self.device.wait_for_life(BOOT_TIME).is_err() {
                         break last;
                     }
                 }
@@ -300,18 +302,17 @@ impl Change<'_, '_, '_> {
         Ok(Left::Old)
     }
 
-    fn put_state_back(&mut self) {
-        // A second try, since Ctrl-C may fall into the first.
+    /// The NMT state before, where it was known; what is to be said about it.
+    fn put_state_back(&mut self) -> Option<String> {
         let before = self.state.clone();
-        match self.state.put_back(&mut self.device) {
-            Err(Trouble::Stopped(Error::Interrupted)) => {
-                self.state = before;
-                let again = self.state.put_back(&mut self.device);
-                self.remarks.extend(again.ok().flatten());
+        for _ in 0..=DEAF {
+            match self.state.put_back(&mut self.device) {
+                Err(Trouble::Stopped(Error::Interrupted)) => self.state = before.clone(),
+                Ok(remark) => return remark,
+                Err(_) => break,
             }
-            Ok(remark) => self.remarks.extend(remark),
-            Err(_) => self.warnings.push(format!("the state of node {} was not put back", self.device.node)),
         }
+        Some(format!("the state of node {} was not put back", self.device.node))
     }
 
     /// What was being done, at a write, as a part of a message.

@@ -63,7 +63,12 @@ impl Switched {
         device.master.listen(&Filters::All)?;
         let reached = command(device.master, back, &[node], false)?.first().and_then(|report| report.state);
         device.master.listen_to(&[node])?;
-        let confirmed = reached == Some(wanted);
-        Ok((!confirmed).then(|| format!("node {node} was sent back to {wanted}, and nothing confirms it")))
+        Ok(match reached {
+            Some(reached) if reached == wanted => None,
+            Some(other) => {
+                Some(format!("node {node} was {wanted} before and is {other} now (cangauge nmt state {node})"))
+            }
+            None => Some(format!("node {node} was sent back to {wanted}, and nothing confirms it")),
+        })
     }
 }
