@@ -4,6 +4,7 @@ mod answers;
 mod full_queue;
 mod garbage;
 mod pdo_map;
+mod pdo_map_devices;
 mod scan;
 mod second_master;
 mod second_sync;

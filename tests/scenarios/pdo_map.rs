@@ -181,7 +181,7 @@ const CASES: [Case; 6] = [
         items: &["ch16", "ch1"],
         send: Some(Send::Code(3)),
         event_timer_ms: Some(250),
-        cob_id: Some(0x3a5),
+        cob_id: None,
     },
     Case {
         device: "dps",
@@ -314,10 +314,14 @@ fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Held, new: &
     }
 }
 
+/// A TPDO that moves to another identifier.
+const MOVED: Case = Case { cob_id: Some(0x3a5), ..CASES[4] };
+
 /// Runs every case with mishaps at every frame.
 fn everywhere(mishaps: &[Mishap]) {
-    for (number, case) in CASES.iter().enumerate() {
-        for start in [false, true] {
+    for (number, case) in CASES.iter().chain([&MOVED]).enumerate() {
+        let starts: &[bool] = if number < 2 { &[false, true] } else { &[true] };
+        for &start in starts {
             let old = held(&mut case.bus(start));
             let well = case.run(start, Mishap::None, 0);
             let new = well.held;
