@@ -2,7 +2,9 @@
 //! it gets.
 
 pub mod args;
+mod autozero;
 mod completions;
+mod each;
 pub mod exit;
 mod file;
 mod log;
@@ -14,6 +16,7 @@ mod read;
 mod scan;
 mod sdo;
 mod sim;
+mod store;
 
 use crate::master::{Master, Timing};
 use crate::output::console::Console;
@@ -136,6 +139,12 @@ pub(crate) enum Command {
     Log(log::Log),
     /// Show, change and watch what the nodes' transmit PDOs carry
     Pdo(pdo::Pdo),
+    /// Make the present reading of a channel zero (6125h), with checks before and after
+    Autozero(autozero::Autozero),
+    /// Let devices keep their settings beyond power off (1010h)
+    Store(store::Store),
+    /// Give devices their settings as delivered (1011h); node-ID and bit rate stay
+    Restore(store::Restore),
     /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
     /// Print the completions for a shell
@@ -201,6 +210,9 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
         Command::Pdo(command) => command.run(&cli.global),
+        Command::Autozero(command) => command.run(&cli.global),
+        Command::Store(command) => command.run(&cli.global),
+        Command::Restore(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }

@@ -58,6 +58,16 @@ impl Failure {
         Failure { node: Some(node), ..Failure::new(kind, format!("node {node}: {message}")) }
     }
 
+    /// The same, with what is known of `node` all the same: what was changed before, or may have been.
+    pub fn knowing(mut self, node: NodeId, known: impl fmt::Display) -> Failure {
+        self.message = match self.node {
+            Some(_) => format!("{}; {known}", self.message),
+            None => format!("node {node}: {}; {known}", self.message),
+        };
+        self.node = Some(node);
+        self
+    }
+
     /// The same with a hint.
     pub fn hint(mut self, hint: impl Into<String>) -> Failure {
         self.hint = Some(hint.into());

@@ -1,11 +1,16 @@
 //! The procedures that users think in. They return reports and print nothing.
 
+pub mod autozero;
 pub mod failure;
+mod kept;
 pub mod log;
 pub mod nmt;
 pub mod pdo;
 pub mod read;
+pub mod restore;
 pub mod scan;
 pub mod sdo;
+mod signature;
+pub mod store;
 
 pub use failure::{Failure, Kind};

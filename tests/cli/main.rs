@@ -2,6 +2,7 @@
 //! frames. Benches go by the virtual clock, so that waiting takes no time.
 
 mod args;
+mod autozero;
 mod examples;
 mod log;
 mod log_end;
@@ -11,6 +12,7 @@ mod output;
 mod read;
 mod scan;
 mod sdo;
+mod store;
 
 use std::fs;
 use std::io::{self, Read};
