@@ -70,6 +70,9 @@ struct MapArgs {
     /// The identifier, 11 bits: 0x1A5
     #[arg(long, value_name = "ID", value_parser = identifier)]
     cob_id: Option<u16>,
+    /// Store it then (1010h, the communication settings alone where the device has them apart)
+    #[arg(long)]
+    store: bool,
 }
 
 #[derive(Debug, Args)]
@@ -200,7 +203,7 @@ impl MapArgs {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let wish = self.wish()?;
         let overrides = open::overrides(global, &[self.node])?;
-        let mapped = global.with_master(|master| Ok(map(master, &wish, false, &overrides)?))?;
+        let mapped = global.with_master(|master| Ok(map(master, &wish, self.store, &overrides)?))?;
         let console = global.console();
         mapped.warnings.iter().for_each(|warning| console.warn(warning));
         let node = self.node;
@@ -208,6 +211,10 @@ impl MapArgs {
             0 => console.note(&format!("node {node}: {} is already as wanted: nothing was written", self.pdo)),
             1 => console.detail(&format!("node {node}: 1 write, read back")),
             writes => console.detail(&format!("node {node}: {writes} writes, read back")),
+        }
+        if let Some(stored) = &mapped.stored {
+            console.note(&format!("node {node}: stored ({}), acknowledged", stored.groups()));
+            stored.notes.iter().for_each(|note| console.note(&format!("node {node}: {note}")));
         }
         mapped.remarks.iter().for_each(|remark| console.note(remark));
         print(&[mapped.shown], global.format).map_err(stdout)

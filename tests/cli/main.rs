@@ -9,6 +9,7 @@ mod log_end;
 mod log_file;
 mod nmt;
 mod output;
+mod pdo;
 mod read;
 mod scan;
 mod sdo;

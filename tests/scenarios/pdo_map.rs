@@ -127,7 +127,7 @@ impl Bus for Meddler {
             let event = self.bus.receive(deadline)?;
             let is_answer = |frame: &Frame| frame.id() == CanId::sdo_response(node());
             match &event {
-                Event::Frame(received) if self.is_away() => drop(received),
+                Event::Frame(_) if self.is_away() => {}
                 Event::Frame(received) if self.lose_next && is_answer(&received.frame) => self.lose_next = false,
                 Event::Frame(received) => {
                     if self.reset_next && is_answer(&received.frame) {

@@ -13,6 +13,7 @@ use crate::device::description::{Access, Remap};
 use crate::master::{Error, Master, SdoError, SdoFailure};
 use crate::measure::instrument::Instrument;
 use crate::measure::survey::{Overrides, instruments};
+use crate::tasks::store::{self, Done, Group};
 use crate::tasks::{Failure, Kind};
 use std::time::Duration;
 
@@ -29,14 +30,16 @@ pub struct Mapped {
     pub shown: Shown,
     /// How many writes that took.
     pub writes: u32,
+    /// What the device acknowledged to have stored, where that was asked for.
+    pub stored: Option<Done>,
     /// What is worth knowing.
     pub remarks: Vec<String>,
     /// What is not as one would expect.
     pub warnings: Vec<String>,
 }
 
-/// Sets a TPDO as `wish` wants it. With `keep` the device must be one that keeps such settings when it is told to
-/// store them.
+/// Sets a TPDO as `wish` wants it. With `keep` the device is then told to store it; whether it can, and whether it
+/// keeps such settings, is found out before anything is changed.
 ///
 /// # Errors
 /// With the old settings in place again, if any were touched; a device that cannot be reached any more is
@@ -48,11 +51,7 @@ pub fn map(master: &mut Master<'_>, wish: &Wish, keep: bool, overrides: &Overrid
     let found = instruments(master, &[node], overrides)?.pop();
     let instrument = found.ok_or_else(|| Failure::of_node(Kind::NoAnswer, node, "it is not there"))?;
     let model = instrument.model.as_deref();
-    if keep && model.is_some_and(|model| !keeps(model, wish.number)) {
-        let message = format!("it does not keep the settings of {} when it stores: nothing was changed", wish.number);
-        let failure = Failure::of_node(Kind::CheckFailed, node, message);
-        return Err(failure.hint("leave --store out, and set it after every power on"));
-    }
+    let storing = if keep { Some(storing(master, &instrument, wish.number)?) } else { None };
     let mut device = Device::new(master, node, model);
     let (mapping, remarks) = wish.mapping(&mut device, &instrument)?;
     let inhibit = wish.inhibit_100us.is_some() || may_inhibit(&instrument, wish.number);
@@ -81,12 +80,28 @@ pub fn map(master: &mut Master<'_>, wish: &Wish, keep: bool, overrides: &Overrid
         warnings: Vec::new(),
     };
     change.run()?;
-    Ok(Mapped {
-        shown: Shown::new(&instrument, change.wanted),
-        writes: change.device.writes,
-        remarks: change.remarks,
-        warnings: change.warnings,
-    })
+    let Change { device, wanted, remarks, warnings, .. } = change;
+    let (writes, master) = (device.writes, device.master);
+    let stored = storing.map(|plan| store::carry_out(master, &instrument, plan, false)).transpose();
+    let stored = stored.map_err(|failure| {
+        failure.knowing(node, format!("{} is set as wanted, and keeps it until power off at the least", wish.number))
+    })?;
+    Ok(Mapped { shown: Shown::new(&instrument, wanted), writes, stored, remarks, warnings })
+}
+
+/// What has to be stored to keep the settings of a TPDO. The communication settings alone where they are a group
+/// of their own: a store of everything puts custom COB-IDs back on some devices.
+fn storing(master: &mut Master<'_>, instrument: &Instrument, number: TpdoNumber) -> Result<store::Plan, Failure> {
+    let model = instrument.model.as_deref();
+    if model.is_some_and(|model| !keeps(model, number)) {
+        let message = format!("it does not keep the settings of {number} when it stores: nothing was changed");
+        let failure = Failure::of_node(Kind::CheckFailed, instrument.node, message);
+        return Err(failure.hint("leave --store out, and set it after every power on"));
+    }
+    match store::plan(master, instrument, Group::Communication) {
+        Err(failure) if failure.kind == Kind::Refused => store::plan(master, instrument, Group::All),
+        plan => plan,
+    }
 }
 
 /// Whether a device stores the settings of a TPDO, as far as its description tells.
