@@ -46,6 +46,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('nmt', 'nmt', [CompletionResultType]::ParameterValue, 'Send NMT commands and tell states')
             [CompletionResult]::new('sdo', 'sdo', [CompletionResultType]::ParameterValue, 'Read and write objects of the object dictionary')
             [CompletionResult]::new('log', 'log', [CompletionResultType]::ParameterValue, 'Record measurements as CSV or JSON Lines')
+            [CompletionResult]::new('pdo', 'pdo', [CompletionResultType]::ParameterValue, 'Show, change and watch what the nodes'' transmit PDOs carry')
             [CompletionResult]::new('autozero', 'autozero', [CompletionResultType]::ParameterValue, 'Make the present reading of a channel zero (6125h), with checks before and after')
             [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Let devices keep their settings beyond power off (1010h)')
             [CompletionResult]::new('restore', 'restore', [CompletionResultType]::ParameterValue, 'Give devices their settings as delivered (1011h); node-ID and bit rate stay')
@@ -502,6 +503,128 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
             break
         }
+        'cangauge;pdo' {
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('show', 'show', [CompletionResultType]::ParameterValue, 'Show how the TPDOs are set up')
+            [CompletionResult]::new('map', 'map', [CompletionResultType]::ParameterValue, 'Set what a TPDO carries, and when it is sent')
+            [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Show the TPDOs as they come, decoded, until Ctrl-C')
+            [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
+            break
+        }
+        'cangauge;pdo;show' {
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;pdo;map' {
+            [CompletionResult]::new('--transmission', '--transmission', [CompletionResultType]::ParameterName, 'When it is sent: acyclic (on SYNC after a change), sync:N (on every N-th SYNC), event (255), timer (by the event timer), or a number')
+            [CompletionResult]::new('--event-timer', '--event-timer', [CompletionResultType]::ParameterName, 'The event timer, in whole milliseconds; 0 is off')
+            [CompletionResult]::new('--inhibit', '--inhibit', [CompletionResultType]::ParameterName, 'The shortest time between two transmissions, in steps of 100us; 0 is none')
+            [CompletionResult]::new('--cob-id', '--cob-id', [CompletionResultType]::ParameterName, 'The identifier, 11 bits: 0x1A5')
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('--store', '--store', [CompletionResultType]::ParameterName, 'Store it then (1010h, the communication settings alone where the device has them apart)')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;pdo;watch' {
+            [CompletionResult]::new('-d', '-d', [CompletionResultType]::ParameterName, 'End after this time')
+            [CompletionResult]::new('--duration', '--duration', [CompletionResultType]::ParameterName, 'End after this time')
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;pdo;help' {
+            [CompletionResult]::new('show', 'show', [CompletionResultType]::ParameterValue, 'Show how the TPDOs are set up')
+            [CompletionResult]::new('map', 'map', [CompletionResultType]::ParameterValue, 'Set what a TPDO carries, and when it is sent')
+            [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Show the TPDOs as they come, decoded, until Ctrl-C')
+            [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
+            break
+        }
+        'cangauge;pdo;help;show' {
+            break
+        }
+        'cangauge;pdo;help;map' {
+            break
+        }
+        'cangauge;pdo;help;watch' {
+            break
+        }
+        'cangauge;pdo;help;help' {
+            break
+        }
         'cangauge;autozero' {
             [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
             [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN interface that is up')
@@ -633,6 +756,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('nmt', 'nmt', [CompletionResultType]::ParameterValue, 'Send NMT commands and tell states')
             [CompletionResult]::new('sdo', 'sdo', [CompletionResultType]::ParameterValue, 'Read and write objects of the object dictionary')
             [CompletionResult]::new('log', 'log', [CompletionResultType]::ParameterValue, 'Record measurements as CSV or JSON Lines')
+            [CompletionResult]::new('pdo', 'pdo', [CompletionResultType]::ParameterValue, 'Show, change and watch what the nodes'' transmit PDOs carry')
             [CompletionResult]::new('autozero', 'autozero', [CompletionResultType]::ParameterValue, 'Make the present reading of a channel zero (6125h), with checks before and after')
             [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Let devices keep their settings beyond power off (1010h)')
             [CompletionResult]::new('restore', 'restore', [CompletionResultType]::ParameterValue, 'Give devices their settings as delivered (1011h); node-ID and bit rate stay')
@@ -654,6 +778,9 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;help;log' {
+            break
+        }
+        'cangauge;help;pdo' {
             break
         }
         'cangauge;help;autozero' {
