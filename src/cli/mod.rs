@@ -14,6 +14,7 @@ mod lss;
 mod nmt;
 mod open;
 pub mod parse;
+mod pdo;
 mod read;
 mod scan;
 mod sdo;
@@ -146,6 +147,8 @@ pub(crate) enum Command {
     Lss(lss::LssCommand),
     /// List CAN interfaces, switch them on and off, find the bit rate of a bus
     Bus(bus::BusCommand),
+    /// Show, change and watch what the nodes' transmit PDOs carry
+    Pdo(pdo::Pdo),
     /// Make the present reading of a channel zero (6125h), with checks before and after
     Autozero(autozero::Autozero),
     /// Let devices keep their settings beyond power off (1010h)
@@ -219,6 +222,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Check(command) => command.run(&cli.global),
         Command::Lss(command) => command.run(&cli.global),
         Command::Bus(command) => command.run(&cli.global),
+        Command::Pdo(command) => command.run(&cli.global),
         Command::Autozero(command) => command.run(&cli.global),
         Command::Store(command) => command.run(&cli.global),
         Command::Restore(command) => command.run(&cli.global),

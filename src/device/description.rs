@@ -189,6 +189,8 @@ pub struct PdoStyle {
     /// What has to be done before the mapping can be changed.
     #[serde(default)]
     pub remap: Remap,
+    /// The transmission type by which the event timer sends, 254 or 255; 254 where the description does not say.
+    pub timer: Option<u8>,
 }
 
 /// What has to be done before a mapping can be changed.

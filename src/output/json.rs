@@ -179,7 +179,7 @@ pub fn seen(out: &mut dyn Write, time: &str, node: NodeId, event: &str, state: O
 }
 
 /// A number as JSON has them: decimals keep their digits, what is not finite is null.
-struct JsonNumber(Option<Number>);
+pub(super) struct JsonNumber(pub(super) Option<Number>);
 
 impl Serialize for JsonNumber {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

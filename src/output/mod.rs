@@ -8,6 +8,7 @@ pub mod json;
 pub mod json_lss;
 pub mod junit;
 pub mod limits;
+pub mod pdo;
 pub mod progress;
 pub mod rows;
 pub mod summary;

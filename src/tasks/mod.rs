@@ -9,6 +9,7 @@ mod kept;
 pub mod log;
 pub mod lss;
 pub mod nmt;
+pub mod pdo;
 pub mod read;
 pub mod restore;
 pub mod scan;

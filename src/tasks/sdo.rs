@@ -121,16 +121,20 @@ impl Knowledge {
             None => standard::names().collect(),
         };
         let what = model.as_ref().map_or_else(|| "the standard".to_owned(), |model| model.description.title.clone());
-        let mut near: Vec<(usize, String)> = known
-            .into_iter()
-            .map(|known| (distance(name, &known), known))
-            .filter(|(distance, _)| *distance <= name.len() / 2)
-            .collect();
-        near.sort();
-        let near: Vec<String> = near.into_iter().take(3).map(|(_, name)| name).collect();
+        let near = nearest(name, known.into_iter());
         let failure = Failure::of_node(Kind::Usage, self.node, format!("{what} has no object \"{name}\""));
         Err(if near.is_empty() { failure } else { failure.hint(format!("nearest: {}", near.join(", "))) })
     }
+}
+
+/// The known names that are nearest to a word, at most three.
+pub(super) fn nearest(word: &str, known: impl Iterator<Item = String>) -> Vec<String> {
+    let mut near: Vec<(usize, String)> = known
+        .map(|known| (distance(word, &known), known))
+        .filter(|(distance, _)| *distance <= word.len() / 2)
+        .collect();
+    near.sort();
+    near.into_iter().take(3).map(|(_, name)| name).collect()
 }
 
 /// Reads an object.

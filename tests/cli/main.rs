@@ -12,6 +12,7 @@ mod log_file;
 mod lss;
 mod nmt;
 mod output;
+mod pdo;
 mod read;
 mod replay;
 mod scan;

@@ -6,6 +6,8 @@ mod detect;
 mod full_queue;
 mod garbage;
 mod lss;
+mod pdo_map;
+mod pdo_map_devices;
 mod scan;
 mod second_master;
 mod second_sync;
