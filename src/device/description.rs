@@ -34,6 +34,9 @@ pub struct Description {
     /// Deviations from the standard that code has to know about.
     #[serde(default)]
     pub quirks: Vec<super::quirk::Quirk>,
+    /// How an entry of its error history (1003h) is laid out.
+    #[serde(default)]
+    pub error_history: ErrorHistory,
     /// Index of the LSS bit rate table to bit rate in bit/s.
     #[serde(default)]
     pub bit_rates: BTreeMap<String, u32>,
@@ -65,6 +68,31 @@ pub struct Startup {
     pub wait: u32,
     /// The device starts itself.
     pub auto: u32,
+}
+
+/// How an entry of the error history (1003h:1 …) holds an emergency.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ErrorHistory {
+    /// CiA 301, 7.5.2.5: the code in bits 0 to 15; what the upper half says is the manufacturer's secret.
+    #[default]
+    CodeLow,
+    /// The code in bits 0 to 15, byte 4 of the emergency in 16 to 23 and byte 3 in 24 to 31 (MH-4).
+    CodeLowBytesSwapped,
+    /// The code in bits 16 to 31 (HYDAC).
+    CodeHigh,
+}
+
+impl ErrorHistory {
+    /// The emergency code of an entry, and bytes 3 and 4 of the emergency where the entry holds them.
+    pub fn read(self, entry: u32) -> (u16, Option<[u8; 2]>) {
+        let [a, b, c, d] = entry.to_le_bytes();
+        match self {
+            ErrorHistory::CodeLow => (u16::from_le_bytes([a, b]), None),
+            ErrorHistory::CodeLowBytesSwapped => (u16::from_le_bytes([a, b]), Some([d, c])),
+            ErrorHistory::CodeHigh => (u16::from_le_bytes([c, d]), None),
+        }
+    }
 }
 
 /// What a device answers that tells its kind; everything given must agree.
@@ -219,6 +247,18 @@ pub struct ObjectEntry {
     pub doubt: String,
 }
 
+impl Description {
+    /// The entry that describes `object`, be it of a run.
+    pub fn object(&self, object: ObjectId) -> Option<&ObjectEntry> {
+        self.objects.iter().find(|entry| entry.objects().is_ok_and(|mut objects| objects.any(|other| other == object)))
+    }
+
+    /// What an emergency code means on this device.
+    pub fn emergency(&self, code: u16) -> Option<&EmergencyEntry> {
+        self.emergencies.iter().find(|entry| entry.code == code)
+    }
+}
+
 impl ObjectEntry {
     /// The object that the entry stands for, or every one of a run of sub-indices.
     ///
@@ -241,6 +281,12 @@ impl ObjectEntry {
     /// Whether the entry stands for a run of sub-indices, be it of one.
     pub fn is_run(&self) -> bool {
         self.at.split_once(':').is_some_and(|(_, subs)| subs.contains('-'))
+    }
+
+    /// What a number in this object means, where the description says.
+    pub fn meaning(&self, number: u64) -> Option<&str> {
+        let is = |key: &str| parse_u32(key).is_some_and(|key| u64::from(key) == number);
+        self.values.iter().find(|(key, _)| is(key)).map(|(_, meaning)| meaning.as_str())
     }
 
     /// Whether `number` lies within the limits and, where values are listed, is one of them.

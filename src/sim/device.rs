@@ -79,7 +79,7 @@ impl Device {
         let tpdos = Tpdo::all(&objects);
         let answers_60 = description.quirks.contains(&Quirk::UploadAnswered60);
         let sdo = SdoServer::new(description.sdo.clone(), answers_60);
-        let emergencies = Emergencies::new(&description.emergencies);
+        let emergencies = Emergencies::new(description);
         let memory = Memory { node: setup.node, objects, channels, emergencies, remap: description.pdo.remap };
         Ok(Device {
             setup,

@@ -5,7 +5,7 @@ use crate::bus::time::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
-use crate::device::description::EmergencyEntry;
+use crate::device::description::{Description, EmergencyEntry, ErrorHistory};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
@@ -18,6 +18,7 @@ const INHIBIT_TIME: ObjectId = ObjectId::new(0x1015, 0);
 #[derive(Clone, Debug, Default)]
 pub(super) struct Emergencies {
     described: Vec<EmergencyEntry>,
+    layout: ErrorHistory,
     /// Codes that are pending, and on which channels; channel 0 stands for the device.
     pending: BTreeMap<u16, BTreeSet<u8>>,
     history: VecDeque<u32>,
@@ -27,8 +28,9 @@ pub(super) struct Emergencies {
 }
 
 impl Emergencies {
-    pub(super) fn new(described: &[EmergencyEntry]) -> Emergencies {
-        Emergencies { described: described.to_vec(), ..Emergencies::default() }
+    pub(super) fn new(description: &Description) -> Emergencies {
+        let described = description.emergencies.clone();
+        Emergencies { described, layout: description.error_history, ..Emergencies::default() }
     }
 
     /// Whether the device knows this emergency.
@@ -50,9 +52,12 @@ impl Emergencies {
         }
         let entries = self.capacity(objects);
         if entries > 0 {
-            // MH-4, 4.1.3: byte 4 of the message in bits 16 to 23, byte 3 in bits 24 to 31.
             let [low, high] = code.to_le_bytes();
-            self.history.push_front(u32::from_le_bytes([low, high, extra[1], extra[0]]));
+            self.history.push_front(u32::from_le_bytes(match self.layout {
+                ErrorHistory::CodeLow => [low, high, 0, 0],
+                ErrorHistory::CodeLowBytesSwapped => [low, high, extra[1], extra[0]],
+                ErrorHistory::CodeHigh => [0, 0, low, high],
+            }));
             self.history.truncate(entries);
         }
         self.publish(objects);
@@ -172,7 +177,7 @@ mod tests {
 
     fn mh4() -> (Objects, Emergencies) {
         let model = catalog::by_name("mh4").expect("built in");
-        (Objects::new(&model, node()), Emergencies::new(&model.description.emergencies))
+        (Objects::new(&model, node()), Emergencies::new(&model.description))
     }
 
     fn frames(objects: &Objects, emergencies: &mut Emergencies) -> Vec<String> {
@@ -256,7 +261,7 @@ mod tests {
     fn dps_has_its_own_codes_and_registers() {
         let model = catalog::by_name("dps").expect("built in");
         let mut objects = Objects::new(&model, node());
-        let mut emergencies = Emergencies::new(&model.description.emergencies);
+        let mut emergencies = Emergencies::new(&model.description);
         emergencies.raise(&mut objects, 0x3201, 1, 0x03);
         assert_eq!(frames(&objects, &mut emergencies), ["085#0132050000000000"]);
     }

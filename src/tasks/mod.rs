@@ -6,5 +6,6 @@ pub mod nmt;
 pub mod read;
 pub mod scan;
 pub mod sdo;
+pub mod settings;
 
 pub use failure::{Failure, Kind};
