@@ -3,15 +3,21 @@
 
 pub mod args;
 mod completions;
+mod errors;
 pub mod exit;
 mod file;
+mod filter;
+mod info;
+mod limits;
 mod log;
+mod minmax;
 mod nmt;
 mod open;
 mod read;
 mod scan;
 mod sdo;
 mod sim;
+mod unit;
 
 use crate::master::{Master, Timing};
 use crate::output::console::Console;
@@ -28,6 +34,8 @@ Examples, on the simulated bus; leave `-b sim` out where one CAN interface is up
   cangauge -b sim read 1                                 its measured values now
   cangauge -b sim log 1 --sync 100ms --count 20          its measurements as CSV
   cangauge -b sim log 1-3,127 --sync 10ms --duration 1h -o run.csv
+  cangauge -b sim info 1                                 all of one device on one page
+  cangauge -b sim unit 127 bar                           its unit, and what that rescales
   cangauge -b sim sdo read 1 0x1018:1                    one object, bare
   cangauge -b sim nmt reset 1                            restart it, wait for the boot-up
 
@@ -125,6 +133,12 @@ pub(crate) enum Command {
     Nmt(nmt::Nmt),
     Sdo(sdo::Sdo),
     Log(log::Log),
+    Info(info::Info),
+    Unit(unit::Unit),
+    Filter(filter::Filter),
+    Limits(limits::Limits),
+    Minmax(minmax::Minmax),
+    Errors(errors::Errors),
     Sim(sim::Sim),
     Completions(completions::Completions),
 }
@@ -187,6 +201,12 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Info(command) => command.run(&cli.global),
+        Command::Unit(command) => command.run(&cli.global),
+        Command::Filter(command) => command.run(&cli.global),
+        Command::Limits(command) => command.run(&cli.global),
+        Command::Minmax(command) => command.run(&cli.global),
+        Command::Errors(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }

@@ -234,6 +234,8 @@ pub struct ObjectEntry {
     pub unit: Option<String>,
     /// The channel whose physical unit (6131h) its number is in, for objects of which CiA 404 does not say so.
     pub follows_unit: Option<u8>,
+    /// The object that holds the code of its unit (as 6131h), where that is not the channel's present one.
+    pub unit_at: Option<ObjectId>,
     /// Which store group keeps it: `comm`, `app`, `all`; absent when 1010h does not.
     pub stored: Option<String>,
     /// What it is and does, in one or two sentences.

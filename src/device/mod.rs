@@ -5,5 +5,6 @@ pub mod description;
 pub mod dictionary;
 pub mod eds;
 pub mod quirk;
+pub mod sensor;
 pub mod standard;
 pub mod unit;

@@ -8,7 +8,7 @@ use crate::tasks::{Failure, Kind};
 use serde::Serialize;
 use std::io::{self, Write};
 
-fn line<T: Serialize>(out: &mut dyn Write, object: &T) -> io::Result<()> {
+pub(super) fn line<T: Serialize>(out: &mut dyn Write, object: &T) -> io::Result<()> {
     serde_json::to_writer(&mut *out, object)?;
     out.write_all(b"\n")
 }
@@ -123,7 +123,7 @@ pub fn seen(out: &mut dyn Write, time: &str, node: NodeId, event: &str, state: O
 }
 
 /// A number as JSON has them: decimals keep their digits, what is not finite is null.
-struct JsonNumber(Option<Number>);
+pub(super) struct JsonNumber(pub(super) Option<Number>);
 
 impl Serialize for JsonNumber {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

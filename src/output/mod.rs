@@ -1,9 +1,12 @@
 //! Rows and text: what goes to stdout, stderr and files. Knows no bus and no command line.
 
 pub mod console;
+pub mod info;
+pub mod info_json;
 pub mod json;
 pub mod progress;
 pub mod rows;
+pub mod settings;
 pub mod summary;
 pub mod table;
 pub mod text;

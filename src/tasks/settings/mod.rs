@@ -6,6 +6,7 @@ pub mod filter;
 pub mod info;
 pub mod limits;
 pub mod minmax;
+mod page;
 pub mod unit;
 
 use crate::canopen::id::NodeId;
