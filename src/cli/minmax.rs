@@ -39,12 +39,15 @@ impl Minmax {
 
     fn print(&self, report: &[(Extremes, Option<Extremes>)], format: Format) -> io::Result<()> {
         let mut out = io::stdout().lock();
-        let text = |quantity: Option<Quantity>| quantity.map_or_else(|| "-".to_owned(), |quantity| quantity.to_string());
+        let text =
+            |quantity: Option<Quantity>| quantity.map_or_else(|| "-".to_owned(), |quantity| quantity.to_string());
         // After a reset what was there before is worth more than what has come since.
         let shown = report.iter().map(|(now, before)| before.as_ref().unwrap_or(now));
         match format {
             Format::Json => {
-                report.iter().try_for_each(|(now, before)| json::extremes(&mut out, self.node, now, before.as_ref()))?;
+                report
+                    .iter()
+                    .try_for_each(|(now, before)| json::extremes(&mut out, self.node, now, before.as_ref()))?;
             }
             Format::Csv => {
                 let mut csv = csv::Writer::from_writer(&mut out);

@@ -68,6 +68,9 @@ pub struct Startup {
     pub wait: u32,
     /// The device starts itself.
     pub auto: u32,
+    /// What the manual contradicts or leaves open.
+    #[serde(default)]
+    pub doubt: String,
 }
 
 /// How an entry of the error history (1003h:1 …) holds an emergency.
@@ -135,6 +138,9 @@ pub struct SdoStyle {
     /// Whether it knows block transfer.
     #[serde(default)]
     pub block: bool,
+    /// The abort codes that its manual lists; empty where none are printed.
+    #[serde(default)]
+    pub aborts: Vec<u32>,
 }
 
 /// Whether the command specifier of an expedited transfer tells the size.
@@ -236,7 +242,8 @@ pub struct ObjectEntry {
     pub follows_unit: Option<u8>,
     /// The object that holds the code of its unit (as 6131h), where that is not the channel's present one.
     pub unit_at: Option<ObjectId>,
-    /// Which store group keeps it: `comm`, `app`, `all`; absent when 1010h does not.
+    /// Which store group keeps it: `comm`, `app`, `all`, or `lss` that 1010h:1 leaves out and 1010h:4 keeps;
+    /// absent when 1010h does not.
     pub stored: Option<String>,
     /// What it is and does, in one or two sentences.
     #[serde(default)]

@@ -63,15 +63,15 @@ fn identity(info: &Info) -> Rows {
     let mut rows: Rows = Vec::new();
     rows.extend(identity.name.as_ref().map(|name| row("name", super::text::safe(name))));
     rows.extend(described.map(|description| row("description", &description.name)));
-    rows.extend(identity.device_type.map(|number| {
-        row("device type", format!("0x{number:08X} profile {}", number & 0xffff))
-    }));
+    rows.extend(
+        identity.device_type.map(|number| row("device type", format!("0x{number:08X} profile {}", number & 0xffff))),
+    );
     let vendor = described.map_or("", |description| description.vendor.as_str());
     rows.extend(identity.vendor.map(|number| row("vendor", format!("0x{number:08X} {vendor}").trim_end())));
     rows.extend(identity.product.map(|number| row("product", format!("0x{number:08X}"))));
-    rows.extend(identity.revision.map(|number| {
-        row("revision", format!("0x{number:08X} {}.{}", number >> 16, number & 0xffff))
-    }));
+    rows.extend(
+        identity.revision.map(|number| row("revision", format!("0x{number:08X} {}.{}", number >> 16, number & 0xffff))),
+    );
     rows.extend(identity.serial.map(|number| row("serial", number.to_string())));
     rows.extend(info.hardware.as_ref().map(|version| row("hardware", super::text::safe(version))));
     rows.extend(info.software.as_ref().map(|version| row("software", super::text::safe(version))));

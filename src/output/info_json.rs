@@ -31,7 +31,8 @@ impl<'a> JsonSetting<'a> {
 #[derive(Serialize)]
 struct JsonIdentity<'a> {
     name: Option<&'a str>,
-    device_type: Option<u32>,
+    device_type: Option<String>,
+    profile: Option<u32>,
     vendor: Option<u32>,
     product: Option<u32>,
     revision: Option<u32>,
@@ -158,7 +159,8 @@ pub fn object(out: &mut dyn Write, info: &Info) -> io::Result<()> {
             title: described.map(|description| description.title.as_str()),
             identity: JsonIdentity {
                 name: identity.name.as_deref(),
-                device_type: identity.device_type,
+                device_type: identity.device_type.map(|device_type| format!("0x{device_type:08X}")),
+                profile: identity.profile(),
                 vendor: identity.vendor,
                 product: identity.product,
                 revision: identity.revision,

@@ -130,7 +130,9 @@ impl Device {
         self.restart_heartbeat(now + self.heartbeat_period().unwrap_or_default());
         // MH-4, 4.1.16: 8 starts by itself. CiA 302-2: bit 3 set with bit 2 clear.
         let startup = self.memory.objects.number(NMT_STARTUP);
-        let starts = self.setup.start || startup & 0b1100 == 0b1000;
+        let other = self.setup.model.description.startup.as_ref().filter(|startup| startup.object != NMT_STARTUP);
+        let by_other = other.is_some_and(|other| self.memory.objects.number(other.object) == other.auto);
+        let starts = self.setup.start || by_other || startup & 0b1100 == 0b1000;
         self.enter(if starts { State::Operational } else { State::PreOperational }, now);
         self.memory.emergencies.publish(&mut self.memory.objects);
         self.look_for_overload(now);
@@ -178,10 +180,15 @@ impl Device {
         self.phase = Phase::Starting(now + if area == Area::All { RESTART } else { RECONNECT });
     }
 
-    /// A node-ID that was written with its signature and saved is taken at the next reset.
+    /// A node-ID that was written and saved is taken at the next reset.
     fn saved_node(&self) -> NodeId {
         let objects = &self.memory.objects;
-        let object = objects.specs().find(|(_, spec)| spec.signature == Some(Signature::Set) && spec.name == "node-id");
+        let object = objects.specs().find(|(_, spec)| match spec.name.as_str() {
+            "node-id" => spec.signature == Some(Signature::Set),
+            // HYDAC 2003h:2.
+            "node-id-pending" => true,
+            _ => false,
+        });
         let saved = object.and_then(|(object, _)| objects.saved(object)?.first().copied());
         saved.and_then(|id| NodeId::new(id).ok()).unwrap_or(self.memory.node)
     }
@@ -323,6 +330,7 @@ impl Device {
     }
 
     fn send_emergencies(&mut self, now: Mono, out: &mut Outbox) {
+        self.memory.emergencies.repeat(&self.memory.objects, now);
         if matches!(self.phase, Phase::Running(State::Stopped)) {
             self.memory.emergencies.drop_waiting();
         }

@@ -1,11 +1,13 @@
 //! Emergencies of a simulated device: what is pending, the error register, the history, and the frames.
 
+use super::device::next_turn;
 use super::objects::Objects;
 use crate::bus::time::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::device::description::{Description, EmergencyEntry, ErrorHistory};
+use crate::device::quirk::Quirk;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
@@ -25,12 +27,17 @@ pub(super) struct Emergencies {
     waiting: VecDeque<[u8; 8]>,
     /// Before this moment the inhibit time forbids the next frame.
     free: Mono,
+    /// The deviation [`Quirk::EmergencyRepeats`].
+    repeats: bool,
+    /// What is said again while an error is pending, and when.
+    again: Option<([u8; 8], Mono)>,
 }
 
 impl Emergencies {
     pub(super) fn new(description: &Description) -> Emergencies {
         let described = description.emergencies.clone();
-        Emergencies { described, layout: description.error_history, ..Emergencies::default() }
+        let repeats = description.quirks.contains(&Quirk::EmergencyRepeats);
+        Emergencies { described, layout: description.error_history, repeats, ..Emergencies::default() }
     }
 
     /// Whether the device knows this emergency.
@@ -84,6 +91,7 @@ impl Emergencies {
     /// As after power-on.
     pub(super) fn forget(&mut self) {
         self.pending.clear();
+        self.again = None;
         self.history.clear();
         self.waiting.clear();
     }
@@ -128,20 +136,42 @@ impl Emergencies {
         self.waiting.push_back([low, high, register, a, b, c, d, e]);
     }
 
+    /// Puts the emergency of a pending error behind those that wait when its time has come again.
+    pub(super) fn repeat(&mut self, objects: &Objects, now: Mono) {
+        let Some((message, due)) = self.again else { return };
+        if self.pending.is_empty() {
+            self.again = None;
+        } else if due <= now {
+            self.waiting.push_back(message);
+            self.again = repeat_time(objects).map(|period| (message, next_turn(due, period, now)));
+        }
+    }
+
     /// The next message, if one waits and the inhibit time allows it.
     pub(super) fn next_frame(&mut self, objects: &Objects, node: NodeId, now: Mono) -> Option<Frame> {
         if now < self.free {
             return None;
         }
         let message = self.waiting.pop_front()?;
+        if self.repeats && self.again.is_none() && !self.pending.is_empty() {
+            self.again = repeat_time(objects).map(|period| (message, now + period));
+        }
         self.free = now + Duration::from_micros(100) * objects.number(INHIBIT_TIME);
         Some(Frame::full(cob_id(objects, node)?, message))
     }
 
     /// When [`Emergencies::next_frame`] has something.
     pub(super) fn next_wake(&self) -> Option<Mono> {
-        self.waiting.front().map(|_| self.free)
+        let waiting = self.waiting.front().map(|_| self.free);
+        let again = self.again.map(|(_, due)| due);
+        waiting.into_iter().chain(again).min()
     }
+}
+
+/// How often a pending error is told again; `None` where it is told once.
+fn repeat_time(objects: &Objects) -> Option<Duration> {
+    let (object, _) = objects.specs().find(|(_, spec)| spec.name == "emcy-repeat-time")?;
+    Some(objects.number(object)).filter(|&period| period > 0).map(|period| Duration::from_millis(period.into()))
 }
 
 /// The identifier of emergencies: 1014h, unless its bit 31 switches them off.

@@ -68,6 +68,8 @@ pub(super) enum Group {
     All,
     Communication,
     Application,
+    /// Node-ID and bit rate, where "all" leaves them out (HYDAC 1010h:4).
+    Lss,
 }
 
 impl Group {
@@ -77,6 +79,7 @@ impl Group {
             1 => Group::All,
             2 => Group::Communication,
             3 => Group::Application,
+            4 => Group::Lss,
             _ => return None,
         })
     }
@@ -86,13 +89,14 @@ impl Group {
             "all" => Group::All,
             "comm" => Group::Communication,
             "app" => Group::Application,
+            "lss" => Group::Lss,
             _ => return None,
         })
     }
 
     /// Whether a command for `self` reaches an entry of group `entry`.
     fn reaches(self, entry: Group) -> bool {
-        self == Group::All || self == entry
+        self == entry || self == Group::All && entry != Group::Lss
     }
 }
 
@@ -119,6 +123,8 @@ pub(super) struct Objects {
     marked: bool,
     /// The deviation [`Quirk::SaveAllResetsCobIds`].
     resets_cob_ids: bool,
+    /// The deviation [`Quirk::CobIdZeroIsDefault`].
+    zero_is_default: bool,
     values: BTreeMap<ObjectId, Vec<u8>>,
     saved: BTreeMap<ObjectId, Vec<u8>>,
 }
@@ -137,6 +143,7 @@ impl Objects {
             specs: Arc::new(specs),
             marked,
             resets_cob_ids: model.description.quirks.contains(&Quirk::SaveAllResetsCobIds),
+            zero_is_default: model.description.quirks.contains(&Quirk::CobIdZeroIsDefault),
             values: BTreeMap::new(),
             saved: BTreeMap::new(),
         };
@@ -178,6 +185,18 @@ impl Objects {
     /// The working value as a number of its type.
     pub(super) fn real(&self, object: ObjectId) -> Option<f64> {
         self.spec(object)?.data_type.decode(self.bytes(object)?).ok()?.as_f64()
+    }
+
+    /// Whether a write asks for the default of a COB-ID instead of the value written.
+    pub(super) fn asks_for_default(&self, object: ObjectId, bytes: &[u8]) -> bool {
+        self.zero_is_default && is_cob_id(object) && bytes.iter().all(|&byte| byte == 0)
+    }
+
+    /// Puts the value as delivered in place.
+    pub(super) fn put_default(&mut self, object: ObjectId, node: NodeId) {
+        if let Some(value) = self.spec(object).map(|spec| spec.delivered(node)) {
+            self.values.insert(object, value);
+        }
     }
 
     /// Puts a working value in place, whatever the access says.

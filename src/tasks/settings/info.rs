@@ -184,7 +184,7 @@ fn of_channel(device: &Device, signal: &Signal) -> Vec<ObjectId> {
     let numbered = numbered.filter(|entry| entry.numbered && entry.object.sub == signal.channel);
     objects.extend(numbered.map(|entry| entry.object).filter(|object| page::is_own(*object)));
     objects.extend(["minimum-pv", "maximum-pv"].into_iter().filter_map(|name| device.of_signal(signal, name)));
-    let mut seen = BTreeSet::new();
+    let mut seen: BTreeSet<ObjectId> = signal.also.iter().copied().collect();
     objects.retain(|&object| {
         let readable = device.entry(object).is_none_or(|entry| entry.access.is_readable());
         device.may_have(object) && readable && seen.insert(object)

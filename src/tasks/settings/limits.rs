@@ -89,12 +89,7 @@ pub fn show(master: &mut Master<'_>, device: &Device, signal: &str) -> Result<Li
 ///
 /// # Errors
 /// Numbers that the device cannot hold, a lower limit above the upper one, refusals, silence.
-pub fn set(
-    master: &mut Master<'_>,
-    device: &Device,
-    signal: &str,
-    wanted: &[(Limit, f64)],
-) -> Result<Limits, Failure> {
+pub fn set(master: &mut Master<'_>, device: &Device, signal: &str, wanted: &[(Limit, f64)]) -> Result<Limits, Failure> {
     let before = show(master, device, signal)?;
     let described = device.signal(Some(signal))?;
     let usage = |message: String| Failure::of_node(Kind::Usage, device.node(), message);

@@ -45,11 +45,7 @@ fn extremes(
 ) -> Result<Extremes, Failure> {
     let values = device.read_each(master, &objects)?;
     let quantity = |value: Option<&Option<Value>>| device.quantity(signal, value?.as_ref()?);
-    Ok(Extremes {
-        signal: signal.name.clone(),
-        lowest: quantity(values.first()),
-        highest: quantity(values.get(1)),
-    })
+    Ok(Extremes { signal: signal.name.clone(), lowest: quantity(values.first()), highest: quantity(values.get(1)) })
 }
 
 /// Resets minimum and maximum of every signal that has them; the values before and after. The signature is

@@ -125,9 +125,7 @@ impl Device {
         match (name, self.instrument.signals.as_slice()) {
             (Some(name), _) => super::read::find(&self.instrument, name),
             (None, [only]) => Ok(only),
-            (None, []) => {
-                Err(Failure::of_node(Kind::Unexpected, self.node(), "it has no measured value of CiA 404"))
-            }
+            (None, []) => Err(Failure::of_node(Kind::Unexpected, self.node(), "it has no measured value of CiA 404")),
             (None, several) => {
                 let names: Vec<&str> = several.iter().map(|signal| signal.name.as_str()).collect();
                 let message = format!("which signal? It has {}", names.join(", "));
@@ -141,8 +139,7 @@ impl Device {
     /// # Errors
     /// Silence, breaches of the protocol, and what stops everything.
     pub fn read_each(&self, master: &mut Master<'_>, objects: &[ObjectId]) -> Result<Vec<Option<Value>>, Failure> {
-        let items: Vec<_> =
-            objects.iter().map(|&object| (self.node(), object, self.data_type(object))).collect();
+        let items: Vec<_> = objects.iter().map(|&object| (self.node(), object, self.data_type(object))).collect();
         let told = |result: Result<Value, SdoError>| match result {
             Ok(value) => Ok(Some(value)),
             Err(SdoError { failure: SdoFailure::Refused(_) | SdoFailure::Fit(_), .. }) => Ok(None),

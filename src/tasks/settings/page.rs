@@ -39,6 +39,11 @@ pub(super) fn text(
         let unit = u32::try_from(unit).map(Unit).map(|unit| unit.to_string()).unwrap_or_default();
         return format!("{value} {unit}");
     }
+    let codes =
+        device.model().is_some_and(|model| model.description.objects.iter().any(|entry| entry.unit_at == Some(object)));
+    if let Some(code) = number.filter(|_| codes).and_then(|code| u32::try_from(code).ok()) {
+        return Unit(code).to_string();
+    }
     match (object.index, number) {
         (0x1005 | 0x1014, Some(number)) => format!("0x{number:X}"),
         (0x100c | 0x1017, Some(0)) => "off".to_owned(),

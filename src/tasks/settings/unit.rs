@@ -146,7 +146,8 @@ pub fn set(
     let digits = ObjectId::new(0x6132, signal.channel);
     let told = if device.may_have(digits) { device.read_each(master, &[digits])?.pop().flatten() } else { None };
     let mut renewed = Signal { unit: Some(unit), ..signal.clone() };
-    renewed.digits = told.as_ref().and_then(Value::as_u64).and_then(|number| u8::try_from(number).ok()).or(signal.digits);
+    renewed.digits =
+        told.as_ref().and_then(Value::as_u64).and_then(|number| u8::try_from(number).ok()).or(signal.digits);
     let after = device.read_each(master, &addresses)?;
     let rescaled = objects
         .iter()
