@@ -11,6 +11,7 @@ mod output;
 mod read;
 mod scan;
 mod sdo;
+mod settings;
 
 use std::fs;
 use std::io::{self, Read};
