@@ -192,7 +192,7 @@ impl Recording {
                 Happening::Deadline => {
                     self.end = until;
                     if stop.is_some_and(|stop| until >= stop) || self.rows == 0 && until >= give_up {
-                        return ControlFlow::Continue(());
+                        return Ok(());
                     }
                     if let Some((period, id)) = sync
                         && until >= begin + nth(period, slot)
