@@ -3,7 +3,7 @@
 use super::exit::stdout;
 use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
-use crate::output::{info, settings as json, table};
+use crate::output::{csv, info, settings as json, table};
 use crate::tasks::settings::Device;
 use crate::tasks::settings::errors::{Errors as Report, clear, read};
 use clap::Args;
@@ -50,14 +50,12 @@ impl Errors {
         match format {
             Format::Json => json::errors(&mut out, self.node, report, cleared)?,
             Format::Csv => {
-                let mut csv = csv::Writer::from_writer(&mut out);
-                csv.write_record(["node", "number", "code", "text", "detail", "raw"])?;
-                for (at, error) in report.history.iter().enumerate() {
+                let rows = report.history.iter().enumerate().map(|(at, error)| {
                     let (code, raw) = (format!("0x{:04X}", error.code), format!("0x{:08X}", error.raw));
                     let (node, number) = (self.node.to_string(), (at + 1).to_string());
-                    csv.write_record([&node, &number, &code, &error.text, &error.detail, &raw])?;
-                }
-                csv.flush()?;
+                    vec![node, number, code, error.text.clone(), error.detail.clone(), raw]
+                });
+                csv::write(&mut out, &["node", "number", "code", "text", "detail", "raw"], rows)?;
             }
             Format::Text => table::write(&mut out, &[table::Align::Left; 2], &info::errors(report))?,
         }

@@ -4,7 +4,7 @@ use super::args::Duration;
 use super::exit::stdout;
 use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
-use crate::output::{settings as json, table};
+use crate::output::{csv, settings as json, table};
 use crate::tasks::settings::Device;
 use crate::tasks::settings::filter::{FilterOf, FilterType, Wanted, set, show};
 use clap::{Args, ValueEnum};
@@ -89,13 +89,11 @@ impl Filter {
                 filters.iter().try_for_each(|filter| json::filter(&mut out, self.node, filter, damping_shown))?;
             }
             Format::Csv => {
-                let mut csv = csv::Writer::from_writer(&mut out);
-                csv.write_record(["node", "signal", "code", "type", "constant"])?;
-                for filter in filters {
+                let row = |filter: &FilterOf| {
                     let (code, constant) = (number(filter.code), number(filter.constant));
-                    csv.write_record([&node, &filter.signal, &code, &filter.kind, &constant])?;
-                }
-                csv.flush()?;
+                    vec![node.clone(), filter.signal.clone(), code, filter.kind.clone(), constant]
+                };
+                csv::write(&mut out, &["node", "signal", "code", "type", "constant"], filters.iter().map(row))?;
             }
             Format::Text => {
                 let row = |filter: &FilterOf| {

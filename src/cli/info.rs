@@ -3,7 +3,7 @@
 use super::exit::stdout;
 use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
-use crate::output::{info, info_json};
+use crate::output::{csv, info, info_json};
 use crate::tasks::settings::Device;
 use crate::tasks::settings::info::{Info as Page, Setting, read};
 use clap::Args;
@@ -31,7 +31,7 @@ impl Info {
         let mut text = Vec::new();
         match global.format {
             Format::Json => info_json::object(&mut text, &page),
-            Format::Csv => csv(&mut text, &page),
+            Format::Csv => table(&mut text, &page),
             Format::Text => info::text(&mut text, &page),
         }
         .and_then(|()| io::stdout().lock().write_all(&text))
@@ -40,13 +40,12 @@ impl Info {
 }
 
 /// Every object of the page in a row.
-fn csv(out: &mut dyn Write, page: &Page) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(["node", "object", "name", "value", "text"])?;
+fn table(out: &mut dyn Write, page: &Page) -> io::Result<()> {
     let node = page.instrument.node.to_string();
     let settings = page.channels.iter().flat_map(|channel| &channel.settings);
-    for Setting { object, name, value, text } in page.communication.iter().chain(settings).chain(&page.own) {
-        csv.write_record([&node, &object.to_string(), name, &value.to_string(), text])?;
-    }
-    csv.flush()
+    let rows =
+        page.communication.iter().chain(settings).chain(&page.own).map(|Setting { object, name, value, text }| {
+            vec![node.clone(), object.to_string(), name.clone(), value.to_string(), text.clone()]
+        });
+    csv::write(out, &["node", "object", "name", "value", "text"], rows)
 }

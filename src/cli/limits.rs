@@ -3,7 +3,7 @@
 use super::exit::stdout;
 use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
-use crate::output::{settings as json, table};
+use crate::output::{csv, settings as json, table};
 use crate::tasks::settings::Device;
 use crate::tasks::settings::limits::{Limit, Limits as Report, set, show};
 use clap::Args;
@@ -79,14 +79,12 @@ impl Limits {
         match format {
             Format::Json => json::limits(&mut out, self.node, report)?,
             Format::Csv => {
-                let mut csv = csv::Writer::from_writer(&mut out);
-                csv.write_record(["node", "signal", "limit", "value", "unit"])?;
-                for (limit, _, quantity) in &report.values {
+                let rows = report.values.iter().map(|(limit, _, quantity)| {
                     let unit = quantity.unit.map(|unit| unit.to_string()).unwrap_or_default();
-                    let number = quantity.number.to_string();
-                    csv.write_record([&*self.node.to_string(), &report.signal, limit.as_str(), &number, &unit])?;
-                }
-                csv.flush()?;
+                    let (node, limit) = (self.node.to_string(), limit.as_str().to_owned());
+                    vec![node, report.signal.clone(), limit, quantity.number.to_string(), unit]
+                });
+                csv::write(&mut out, &["node", "signal", "limit", "value", "unit"], rows)?;
             }
             Format::Text => {
                 let rows = report.values.iter().map(|(limit, object, quantity)| {

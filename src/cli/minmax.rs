@@ -3,7 +3,7 @@
 use super::exit::stdout;
 use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
-use crate::output::{settings as json, table};
+use crate::output::{csv, settings as json, table};
 use crate::tasks::settings::minmax::{Extremes, reset, show};
 use crate::tasks::settings::{Device, Quantity};
 use clap::Args;
@@ -50,18 +50,16 @@ impl Minmax {
                     .try_for_each(|(now, before)| json::extremes(&mut out, self.node, now, before.as_ref()))?;
             }
             Format::Csv => {
-                let mut csv = csv::Writer::from_writer(&mut out);
-                csv.write_record(["node", "signal", "min", "max", "unit"])?;
                 let number = |quantity: Option<Quantity>| {
                     quantity.map(|quantity| quantity.number.to_string()).unwrap_or_default()
                 };
-                for extremes in shown {
+                let row = |extremes: &Extremes| {
                     let unit = extremes.lowest.and_then(|quantity| quantity.unit).map(|unit| unit.to_string());
                     let (node, unit) = (self.node.to_string(), unit.unwrap_or_default());
                     let (lowest, highest) = (number(extremes.lowest), number(extremes.highest));
-                    csv.write_record([&*node, &extremes.signal, &lowest, &highest, &unit])?;
-                }
-                csv.flush()?;
+                    vec![node, extremes.signal.clone(), lowest, highest, unit]
+                };
+                csv::write(&mut out, &["node", "signal", "min", "max", "unit"], shown.map(row))?;
             }
             Format::Text => {
                 let row = |extremes: &Extremes| {

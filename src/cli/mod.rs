@@ -2,6 +2,7 @@
 //! it gets.
 
 pub mod args;
+mod bus;
 mod completions;
 mod errors;
 pub mod exit;
@@ -13,6 +14,7 @@ mod log;
 mod minmax;
 mod nmt;
 mod open;
+pub mod parse;
 mod read;
 mod scan;
 mod sdo;
@@ -62,8 +64,8 @@ pub struct Cli {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
-    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN
-    /// interface that is up
+    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a
+    /// candump -L log; receives only). Not given: the only CAN interface that is up
     #[arg(short, long, global = true, env = "CANGAUGE_BUS", value_name = "BUS")]
     pub(crate) bus: Option<BusSpec>,
 
@@ -125,21 +127,38 @@ pub(crate) enum When {
     Never,
 }
 
-/// What to do. The help of each stands with its arguments.
+/// What to do. The first line of each command's own help, which is made up only when it is chosen, stands
+/// here again.
 #[derive(Debug, Subcommand)]
+#[command(defer = true)]
 pub(crate) enum Command {
+    /// List every node that answers, with its state, identity and recognised device
     Scan(scan::Scan),
+    /// Read measured values now, scaled, with unit and status
     Read(read::Read),
+    /// Send NMT commands and tell states
     Nmt(nmt::Nmt),
+    /// Read and write objects of the object dictionary
     Sdo(sdo::Sdo),
+    /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// Tell everything about one device on one page
     Info(info::Info),
+    /// Tell or set the physical unit of a signal (6131h)
     Unit(unit::Unit),
+    /// Tell or set the filter of a signal: type (61A0h) and constant (61A1h)
     Filter(filter::Filter),
+    /// Tell or set what makes a TPDO of a signal go out by itself: delta, limits, hysteresis (x133h to x136h)
     Limits(limits::Limits),
+    /// Tell the lowest and highest value that the device has measured, or reset them
     Minmax(minmax::Minmax),
+    /// Tell the errors of a device: register (1001h) and history (1003h) in words, or clear the history
     Errors(errors::Errors),
+    /// List CAN interfaces, switch them on and off, find the bit rate of a bus
+    Bus(bus::BusCommand),
+    /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
+    /// Print the completions for a shell
     Completions(completions::Completions),
 }
 
@@ -207,6 +226,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Limits(command) => command.run(&cli.global),
         Command::Minmax(command) => command.run(&cli.global),
         Command::Errors(command) => command.run(&cli.global),
+        Command::Bus(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }

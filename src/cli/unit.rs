@@ -6,7 +6,7 @@ use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit as Code;
 use crate::output::console::Console;
-use crate::output::{settings as json, table};
+use crate::output::{csv, settings as json, table};
 use crate::tasks::settings::Device;
 use crate::tasks::settings::unit::{Rescaled, UnitChange, UnitOf, list, set, show};
 use crate::tasks::{Failure, Kind};
@@ -86,13 +86,10 @@ fn print(node: NodeId, units: &[UnitOf], format: Format) -> io::Result<()> {
     match (format, units) {
         (Format::Json, _) => units.iter().try_for_each(|unit| json::unit(&mut out, node, unit))?,
         (Format::Csv, _) => {
-            let mut csv = csv::Writer::from_writer(&mut out);
-            csv.write_record(["node", "signal", "unit", "code"])?;
-            for unit in units {
-                let code = format!("0x{:08X}", unit.unit.0);
-                csv.write_record([&node.to_string(), &unit.signal, &unit.unit.to_string(), &code])?;
-            }
-            csv.flush()?;
+            let row = |unit: &UnitOf| {
+                vec![node.to_string(), unit.signal.clone(), unit.unit.to_string(), format!("0x{:08X}", unit.unit.0)]
+            };
+            csv::write(&mut out, &["node", "signal", "unit", "code"], units.iter().map(row))?;
         }
         (Format::Text, [only]) => writeln!(out, "{}", only.unit)?,
         (Format::Text, several) => {
@@ -114,17 +111,14 @@ fn print_change(node: NodeId, change: &UnitChange, format: Format) -> io::Result
         quantity.map_or_else(|| "-".to_owned(), |quantity| quantity.to_string())
     };
     let rows = change.rescaled.iter().map(|item: &Rescaled| [item.name.clone(), text(item.before), text(item.after)]);
+    let head = [change.now.signal.clone(), change.before.to_string(), change.now.unit.to_string()];
     match format {
         Format::Json => json::unit_change(&mut out, node, change)?,
         Format::Csv => {
-            let mut csv = csv::Writer::from_writer(&mut out);
-            csv.write_record(["name", "before", "after"])?;
-            csv.write_record([&*change.now.signal, &change.before.to_string(), &change.now.unit.to_string()])?;
-            rows.into_iter().try_for_each(|row| csv.write_record(row))?;
-            csv.flush()?;
+            let rows = std::iter::once(head).chain(rows).map(Vec::from);
+            csv::write(&mut out, &["name", "before", "after"], rows)?;
         }
         Format::Text => {
-            let head = [change.now.signal.clone(), change.before.to_string(), change.now.unit.to_string()];
             let arrow = |[name, before, after]: [String; 3]| vec![name, before, "->".to_owned(), after];
             let rows: Vec<Vec<String>> = std::iter::once(head).chain(rows).map(arrow).collect();
             table::write(&mut out, &[table::Align::Left; 4], &rows)?;

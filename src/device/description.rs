@@ -2,6 +2,7 @@
 //!
 //! Unknown keys are errors, so that a typing error in a description is never silently ignored.
 
+use super::assign::AssignEntry;
 use crate::canopen::id::{NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
@@ -42,6 +43,9 @@ pub struct Description {
     pub bit_rates: BTreeMap<String, u32>,
     /// Index that stands for automatic bit rate detection, if the device has one.
     pub auto_bit_rate: Option<u8>,
+    /// The ways to a new node-ID and bit rate, the one to take first.
+    #[serde(default)]
+    pub assign: Vec<AssignEntry>,
     /// Which object decides who starts it after power on.
     pub startup: Option<Startup>,
     /// What it measures.
@@ -98,7 +102,8 @@ impl ErrorHistory {
     }
 }
 
-/// What a device answers that tells its kind; everything given must agree.
+/// What a device answers that tells its kind; everything given must agree. Where nothing is given nothing is
+/// recognised: such a description is taken only when it is named.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identify {
@@ -113,6 +118,15 @@ pub struct Identify {
     /// Objects to read where all of the above is not proof enough, and what they must hold.
     #[serde(default)]
     pub confirm: BTreeMap<ObjectId, Scalar>,
+}
+
+impl Identify {
+    /// Whether nothing is given: then nothing is recognised.
+    pub fn is_empty(&self) -> bool {
+        let Identify { device_type, vendor_id, product_code, device_name, confirm } = self;
+        let numbers = [device_type, vendor_id, product_code];
+        numbers.iter().all(|number| number.is_none()) && device_name.is_none() && confirm.is_empty()
+    }
 }
 
 /// The settings of a new device.
@@ -242,8 +256,7 @@ pub struct ObjectEntry {
     pub follows_unit: Option<u8>,
     /// The object that holds the code of its unit (as 6131h), where that is not the channel's present one.
     pub unit_at: Option<ObjectId>,
-    /// Which store group keeps it: `comm`, `app`, `all`, or `lss` that 1010h:1 leaves out and 1010h:4 keeps;
-    /// absent when 1010h does not.
+    /// Which store group keeps it: `comm`, `app`, `all`; absent when 1010h does not.
     pub stored: Option<String>,
     /// What it is and does, in one or two sentences.
     #[serde(default)]
@@ -390,9 +403,39 @@ pub struct SimEntry {
     pub overload_percent: f64,
     /// The emergency of an overload, if it raises one.
     pub overload_emcy: Option<u16>,
+    /// What its LSS slave knows.
+    #[serde(default)]
+    pub lss: SimLss,
     /// The measured quantities, one per signal.
     #[serde(default, rename = "channel")]
     pub channels: Vec<SimChannel>,
+}
+
+/// What the LSS slave of a simulated device knows.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimLss {
+    /// The services, by the command specifier of the request; all of CiA 305 if there are none.
+    #[serde(default)]
+    pub services: Vec<u8>,
+    /// The NMT states in which it listens to LSS; all if there are none.
+    #[serde(default)]
+    pub states: Vec<SimState>,
+    /// Whether the answer to the selective switch tells the mode (44h 01h) instead of nothing.
+    #[serde(default)]
+    pub tells_mode: bool,
+}
+
+/// An NMT state of a simulated device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SimState {
+    /// STOPPED.
+    Stopped,
+    /// PRE-OPERATIONAL.
+    PreOperational,
+    /// OPERATIONAL.
+    Operational,
 }
 
 /// How a simulated quantity moves: a slow sine with noise.
@@ -419,7 +462,7 @@ pub struct SimChannel {
     pub field: Option<[f64; 2]>,
 }
 
-fn from_text<'de, D, T>(deserializer: D) -> Result<T, D::Error>
+pub(super) fn from_text<'de, D, T>(deserializer: D) -> Result<T, D::Error>
 where
     D: serde::Deserializer<'de>,
     T: std::str::FromStr,

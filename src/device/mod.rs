@@ -1,5 +1,6 @@
 //! What is known of measuring devices: descriptions as data, units, and the objects of CiA 404.
 
+pub mod assign;
 pub mod catalog;
 pub mod description;
 pub mod dictionary;

@@ -1,8 +1,11 @@
 //! Rows and text: what goes to stdout, stderr and files. Knows no bus and no command line.
 
 pub mod console;
+pub mod csv;
+mod elapsed;
 pub mod info;
 pub mod info_json;
+pub mod interfaces;
 pub mod json;
 pub mod progress;
 pub mod rows;

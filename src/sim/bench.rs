@@ -1,19 +1,30 @@
 //! Benches: which simulated devices are on the bus, and how they are set up.
 //!
-//! `mh4@5,dps@127`, or a TOML file:
+//! `mh4@5,dps@127,dps@unconfigured`, or a TOML file:
 //!
 //! ```toml
 //! clock = "virtual"          # "real" unless given
-//! bit_rate = 125000          # 250000 unless given
+//! bit_rate = 125000          # of the bus as the program finds it; 250000 unless given
+//! retime = false             # the program may not change it; it may unless this is given
 //! seed = 7                   # 0 unless given
 //! record = "truth.csv"       # what was sent; beside this file
 //!
 //! [[device]]
 //! kind = "mh4"               # a built-in description, or a description file beside this one
-//! node = 5
+//! node = 5                   # without it the device is unconfigured
+//! twin = true                # another device may have the same node-ID
+//! bit_rate = 125000          # at another one than the bus's the device is deaf and mute
+//! latency = "300us"          # how long it thinks before it answers
+//! gone_after = ["reset"]     # does not come back after it until power on; or "activate"
 //! serial = 4711
 //! start = true               # becomes OPERATIONAL by itself
 //! set = { "0x1017" = 100, "0x1800:5" = 100 }   # as if written and saved before
+//!
+//! [device.lss]               # by the service in the request
+//! lose = [0x17]              # the next answer is lost; once each
+//! late = { "0x11" = "2s" }   # the next answer is late
+//! refuse = { "0x17" = 1 }    # always refused, with this error code: 11h, 13h, 17h
+//! scans_for_ever = true      # answers every fastscan frame in configuration state
 //!
 //! [[device.channel]]         # what is not given is as described
 //! channel = 1
@@ -32,9 +43,9 @@
 use super::device::Device;
 use super::model::{Direction, Overload};
 use super::record::Recorder;
-use super::setup::Setup;
+use super::setup::{GoneAfter, Oddities, Setup};
 use crate::bus::memory::{BIT_RATE, Clock, MemoryBus};
-use crate::canopen::id::NodeId;
+use crate::canopen::id::{NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::device::catalog::{self, Model};
 use crate::device::description::{Scalar, SimChannel};
@@ -44,6 +55,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+/// What stands in the place of the node-ID of a device that has none.
+const UNCONFIGURED: &str = "unconfigured";
+
 /// The bench when none is described.
 const DEFAULT: &str = "mh4@1,d20@2,mc1609@3,dps@127";
 
@@ -51,6 +65,7 @@ const DEFAULT: &str = "mh4@1,d20@2,mc1609@3,dps@127";
 pub struct Bench {
     clock: Clock,
     bit_rate: u32,
+    retime: bool,
     record: Option<PathBuf>,
     devices: Vec<Device>,
 }
@@ -96,10 +111,14 @@ impl Bench {
             let (kind, node) = text.rsplit_once('@').ok_or_else(|| {
                 BenchError::Usage(format!("\"{text}\" is not DEVICE@NODE ({DEFAULT}) and no file FILE.toml"))
             })?;
-            let node = node.parse().map_err(|error| BenchError::Usage(format!("{text}: {error}")))?;
-            Ok(DeviceEntry::new(kind, node))
+            let node = match node {
+                UNCONFIGURED => None,
+                number => Some(number.parse().map_err(|error| BenchError::Usage(format!("{text}: {error}")))?),
+            };
+            Ok(DeviceEntry { kind: kind.to_owned(), node, ..DeviceEntry::default() })
         });
-        let file = BenchFile { device: entries.collect::<Result<_, BenchError>>()?, ..BenchFile::default() };
+        let file =
+            BenchFile { device: entries.collect::<Result<_, BenchError>>()?, retime: true, ..BenchFile::default() };
         Bench::build(file, Path::new(""))
     }
 
@@ -119,25 +138,21 @@ impl Bench {
         if file.device.is_empty() {
             return Err(BenchError::Usage("no device".to_owned()));
         }
-        let bit_rate = file.bit_rate.unwrap_or(BIT_RATE);
-        if !(1..=1_000_000).contains(&bit_rate) {
-            return Err(BenchError::Usage(format!("{bit_rate} bit/s is not a bit rate of CAN (1 to 1000000)")));
-        }
+        let bit_rate = check_rate(file.bit_rate.unwrap_or(BIT_RATE))?;
         let mut taken = BTreeSet::new();
         let mut of_kind: BTreeMap<String, u32> = BTreeMap::new();
         let mut devices = Vec::new();
         for entry in &file.device {
-            if !taken.insert(entry.node) {
-                return Err(BenchError::Usage(format!("two devices with node-ID {}", entry.node)));
+            if let Some(node) = entry.node.filter(|node| !taken.insert(*node) && !entry.twin) {
+                return Err(BenchError::Usage(format!("two devices with node-ID {node}")));
             }
             let before = of_kind.entry(entry.kind.clone()).or_default();
             let setup = entry.setup(file.seed, *before, beside)?;
             *before += 1;
-            let name = format!("{}@{}", entry.kind, entry.node);
-            devices.push(Device::new(setup).map_err(|error| BenchError::Usage(format!("{name}: {error}")))?);
+            devices.push(Device::new(setup).map_err(|error| BenchError::Usage(format!("{}: {error}", entry.name())))?);
         }
         let record = file.record.map(|path| beside.join(path));
-        Ok(Bench { clock: file.clock.into(), bit_rate, record, devices })
+        Ok(Bench { clock: file.clock.into(), bit_rate, retime: file.retime, record, devices })
     }
 
     /// The clock that it goes by.
@@ -162,14 +177,25 @@ impl Bench {
     /// # Errors
     /// When the record cannot be written.
     pub fn open(self) -> Result<MemoryBus, BenchError> {
-        let mut bus = MemoryBus::new(self.clock).with_bit_rate(self.bit_rate);
+        let mut bus = MemoryBus::new(self.clock).with_bit_rate(self.bit_rate).with_retiming(self.retime);
         self.into_devices()?.into_iter().for_each(|device| bus.attach(device));
         Ok(bus)
     }
 }
 
+fn check_rate(bit_rate: u32) -> Result<u32, BenchError> {
+    if (1..=1_000_000).contains(&bit_rate) {
+        return Ok(bit_rate);
+    }
+    Err(BenchError::Usage(format!("{bit_rate} bit/s is not a bit rate of CAN (1 to 1000000)")))
+}
+
 fn read(path: &Path) -> Result<String, BenchError> {
     std::fs::read_to_string(path).map_err(|source| BenchError::Io { path: path.to_owned(), source })
+}
+
+fn yes() -> bool {
+    true
 }
 
 #[derive(Default, Deserialize)]
@@ -178,6 +204,8 @@ struct BenchFile {
     #[serde(default)]
     clock: ClockName,
     bit_rate: Option<u32>,
+    #[serde(default = "yes")]
+    retime: bool,
     #[serde(default)]
     seed: u64,
     record: Option<PathBuf>,
@@ -202,11 +230,20 @@ impl From<ClockName> for Clock {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct DeviceEntry {
     kind: String,
-    node: NodeId,
+    node: Option<NodeId>,
+    #[serde(default)]
+    twin: bool,
+    bit_rate: Option<u32>,
+    #[serde(default, deserialize_with = "duration")]
+    latency: Duration,
+    #[serde(default)]
+    gone_after: Vec<GoneName>,
+    #[serde(default)]
+    lss: LssEntry,
     serial: Option<u32>,
     #[serde(default)]
     start: bool,
@@ -217,6 +254,51 @@ struct DeviceEntry {
     #[serde(default)]
     overload: Vec<OverloadEntry>,
 }
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum GoneName {
+    Reset,
+    Activate,
+}
+
+impl From<GoneName> for GoneAfter {
+    fn from(name: GoneName) -> GoneAfter {
+        match name {
+            GoneName::Reset => GoneAfter::Reset,
+            GoneName::Activate => GoneAfter::Activate,
+        }
+    }
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LssEntry {
+    #[serde(default)]
+    lose: Vec<u8>,
+    #[serde(default)]
+    late: BTreeMap<Service, Late>,
+    #[serde(default)]
+    refuse: BTreeMap<Service, u8>,
+    #[serde(default)]
+    scans_for_ever: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[serde(try_from = "String")]
+struct Service(u8);
+
+impl TryFrom<String> for Service {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Service, String> {
+        let number = parse_u32(&text).and_then(|number| u8::try_from(number).ok());
+        number.map(Service).ok_or_else(|| format!("\"{text}\" is not a service (\"0x17\")"))
+    }
+}
+
+#[derive(Clone, Copy, Deserialize)]
+struct Late(#[serde(deserialize_with = "duration")] Duration);
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -257,21 +339,27 @@ fn duration<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Duration, D::E
 }
 
 impl DeviceEntry {
-    fn new(kind: &str, node: NodeId) -> DeviceEntry {
-        DeviceEntry {
-            kind: kind.to_owned(),
-            node,
-            serial: None,
-            start: false,
-            set: BTreeMap::new(),
-            channel: Vec::new(),
-            overload: Vec::new(),
+    /// As people write it: `mh4@5`.
+    fn name(&self) -> String {
+        match self.node {
+            Some(node) => format!("{}@{node}", self.kind),
+            None => format!("{}@{UNCONFIGURED}", self.kind),
         }
     }
 
     /// `before`: how many devices of this kind come before it; each has its own serial number.
     fn setup(&self, seed: u64, before: u32, beside: &Path) -> Result<Setup, BenchError> {
-        let mut setup = Setup::new(self.model(beside)?, self.node);
+        let mut setup = Setup::new(self.model(beside)?, self.node.unwrap_or(NodeId::MIN));
+        setup.node = self.node;
+        setup.bit_rate = self.bit_rate.map(check_rate).transpose()?;
+        setup.oddities = Oddities {
+            latency: self.latency,
+            lose: self.lss.lose.clone(),
+            late: self.lss.late.iter().map(|(service, late)| (service.0, late.0)).collect(),
+            refuse: self.lss.refuse.iter().map(|(service, code)| (service.0, *code)).collect(),
+            scans_for_ever: self.lss.scans_for_ever,
+            gone_after: self.gone_after.iter().map(|name| GoneAfter::from(*name)).collect(),
+        };
         setup.serial = self.serial.unwrap_or(setup.serial.wrapping_add(before));
         setup.start = self.start;
         setup.set = self.set.iter().map(|(object, value)| (*object, value.clone())).collect();
@@ -282,10 +370,7 @@ impl DeviceEntry {
         for overload in &self.overload {
             self.find(&mut setup.channels, overload.channel)?;
             if overload.from >= overload.until {
-                return Err(BenchError::Usage(format!(
-                    "{}@{}: an overload that ends before it begins",
-                    self.kind, self.node
-                )));
+                return Err(BenchError::Usage(format!("{}: an overload that ends before it begins", self.name())));
             }
             let direction = match overload.direction {
                 DirectionName::High => Direction::High,
@@ -301,7 +386,7 @@ impl DeviceEntry {
         channels
             .iter_mut()
             .find(|channel| channel.channel == number)
-            .ok_or_else(|| BenchError::Usage(format!("{}@{} has no channel {number}", self.kind, self.node)))
+            .ok_or_else(|| BenchError::Usage(format!("{} has no channel {number}", self.name())))
     }
 
     fn model(&self, beside: &Path) -> Result<Arc<Model>, BenchError> {
@@ -340,7 +425,7 @@ mod tests {
     use crate::bus::{Bus, Event};
 
     fn nodes(bench: &Bench) -> Vec<u8> {
-        bench.devices.iter().map(|device| device.node().get()).collect()
+        bench.devices.iter().filter_map(|device| Some(device.node()?.get())).collect()
     }
 
     fn refusal(bench: Result<Bench, BenchError>) -> String {
@@ -367,7 +452,10 @@ mod tests {
             ("mh4@0", "mh4@0: \"0\" is not a node-ID (1 to 127)"),
             ("mh4@5,", "\"\" is not DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) and no file FILE.toml"),
             ("mh4@5,dps@5", "two devices with node-ID 5"),
-            ("mh5@5", "there is no device \"mh5\" (mh4, d20, dps, mc1609, hydac, jumo, or FILE.toml)"),
+            (
+                "mh5@5",
+                "there is no device \"mh5\" (mh4, d20, dps, mc1609, hydac-old, baumer, hydac, jumo, or FILE.toml)",
+            ),
         ] {
             assert_eq!(refusal(Bench::parse(spec)), message);
         }

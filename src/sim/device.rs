@@ -2,18 +2,21 @@
 
 use super::channels::{Channels, status};
 use super::emergency::Emergencies;
+use super::lss::{Slave, Then};
 use super::memory::Memory;
 use super::nmt::{Command, State};
-use super::objects::{Area, Objects, Signature};
+use super::objects::{Area, Objects};
 use super::record::{Line, Recorder, line, plain};
 use super::sdo_server::SdoServer;
-use super::setup::Setup;
+use super::settings::{Pair, Rate, Settings};
+use super::setup::{GoneAfter, Setup};
 use super::tpdo::{Cause, Tpdo};
-use crate::bus::memory::{Outbox, Station};
+use crate::bus::memory::{Outbox, Station, Tuning};
 use crate::bus::time::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
+use crate::device::description::SimState;
 use crate::device::quirk::Quirk;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -37,7 +40,15 @@ enum Phase {
     Off,
     /// Away until then.
     Starting(Mono),
+    /// Without a node-ID: only LSS.
+    Unconfigured,
     Running(State),
+    /// It changes its bit rate at the moment `switch` and is silent until `until`; the state then is `after`.
+    Retiming {
+        after: Option<State>,
+        switch: Option<Mono>,
+        until: Mono,
+    },
 }
 
 /// A simulated device.
@@ -45,6 +56,7 @@ pub struct Device {
     setup: Setup,
     memory: Memory,
     sdo: SdoServer,
+    lss: Slave,
     tpdos: Vec<Tpdo>,
     phase: Phase,
     heartbeat: Option<Mono>,
@@ -52,6 +64,8 @@ pub struct Device {
     toggle: bool,
     /// When an overload may begin or end.
     overload_look: Option<Mono>,
+    /// Answers that it still thinks about.
+    thinking: VecDeque<(Mono, Frame)>,
     recorder: Option<Recorder>,
     /// TPDOs on their way to the wire, with what the record says of them.
     under_way: VecDeque<(Frame, Vec<Line>)>,
@@ -65,13 +79,14 @@ impl Device {
     pub fn new(setup: Setup) -> Result<Device, String> {
         let model = &setup.model;
         let description = &model.description;
-        let mut objects = Objects::new(model, setup.node);
+        let node = setup.node.unwrap_or(NodeId::MIN);
+        let mut objects = Objects::new(model, node);
         objects.preset(SERIAL_NUMBER, setup.serial.to_le_bytes().to_vec());
         for (object, value) in &setup.set {
             let bytes = objects
                 .spec(*object)
                 .ok_or_else(|| format!("{} has no object {object}", description.name))?
-                .encode(value, setup.node)
+                .encode(value, node)
                 .map_err(|error| format!("{object}: {error}"))?;
             objects.preset(*object, bytes);
         }
@@ -80,16 +95,22 @@ impl Device {
         let answers_60 = description.quirks.contains(&Quirk::UploadAnswered60);
         let sdo = SdoServer::new(description.sdo.clone(), answers_60);
         let emergencies = Emergencies::new(description);
-        let memory = Memory { node: setup.node, objects, channels, emergencies, remap: description.pdo.remap };
+        let pair = Pair { node: setup.node, rate: setup.bit_rate.map_or(Rate::Auto, Rate::At) };
+        let settings = Settings::new(description, &objects, pair);
+        let memory = Memory { node, settings, objects, channels, emergencies, remap: description.pdo.remap };
+        let oddities = &setup.oddities;
+        let lss = Slave::new(description.sim.lss.clone(), oddities.refuse.clone(), oddities.scans_for_ever);
         Ok(Device {
             setup,
             memory,
             sdo,
+            lss,
             tpdos,
             phase: Phase::Off,
             heartbeat: None,
             toggle: false,
             overload_look: None,
+            thinking: VecDeque::new(),
             recorder: None,
             under_way: VecDeque::new(),
         })
@@ -101,16 +122,33 @@ impl Device {
         self
     }
 
-    /// Its present node-ID.
-    pub fn node(&self) -> NodeId {
-        self.memory.node
+    /// Its present node-ID; `None` if it has none.
+    pub fn node(&self) -> Option<NodeId> {
+        self.memory.settings.active.node
+    }
+
+    /// Its present bit rate in bit/s; `None` if it is that of the bus.
+    pub fn bit_rate(&self) -> Option<u32> {
+        fixed(self.memory.settings.active.rate)
+    }
+
+    /// The node-ID and the bit rate in bit/s that it will have after power on.
+    pub fn stored(&self) -> (Option<NodeId>, Option<u32>) {
+        let Pair { node, rate } = self.memory.settings.persistent;
+        (node, fixed(rate))
+    }
+
+    /// Whether it is in the configuration state of LSS.
+    pub fn is_configuring(&self) -> bool {
+        self.lss.is_configuring()
     }
 
     /// Its NMT state; `None` without power and while it starts.
     pub fn state(&self) -> Option<State> {
         match self.phase {
             Phase::Running(state) => Some(state),
-            Phase::Off | Phase::Starting(_) => None,
+            Phase::Retiming { after, .. } => after,
+            Phase::Off | Phase::Starting(_) | Phase::Unconfigured => None,
         }
     }
 
@@ -125,6 +163,10 @@ impl Device {
 
     /// Initialisation is over: boot-up, then PRE-OPERATIONAL or at once OPERATIONAL.
     fn boot(&mut self, now: Mono, out: &mut Outbox) {
+        if self.node().is_none() {
+            self.phase = Phase::Unconfigured;
+            return;
+        }
         out.send(Frame::byte(CanId::heartbeat(self.memory.node), 0x00));
         self.toggle = false;
         self.restart_heartbeat(now + self.heartbeat_period().unwrap_or_default());
@@ -160,6 +202,19 @@ impl Device {
 
     /// A reset: nothing that waits is sent any more, and the device is away for a while.
     fn reset(&mut self, area: Area, now: Mono, out: &mut Outbox) {
+        self.fall_silent(out);
+        if area == Area::All {
+            self.memory.emergencies.forget();
+        }
+        self.memory.settings.reset();
+        self.restart(area);
+        let is_gone = self.setup.oddities.gone_after.contains(&GoneAfter::Reset);
+        let away = if area == Area::All { RESTART } else { RECONNECT };
+        self.phase = if is_gone { Phase::Off } else { Phase::Starting(now + away) };
+    }
+
+    /// Nothing that waits is sent any more, and nothing is made that could be.
+    fn fall_silent(&mut self, out: &mut Outbox) {
         // What is on the wire already gets there, and into the record.
         let mut dropped: Vec<Frame> = std::iter::from_fn(|| out.pop()).collect();
         while let Some(frame) = dropped.pop() {
@@ -167,30 +222,21 @@ impl Device {
                 self.under_way.pop_back();
             }
         }
+        self.thinking.clear();
         self.sdo.forget();
         self.tpdos.iter_mut().for_each(Tpdo::stop);
         self.heartbeat = None;
         self.overload_look = None;
-        if area == Area::All {
-            self.memory.emergencies.forget();
-            self.memory.node = self.saved_node();
-        }
         self.memory.emergencies.drop_waiting();
-        self.memory.objects.reset(area, self.memory.node);
-        self.phase = Phase::Starting(now + if area == Area::All { RESTART } else { RECONNECT });
     }
 
-    /// A node-ID that was written and saved is taken at the next reset.
-    fn saved_node(&self) -> NodeId {
-        let objects = &self.memory.objects;
-        let object = objects.specs().find(|(_, spec)| match spec.name.as_str() {
-            "node-id" => spec.signature == Some(Signature::Set),
-            // HYDAC 2003h:2.
-            "node-id-pending" => true,
-            _ => false,
-        });
-        let saved = object.and_then(|(object, _)| objects.saved(object)?.first().copied());
-        saved.and_then(|id| NodeId::new(id).ok()).unwrap_or(self.memory.node)
+    /// What is saved comes into force, under the node-ID that does.
+    fn restart(&mut self, area: Area) {
+        let Memory { node, settings, objects, .. } = &mut self.memory;
+        *node = settings.active.node.unwrap_or(NodeId::MIN);
+        objects.reset(area, *node);
+        settings.show(objects);
+        self.lss.reset();
     }
 
     fn heartbeat_period(&self) -> Option<Duration> {
@@ -231,7 +277,8 @@ impl Device {
             // The rest of a sub-block that the client has given up.
             out.retain(|frame| frame.id() != id);
         }
-        answers.into_iter().for_each(|answer| out.send(Frame::full(id, answer)));
+        let thought = now + self.setup.oddities.latency;
+        answers.into_iter().for_each(|answer| self.answer(Frame::full(id, answer), thought, now, out));
         match written {
             // "The heartbeat protocol begins immediately" (CiA 301, 7.5.2.14).
             Some(HEARTBEAT_TIME) => self.restart_heartbeat(now),
@@ -249,6 +296,80 @@ impl Device {
             } else if measuring {
                 // A limit, a unit, an offset: what can cause an event is worked out anew.
                 tpdo.watch(&self.memory.objects, &self.memory.channels, now);
+            }
+        }
+    }
+
+    /// An answer goes out once it has been thought over.
+    fn answer(&mut self, frame: Frame, thought: Mono, now: Mono, out: &mut Outbox) {
+        if thought <= now && self.thinking.is_empty() {
+            out.send(frame);
+        } else {
+            let place = self.thinking.partition_point(|(due, _)| *due <= thought);
+            self.thinking.insert(place, (thought, frame));
+        }
+    }
+
+    /// Whether it listens to LSS in its present state.
+    fn hears_lss(&self) -> bool {
+        let state = match self.phase {
+            Phase::Unconfigured => return true,
+            Phase::Running(State::Stopped) => SimState::Stopped,
+            Phase::Running(State::PreOperational) => SimState::PreOperational,
+            Phase::Running(State::Operational) => SimState::Operational,
+            Phase::Off | Phase::Starting(_) | Phase::Retiming { .. } => return false,
+        };
+        let states = &self.setup.model.description.sim.lss.states;
+        states.is_empty() || states.contains(&state)
+    }
+
+    /// A request of the LSS master.
+    fn configure(&mut self, request: [u8; 8], now: Mono, out: &mut Outbox) {
+        let identity = [1, 2, 3, 4].map(|sub| self.memory.objects.number(ObjectId::new(0x1018, sub)));
+        let reply = self.lss.request(request, identity, &mut self.memory.settings);
+        if let Some(answer) = reply.answer {
+            let service = request[0];
+            let oddities = &mut self.setup.oddities;
+            let late = oddities.late.remove(&service).unwrap_or_default();
+            if let Some(lost) = oddities.lose.iter().position(|lost| *lost == service) {
+                oddities.lose.remove(lost);
+            } else {
+                let thought = now + oddities.latency + late;
+                self.answer(Frame::full(CanId::LSS_SLAVE, answer), thought, now, out);
+            }
+        }
+        match reply.then {
+            Then::Nothing => {}
+            Then::Boot => {
+                self.memory.settings.active.node = self.memory.settings.pending.node;
+                self.restart(Area::Communication);
+                self.phase = Phase::Starting(now + RECONNECT);
+            }
+            Then::Activate(delay) => {
+                let after = self.state();
+                self.fall_silent(out);
+                self.phase = Phase::Retiming { after, switch: Some(now + delay), until: now + delay + delay };
+            }
+        }
+    }
+
+    /// The two delays of the activation of another bit rate.
+    fn retime(&mut self, now: Mono, out: &mut Outbox) {
+        let Phase::Retiming { after, switch, until } = self.phase else { return };
+        if switch.is_some_and(|switch| switch <= now) {
+            self.memory.settings.active.rate = self.memory.settings.pending.rate;
+            let is_gone = self.setup.oddities.gone_after.contains(&GoneAfter::Activate);
+            self.phase = if is_gone { Phase::Off } else { Phase::Retiming { after, switch: None, until } };
+        }
+        if until <= now && self.phase != Phase::Off {
+            self.phase = after.map_or(Phase::Unconfigured, Phase::Running);
+            if after.is_some() {
+                self.restart_heartbeat(now);
+                self.look_for_overload(now);
+                self.send_emergencies(now, out);
+            }
+            if self.is_operational() {
+                self.start_tpdos(now);
             }
         }
     }
@@ -349,12 +470,25 @@ pub(super) fn next_turn(due: Mono, period: Duration, now: Mono) -> Mono {
 
 impl Station for Device {
     fn power_on(&mut self, now: Mono, out: &mut Outbox) {
-        self.memory.node = self.saved_node();
-        self.memory.objects.reset(Area::All, self.memory.node);
+        self.fall_silent(out);
+        self.memory.emergencies.forget();
+        self.memory.settings.power_on();
+        self.restart(Area::All);
         self.boot(now, out);
     }
 
     fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
+        if frame.id() == CanId::LSS_MASTER
+            && !frame.is_remote()
+            && let Some(request) = frame.all_eight()
+        {
+            // Of a device that changes its bit rate nobody expects more than that it goes back to waiting.
+            let is_retiming = matches!(self.phase, Phase::Retiming { .. });
+            if self.hears_lss() || is_retiming && request[0] == 0x04 {
+                self.configure(request, now, out);
+            }
+            return;
+        }
         let Phase::Running(state) = self.phase else { return };
         if let Some(command) = Command::for_node(self.memory.node, frame) {
             self.obey(command, now, out);
@@ -381,6 +515,9 @@ impl Station for Device {
             }
             return;
         }
+        self.retime(now, out);
+        let thought = self.thinking.partition_point(|(due, _)| *due <= now);
+        self.thinking.drain(..thought).for_each(|(_, frame)| out.send(frame));
         let Phase::Running(state) = self.phase else { return };
         if let Some(due) = self.heartbeat.filter(|due| *due <= now) {
             out.send(Frame::byte(CanId::heartbeat(self.memory.node), state.code()));
@@ -408,9 +545,16 @@ impl Station for Device {
         match self.phase {
             Phase::Off => None,
             Phase::Starting(until) => Some(until),
+            Phase::Unconfigured => self.thinking.front().map(|(due, _)| *due),
+            Phase::Retiming { switch, until, .. } => Some(switch.unwrap_or(until)),
             Phase::Running(_) => {
-                let own =
-                    [self.heartbeat, self.sdo.deadline(), self.overload_look, self.memory.emergencies.next_wake()];
+                let own = [
+                    self.heartbeat,
+                    self.sdo.deadline(),
+                    self.overload_look,
+                    self.memory.emergencies.next_wake(),
+                    self.thinking.front().map(|(due, _)| *due),
+                ];
                 own.into_iter().flatten().chain(self.tpdos.iter().filter_map(Tpdo::next_wake)).min()
             }
         }
@@ -426,6 +570,26 @@ impl Station for Device {
         {
             lines.iter().for_each(|line| recorder.write(now, line));
         }
+    }
+
+    fn tuning(&self) -> Tuning {
+        match self.memory.settings.active.rate {
+            _ if self.phase == Phase::Off => Tuning::Off,
+            Rate::At(rate) => Tuning::At(rate),
+            Rate::Auto => Tuning::Follows,
+        }
+    }
+
+    fn told_bit_rate(&mut self, bit_rate: u32) {
+        let settings = &mut self.memory.settings;
+        settings.tell_wire(bit_rate, self.setup.bit_rate.is_some());
+    }
+}
+
+fn fixed(rate: Rate) -> Option<u32> {
+    match rate {
+        Rate::At(rate) => Some(rate),
+        Rate::Auto => None,
     }
 }
 

@@ -6,6 +6,7 @@ use super::channels::Channels;
 use super::emergency::Emergencies;
 use super::objects::{Group, Objects, Signature};
 use super::sdo_server::Dictionary;
+use super::settings::Settings;
 use super::tpdo;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -16,7 +17,9 @@ use std::time::Duration;
 /// Objects, measuring channels and errors of one device.
 #[derive(Clone, Debug)]
 pub(super) struct Memory {
+    /// The node-ID in force; without one nothing asks for it.
     pub(super) node: NodeId,
+    pub(super) settings: Settings,
     pub(super) objects: Objects,
     pub(super) channels: Channels,
     pub(super) emergencies: Emergencies,
@@ -44,6 +47,9 @@ impl Memory {
 
     /// A write that has passed every check.
     fn act(&mut self, object: ObjectId, bytes: &[u8], time: Duration) -> Result<(), Abort> {
+        if !self.settings.allows(object, bytes) {
+            return Err(Abort::VALUE);
+        }
         match self.objects.spec(object).and_then(|spec| spec.signature) {
             Some(Signature::Save) => {
                 let group = Group::of_sub(object.sub).ok_or(Abort::NOT_STORED)?;
@@ -78,6 +84,7 @@ impl Memory {
                 self.channels.damp(&mut self.objects, object);
             }
         }
+        self.settings.keep(object, &self.objects);
         Ok(())
     }
 }

@@ -68,8 +68,8 @@ pub(super) enum Group {
     All,
     Communication,
     Application,
-    /// Node-ID and bit rate, where "all" leaves them out (HYDAC 1010h:4).
-    Lss,
+    /// What only the manufacturer knows; none of the entries with a value.
+    Other,
 }
 
 impl Group {
@@ -79,7 +79,7 @@ impl Group {
             1 => Group::All,
             2 => Group::Communication,
             3 => Group::Application,
-            4 => Group::Lss,
+            4..=0x7f => Group::Other,
             _ => return None,
         })
     }
@@ -89,14 +89,13 @@ impl Group {
             "all" => Group::All,
             "comm" => Group::Communication,
             "app" => Group::Application,
-            "lss" => Group::Lss,
             _ => return None,
         })
     }
 
     /// Whether a command for `self` reaches an entry of group `entry`.
     fn reaches(self, entry: Group) -> bool {
-        self == entry || self == Group::All && entry != Group::Lss
+        self == Group::All || self == entry
     }
 }
 
@@ -212,11 +211,6 @@ impl Objects {
             self.saved.insert(object, bytes.clone());
             self.values.insert(object, bytes);
         }
-    }
-
-    /// What is saved of an entry, if it differs from what was delivered.
-    pub(super) fn saved(&self, object: ObjectId) -> Option<&[u8]> {
-        self.saved.get(&object).map(Vec::as_slice)
     }
 
     /// Whether the entry exists and can be written.

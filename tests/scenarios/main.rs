@@ -1,8 +1,10 @@
 //! Commands and recordings under bad conditions, on the virtual clock.
 
 mod answers;
+mod detect;
 mod full_queue;
 mod garbage;
+mod lss;
 mod scan;
 mod second_master;
 mod second_sync;

@@ -136,8 +136,13 @@ pub(super) fn store(device: &Device, values: &BTreeMap<ObjectId, Value>, at: Obj
         let acts = entry.signature.as_deref().is_some_and(|signature| signature != "set");
         entry.access == crate::device::description::Access::Rw && !acts && !entry.at.starts_with("0x1003")
     });
+    // Node-ID and bit rate have a way of their own.
+    let ways = device.model().map_or(&[][..], |model| &model.description.assign);
+    let assigned = ways.iter().flat_map(|way| [way.node_id, way.bit_rate]).flatten().map(|place| place.object);
+    let assigned: Vec<ObjectId> = assigned.collect();
     for entry in settings {
-        let names = if entry.stored.is_some() { &mut store.kept } else { &mut store.lost };
+        let is_assigned = entry.objects().is_ok_and(|mut objects| objects.any(|object| assigned.contains(&object)));
+        let names = if entry.stored.is_some() || is_assigned { &mut store.kept } else { &mut store.lost };
         if !names.contains(&entry.name) {
             names.push(entry.name.clone());
         }

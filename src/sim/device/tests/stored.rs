@@ -62,7 +62,7 @@ fn a_node_id_with_its_signature_is_taken_at_the_reset_after_saving() {
         ],
     );
     assert_eq!(hear(&mut bus, ms(300)), ["703#00"]);
-    assert_eq!(device(&mut bus).node(), node(3));
+    assert_eq!(device(&mut bus).node(), Some(node(3)));
     play(
         &mut bus,
         &[
