@@ -7,5 +7,6 @@ pub mod dictionary;
 pub mod eds;
 pub mod nearest;
 pub mod quirk;
+pub mod sensor;
 pub mod standard;
 pub mod unit;

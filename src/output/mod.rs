@@ -3,6 +3,8 @@
 pub mod console;
 pub mod csv;
 mod elapsed;
+pub mod info;
+pub mod info_json;
 pub mod interfaces;
 pub mod json;
 pub mod json_lss;
@@ -11,6 +13,7 @@ pub mod limits;
 pub mod pdo;
 pub mod progress;
 pub mod rows;
+pub mod settings;
 pub mod summary;
 pub mod table;
 pub mod text;

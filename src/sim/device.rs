@@ -95,7 +95,7 @@ impl Device {
         let tpdos = Tpdo::all(&objects);
         let answers_60 = description.quirks.contains(&Quirk::UploadAnswered60);
         let sdo = SdoServer::new(description.sdo.clone(), answers_60);
-        let emergencies = Emergencies::new(&description.emergencies);
+        let emergencies = Emergencies::new(description);
         let pair = Pair { node: setup.node, rate: setup.bit_rate.map_or(Rate::Auto, Rate::At) };
         let settings = Settings::new(description, &objects, pair);
         let memory = Memory { node, settings, objects, channels, emergencies, remap: description.pdo.remap };
@@ -173,7 +173,9 @@ impl Device {
         self.restart_heartbeat(now + self.heartbeat_period().unwrap_or_default());
         // MH-4, 4.1.16: 8 starts by itself. CiA 302-2: bit 3 set with bit 2 clear.
         let startup = self.memory.objects.number(NMT_STARTUP);
-        let starts = self.setup.start || startup & 0b1100 == 0b1000;
+        let other = self.setup.model.description.startup.as_ref().filter(|startup| startup.object != NMT_STARTUP);
+        let by_other = other.is_some_and(|other| self.memory.objects.number(other.object) == other.auto);
+        let starts = self.setup.start || by_other || startup & 0b1100 == 0b1000;
         self.enter(if starts { State::Operational } else { State::PreOperational }, now);
         self.memory.emergencies.publish(&mut self.memory.objects);
         self.look_for_overload(now);
@@ -376,6 +378,7 @@ impl Device {
     }
 
     fn send_emergencies(&mut self, now: Mono, out: &mut Outbox) {
+        self.memory.emergencies.repeat(&self.memory.objects, now);
         if matches!(self.phase, Phase::Running(State::Stopped)) {
             self.memory.emergencies.drop_waiting();
         }

@@ -78,7 +78,11 @@ impl Memory {
                     return Err(Abort::VALUE);
                 }
             }
-            None => self.objects.put(object, bytes.to_vec()),
+            None if self.objects.asks_for_default(object, bytes) => self.objects.put_default(object, self.node),
+            None => {
+                self.objects.put(object, bytes.to_vec());
+                self.channels.damp(&mut self.objects, object);
+            }
         }
         self.settings.keep(object, &self.objects);
         Ok(())
@@ -94,6 +98,14 @@ pub(super) struct Access<'a> {
     pub(super) written: Option<ObjectId>,
 }
 
+impl Access<'_> {
+    fn finish(&mut self, object: ObjectId, bytes: &[u8]) -> Result<(), Abort> {
+        self.memory.act(object, bytes, self.time)?;
+        self.written = Some(object);
+        Ok(())
+    }
+}
+
 impl Dictionary for Access<'_> {
     fn upload(&mut self, object: ObjectId) -> Result<Vec<u8>, Abort> {
         self.memory.objects.check_readable(object)?;
@@ -106,6 +118,10 @@ impl Dictionary for Access<'_> {
 
     fn download(&mut self, object: ObjectId, bytes: &[u8]) -> Result<(), Abort> {
         let objects = &self.memory.objects;
+        if objects.asks_for_default(object, bytes) {
+            objects.check_length(object, bytes)?;
+            return self.finish(object, bytes);
+        }
         let pdo = || tpdo::check(objects, self.memory.remap, self.pre_operational, object, bytes);
         // What cannot be mapped is told as that, before the limits of the entry are.
         if (0x1a00..0x1c00).contains(&object.index) && object.sub > 0 {
@@ -116,8 +132,6 @@ impl Dictionary for Access<'_> {
             objects.check_write(object, bytes)?;
             pdo()?;
         }
-        self.memory.act(object, bytes, self.time)?;
-        self.written = Some(object);
-        Ok(())
+        self.finish(object, bytes)
     }
 }

@@ -122,6 +122,8 @@ pub(super) struct Objects {
     marked: bool,
     /// The deviation [`Quirk::SaveAllResetsCobIds`].
     resets_cob_ids: bool,
+    /// The deviation [`Quirk::CobIdZeroIsDefault`].
+    zero_is_default: bool,
     values: BTreeMap<ObjectId, Vec<u8>>,
     saved: BTreeMap<ObjectId, Vec<u8>>,
 }
@@ -140,6 +142,7 @@ impl Objects {
             specs: Arc::new(specs),
             marked,
             resets_cob_ids: model.description.quirks.contains(&Quirk::SaveAllResetsCobIds),
+            zero_is_default: model.description.quirks.contains(&Quirk::CobIdZeroIsDefault),
             values: BTreeMap::new(),
             saved: BTreeMap::new(),
         };
@@ -181,6 +184,18 @@ impl Objects {
     /// The working value as a number of its type.
     pub(super) fn real(&self, object: ObjectId) -> Option<f64> {
         self.spec(object)?.data_type.decode(self.bytes(object)?).ok()?.as_f64()
+    }
+
+    /// Whether a write asks for the default of a COB-ID instead of the value written.
+    pub(super) fn asks_for_default(&self, object: ObjectId, bytes: &[u8]) -> bool {
+        self.zero_is_default && is_cob_id(object) && bytes.iter().all(|&byte| byte == 0)
+    }
+
+    /// Puts the value as delivered in place.
+    pub(super) fn put_default(&mut self, object: ObjectId, node: NodeId) {
+        if let Some(value) = self.spec(object).map(|spec| spec.delivered(node)) {
+            self.values.insert(object, value);
+        }
     }
 
     /// Puts a working value in place, whatever the access says.

@@ -14,6 +14,7 @@ pub mod read;
 pub mod restore;
 pub mod scan;
 pub mod sdo;
+pub mod settings;
 mod signature;
 pub mod store;
 

@@ -17,6 +17,7 @@ mod read;
 mod replay;
 mod scan;
 mod sdo;
+mod settings;
 mod store;
 
 use std::fs;

@@ -33,7 +33,7 @@ fn lists_of_devices() {
         ("mh4@0", "mh4@0: \"0\" is not a node-ID (1 to 127)"),
         ("mh4@5,", "\"\" is not DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) and no file FILE.toml"),
         ("mh4@5,dps@5", "two devices with node-ID 5"),
-        ("mh5@5", "there is no device \"mh5\" (mh4, d20, dps, mc1609, hydac-old, baumer, or FILE.toml)"),
+        ("mh5@5", "there is no device \"mh5\" (mh4, d20, dps, mc1609, hydac-old, baumer, hydac, jumo, or FILE.toml)"),
     ] {
         assert_eq!(refusal(Bench::parse(spec)), message);
     }

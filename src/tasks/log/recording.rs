@@ -10,6 +10,7 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::Life;
+use crate::device::quirk::Quirk;
 use crate::master::{Error, Happening, Master};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::instrument::Instrument;
@@ -49,6 +50,8 @@ pub(super) struct Recording {
     emergencies_of: BTreeMap<CanId, NodeId>,
     /// What the descriptions say of each emergency code.
     meanings: BTreeMap<(NodeId, u16), String>,
+    /// The last emergency of nodes that tell a pending one again and again ([`Quirk::EmergencyRepeats`]).
+    repeating: BTreeMap<NodeId, Option<Emergency>>,
     timestamps: TimestampSource,
     pub(super) rows: u64,
     first: Option<Mono>,
@@ -81,6 +84,11 @@ impl Recording {
                 .map(|&node| (node, Pulse::default()))
                 .collect(),
             meanings: instruments.iter().flat_map(meanings).collect(),
+            repeating: instruments
+                .iter()
+                .filter(|instrument| repeats(instrument))
+                .map(|instrument| (instrument.node, None))
+                .collect(),
             emergencies_of: instruments.iter().map(|instrument| (instrument.emergency, instrument.node)).collect(),
             timestamps,
             rows: 0,
@@ -261,6 +269,9 @@ impl Recording {
                 let frame = &received.frame;
                 if let (Some(&node), Some(emergency)) = (self.emergencies_of.get(&frame.id()), Emergency::parse(frame))
                 {
+                    if self.repeating.get_mut(&node).is_some_and(|last| last.replace(emergency) == Some(emergency)) {
+                        return ControlFlow::Continue(());
+                    }
                     self.emergencies += 1;
                     let meaning = self.meanings.get(&(node, emergency.code));
                     let meaning = meaning.map_or_else(|| Emergency::class(emergency.code), String::as_str);
@@ -389,6 +400,10 @@ fn next_slot(begin: Mono, now: Mono, period: Duration, slot: u64) -> u64 {
 /// How long a node may be silent: five of its usual intervals, at least a second.
 fn patience(pulse: &Pulse) -> Duration {
     (pulse.interval.unwrap_or_default() * 5).max(Duration::from_secs(1))
+}
+
+fn repeats(instrument: &Instrument) -> bool {
+    instrument.model.as_ref().is_some_and(|model| model.description.quirks.contains(&Quirk::EmergencyRepeats))
 }
 
 fn meanings(instrument: &Instrument) -> impl Iterator<Item = ((NodeId, u16), String)> {
