@@ -1,6 +1,7 @@
 //! Commands and recordings under bad conditions, on the virtual clock.
 
 mod answers;
+mod bit_rates;
 mod full_queue;
 mod garbage;
 mod scan;
