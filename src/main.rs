@@ -1,11 +1,10 @@
 //! The program: parse, run, exit code.
 
-use cangauge::cli::{Cli, exit, run};
-use clap::Parser;
+use cangauge::cli::{exit, parse, run};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match parse::parse(std::env::args_os().collect()) {
         Ok(cli) => cli,
         Err(error) => return ExitCode::from(exit::usage(&error, std::env::args_os())),
     };

@@ -2,12 +2,14 @@
 //! it gets.
 
 pub mod args;
+mod bus;
 mod completions;
 pub mod exit;
 mod file;
 mod log;
 mod nmt;
 mod open;
+pub mod parse;
 mod read;
 mod scan;
 mod sdo;
@@ -54,8 +56,8 @@ pub struct Cli {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
-    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml. Not given: the only CAN
-    /// interface that is up
+    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a
+    /// candump -L log; receives only). Not given: the only CAN interface that is up
     #[arg(short, long, global = true, env = "CANGAUGE_BUS", value_name = "BUS")]
     pub(crate) bus: Option<BusSpec>,
 
@@ -117,15 +119,26 @@ pub(crate) enum When {
     Never,
 }
 
-/// What to do. The help of each stands with its arguments.
+/// What to do. The first line of each command's own help, which is made up only when it is chosen, stands
+/// here again.
 #[derive(Debug, Subcommand)]
+#[command(defer = true)]
 pub(crate) enum Command {
+    /// List every node that answers, with its state, identity and recognised device
     Scan(scan::Scan),
+    /// Read measured values now, scaled, with unit and status
     Read(read::Read),
+    /// Send NMT commands and tell states
     Nmt(nmt::Nmt),
+    /// Read and write objects of the object dictionary
     Sdo(sdo::Sdo),
+    /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// List CAN interfaces, switch them on and off, find the bit rate of a bus
+    Bus(bus::BusCommand),
+    /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
+    /// Print the completions for a shell
     Completions(completions::Completions),
 }
 
@@ -187,6 +200,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Bus(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }

@@ -6,7 +6,7 @@ use super::{Format, Global, open};
 use crate::bus::time::spoken;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtCommand;
-use crate::output::{json, table};
+use crate::output::{csv, json, table};
 use crate::tasks::failure::together;
 use crate::tasks::nmt::{By, Change, Report, Seen, Starts, command, probe, startup, states, watch};
 use crate::tasks::{Failure, Kind};
@@ -286,10 +286,7 @@ fn print(reports: &[Report], format: Format) -> io::Result<()> {
     match format {
         Format::Json => reports.iter().try_for_each(|report| json::report(&mut out, report))?,
         Format::Csv => {
-            let mut csv = csv::Writer::from_writer(&mut out);
-            csv.write_record(["node", "state", "by"])?;
-            reports.iter().try_for_each(|report| csv.write_record(cells(report, "")))?;
-            csv.flush()?;
+            csv::write(&mut out, &["node", "state", "by"], reports.iter().map(|report| cells(report, "")))?;
         }
         Format::Text => {
             let rows: Vec<Vec<String>> = reports.iter().map(|report| cells(report, "-")).collect();

@@ -8,7 +8,7 @@ use crate::device::unit::Unit;
 use crate::master::Master;
 use crate::measure::decode::Wanted;
 use crate::measure::sample::{Number, Sample, Status};
-use crate::output::{json, table, text};
+use crate::output::{csv, json, table, text};
 use crate::tasks::failure::together;
 use crate::tasks::read::{Target, read};
 use crate::tasks::{Failure, Kind};
@@ -124,14 +124,12 @@ fn print(shown: &[Shown], format: Format, bare: bool) -> io::Result<Option<Failu
             }
         }
         Format::Csv => {
-            let mut csv = csv::Writer::from_writer(&mut out);
-            csv.write_record(["node", "signal", "value", "unit", "status"])?;
-            for item in shown {
+            let cells = |item: &Shown| {
                 let status = item.status.map_or("", Status::as_str);
                 let source = &item.target.source;
-                csv.write_record([&source.node.to_string(), &*source.signal, &item.text, &item.unit, status])?;
-            }
-            csv.flush()?;
+                [&source.node.to_string(), &*source.signal, &item.text, &item.unit, status].map(str::to_owned).to_vec()
+            };
+            csv::write(&mut out, &["node", "signal", "value", "unit", "status"], shown.iter().map(cells))?;
         }
         Format::Text if bare => {
             if let [item] = shown {

@@ -4,7 +4,7 @@ use super::args::Nodes;
 use super::exit::{IntoFailure, Several, stdout};
 use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
-use crate::output::{json, table, text};
+use crate::output::{csv, json, table, text};
 use crate::tasks::scan::{Found, listen, scan};
 use crate::tasks::{Failure, Kind, failure::together};
 use clap::Args;
@@ -42,7 +42,9 @@ impl Scan {
         let (found, took) = global.with_master(|master| {
             let begun = master.now();
             let found = if self.passive {
-                listen(master, &nodes, global.timeout.map_or(LISTEN, |timeout| timeout.0)).or_fail()?
+                // A recording is listened to as a whole.
+                let long = if master.bus().is_live() { LISTEN } else { Duration::MAX };
+                listen(master, &nodes, global.timeout.map_or(long, |timeout| timeout.0)).or_fail()?
             } else {
                 let wait = global.timing(WAIT).timeout;
                 let rounds = 1 + global.timing(WAIT).retries;
@@ -84,10 +86,9 @@ fn print(found: &[Found], format: Format) -> io::Result<()> {
     match format {
         Format::Json => found.iter().try_for_each(|found| json::found(&mut out, found)),
         Format::Csv => {
-            let mut csv = csv::Writer::from_writer(&mut out);
-            csv.write_record(HEAD.map(|head| head.to_ascii_lowercase()))?;
-            found.iter().try_for_each(|found| csv.write_record(row(found, "")))?;
-            csv.flush()
+            let head = HEAD.map(str::to_ascii_lowercase);
+            let head = head.each_ref().map(String::as_str);
+            csv::write(&mut out, &head, found.iter().map(|found| row(found, "")))
         }
         Format::Text => {
             let mut rows = vec![HEAD.map(str::to_owned).to_vec()];

@@ -10,7 +10,7 @@ use crate::canopen::value::{DataType, Value, parse_hex};
 use crate::master::Master;
 use crate::master::transfer::BlockMode;
 use crate::output::progress::Transfer;
-use crate::output::{json, text};
+use crate::output::{csv, json, text};
 use crate::tasks::sdo::{Knowledge, Options, ReadValue, SizeMode, encode, is_signature, read, write};
 use crate::tasks::{Failure, Kind};
 use clap::{Args, Subcommand, ValueEnum};
@@ -208,11 +208,7 @@ impl ReadArgs {
                 };
                 json::object(out, &line)
             }
-            Format::Csv => {
-                let mut csv = csv::Writer::from_writer(out);
-                csv.write_record([&self.node.to_string(), &value.object.to_string(), &shown, &raw])?;
-                csv.flush()
-            }
+            Format::Csv => csv::write(out, &[], [vec![self.node.to_string(), value.object.to_string(), shown, raw]]),
             Format::Text if self.objects.len() == 1 => writeln!(out, "{shown}"),
             Format::Text => writeln!(out, "{object} {shown}"),
         }

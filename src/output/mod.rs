@@ -1,6 +1,9 @@
 //! Rows and text: what goes to stdout, stderr and files. Knows no bus and no command line.
 
 pub mod console;
+pub mod csv;
+mod elapsed;
+pub mod interfaces;
 pub mod json;
 pub mod progress;
 pub mod rows;

@@ -2,8 +2,10 @@
 
 mod answers;
 mod bit_rates;
+mod detect;
 mod full_queue;
 mod garbage;
+mod lss;
 mod scan;
 mod second_master;
 mod second_sync;

@@ -1,0 +1,94 @@
+//! From the words of the command line to [`Cli`], at little cost.
+//!
+//! A script starts the program for every single value, so its start counts. Most of it was the tree of all
+//! commands with all their arguments and the global options copied to each. Hence the arguments of a command
+//! are made up when it is chosen (`defer`), and only the one that is named takes part at all.
+
+use super::Cli;
+use clap::{Command, CommandFactory, FromArgMatches};
+use std::ffi::OsString;
+
+/// Parses the words of a command line; the first is the program's name.
+///
+/// # Errors
+/// What is wrong with them, or help or version that were asked for.
+pub fn parse(words: Vec<OsString>) -> Result<Cli, clap::Error> {
+    match narrowed(Cli::command(), &words).try_get_matches_from(&words) {
+        Ok(matches) => Cli::from_arg_matches(&matches),
+        // What is not well is told by the whole tree: it knows the nearest command, and the usage of all.
+        Err(_) => Cli::command().try_get_matches_from(words).and_then(|matches| Cli::from_arg_matches(&matches)),
+    }
+}
+
+/// The same program with only the command that the first word names that names any. What it accepts, the whole
+/// program accepts alike: where that word is the value of an option, the true command is not known here, and
+/// the whole tree is asked.
+fn narrowed(whole: Command, words: &[OsString]) -> Command {
+    let named = |word: &OsString| whole.get_subcommands().find(|command| word.as_os_str() == command.get_name());
+    Command::new("cangauge")
+        .subcommand_required(true)
+        .disable_help_subcommand(true)
+        .disable_version_flag(true)
+        .disable_help_flag(true)
+        .args(whole.get_arguments())
+        .subcommands(words.iter().skip(1).find_map(named))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(line: &str) -> Vec<OsString> {
+        line.split_whitespace().map(OsString::from).collect()
+    }
+
+    #[test]
+    fn the_narrowed_program_understands_the_same() {
+        for line in [
+            "cangauge -b sim scan",
+            "cangauge scan -b sim -f json",
+            "cangauge --bus log log 1 --count 3",
+            "cangauge sdo read 5 0x1000 -t 1s",
+            "cangauge nmt --trace scan state 1 --probe",
+        ] {
+            let whole = Cli::command().try_get_matches_from(words(line)).unwrap();
+            let whole = Cli::from_arg_matches(&whole).unwrap();
+            let narrowed = parse(words(line)).unwrap();
+            assert_eq!(format!("{narrowed:?}"), format!("{whole:?}"), "{line}");
+        }
+    }
+
+    #[test]
+    fn errors_and_help_come_from_the_whole_program() {
+        for line in [
+            "cangauge",
+            "cangauge scna",
+            "cangauge --help",
+            "cangauge scan --help",
+            "cangauge help nmt start",
+            "cangauge sdo read 200 0x1000",
+            "cangauge -V",
+        ] {
+            let whole = Cli::command().try_get_matches_from(words(line)).unwrap_err();
+            let told = parse(words(line)).unwrap_err();
+            assert_eq!(told.to_string(), whole.to_string(), "{line}");
+        }
+    }
+
+    #[test]
+    fn a_command_is_described_alike_in_the_list_and_in_its_own_help() {
+        let mut root = Cli::command();
+        let listed: Vec<(String, String)> = root
+            .get_subcommands()
+            .map(|command| {
+                (command.get_name().to_owned(), command.get_about().map(ToString::to_string).unwrap_or_default())
+            })
+            .collect();
+        root.build();
+        for (name, about) in listed {
+            let own = root.find_subcommand(&name).and_then(|command| command.get_about()).map(ToString::to_string);
+            assert!(!about.is_empty(), "{name}");
+            assert_eq!(own, Some(about), "{name}");
+        }
+    }
+}

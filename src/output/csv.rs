@@ -1,0 +1,30 @@
+//! Tables as CSV: what `--format csv` gives of every command but `log`, whose rows stand in [`super::rows`].
+
+use std::io::{self, Write};
+
+/// Writes a header, if there is one, and rows. A cell that is not known is empty.
+pub fn write(out: &mut dyn Write, head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(out);
+    if !head.is_empty() {
+        csv.write_record(head)?;
+    }
+    rows.into_iter().try_for_each(|row| csv.write_record(row))?;
+    csv.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_with_commas_are_quoted() {
+        let mut out = Vec::new();
+        write(
+            &mut out,
+            &["node", "name"],
+            [vec!["5".to_owned(), "a,b".to_owned()], vec!["6".to_owned(), String::new()]],
+        )
+        .expect("memory");
+        assert_eq!(String::from_utf8_lossy(&out), "node,name\n5,\"a,b\"\n6,\n");
+    }
+}
