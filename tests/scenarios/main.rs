@@ -2,6 +2,7 @@
 
 mod answers;
 mod assign;
+mod bit_rates;
 mod detect;
 mod full_queue;
 mod garbage;
