@@ -1,6 +1,6 @@
 //! `cangauge log`.
 
-use super::args::{Duration, Nodes, SignalArg};
+use super::args::{BusSpec, Duration, Nodes, SignalArg};
 use super::exit::stdout;
 use super::file::OutFile;
 use super::{Format, Global, When, open};
@@ -85,6 +85,10 @@ fn sync_period(text: &str) -> Result<Duration, String> {
 
 impl Log {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
+        if matches!(global.bus, Some(BusSpec::Replay(_))) && (self.sync.is_some() || self.poll.is_some()) {
+            let message = "a recording (replay:) receives only: --sync and --poll send";
+            return Err(Failure::new(Kind::Usage, message).into());
+        }
         let create = |path: &Path| OutFile::create(path, self.force);
         let file = self.output.as_deref().map(create).transpose()?;
         let summary = self.summary.as_deref().filter(|path| *path != Path::new("-")).map(create).transpose()?;
@@ -101,15 +105,16 @@ impl Log {
         let console = Console { progress: Some(progress.multi()), ..global.console() };
         let form = if global.format == Format::Json { Form::Json } else { Form::Csv };
         let (outcome, screen) = global.with_master(|master| {
-            let nodes = match (&self.nodes, self.passive) {
+            let nodes = match (&self.nodes, self.passive || !master.bus().is_live()) {
                 (Nodes::All, true) => NodeId::all().collect(),
                 _ => open::nodes(master, global, &self.nodes)?,
             };
+            let mode = self.mode(master.bus().is_live());
             let plan = Plan {
                 overrides: open::overrides(global, &nodes)?,
                 nodes,
                 wanted: self.signals.iter().map(|signal| signal.0.clone()).collect(),
-                mode: self.mode(),
+                mode,
                 duration,
                 count: self.count,
                 nmt: !self.no_nmt,
@@ -147,8 +152,9 @@ impl Log {
         Ok(outcome)
     }
 
-    fn mode(&self) -> Mode {
-        match (self.sync, self.poll, self.passive) {
+    /// A recording (`replay:`) can only be listened to.
+    fn mode(&self, live: bool) -> Mode {
+        match (self.sync, self.poll, self.passive || !live) {
             (Some(period), _, _) => Mode::Sync(period.0),
             (_, Some(period), _) => Mode::Poll(period.0),
             (_, _, true) => Mode::Passive,

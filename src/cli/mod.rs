@@ -2,6 +2,7 @@
 //! it gets.
 
 pub mod args;
+mod bus;
 mod completions;
 pub mod exit;
 mod file;
@@ -55,8 +56,8 @@ pub struct Cli {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
-    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN
-    /// interface that is up
+    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a
+    /// candump -L log; receives only). Not given: the only CAN interface that is up
     #[arg(short, long, global = true, env = "CANGAUGE_BUS", value_name = "BUS")]
     pub(crate) bus: Option<BusSpec>,
 
@@ -133,6 +134,8 @@ pub(crate) enum Command {
     Sdo(sdo::Sdo),
     /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// List CAN interfaces, switch them on and off, find the bit rate of a bus
+    Bus(bus::BusCommand),
     /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
     /// Print the completions for a shell
@@ -197,6 +200,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Bus(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }

@@ -406,7 +406,11 @@ impl<'bus> Lss<'_, 'bus> {
                 Happening::Fault(fault, _) if self.faults.len() < FAULTS => self.faults.push(fault),
                 Happening::Interrupted => return Err(Error::Interrupted.into()),
                 Happening::Link(false) => return Err(BusError::Down(self.master.bus.name().to_owned()).into()),
-                Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {}
+                Happening::Sdo(..)
+                | Happening::Fault(..)
+                | Happening::Dropped(_)
+                | Happening::Link(true)
+                | Happening::Ended => {}
             }
         }
     }

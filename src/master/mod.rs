@@ -77,6 +77,8 @@ pub enum Happening {
     Link(bool),
     /// The moment waited for is there.
     Deadline,
+    /// The recording that is played again is over.
+    Ended,
     /// The user asked to stop.
     Interrupted,
 }
@@ -235,6 +237,7 @@ impl<'bus> Master<'bus> {
                 Event::Dropped(count) => return Ok(Happening::Dropped(count)),
                 Event::Link(up) => return Ok(Happening::Link(up)),
                 Event::Interrupted => return Ok(Happening::Interrupted),
+                Event::Ended => return Ok(Happening::Ended),
                 Event::Timeout => {
                     self.sdo.on_time(deadline, &self.timing, &mut self.outgoing);
                     if deadline >= until && !self.sdo.has_finished() {
@@ -301,7 +304,11 @@ impl<'bus> Master<'bus> {
                     self.cancel();
                     return Err(Error::Bus(BusError::Down(self.bus.name().to_owned())));
                 }
-                Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) | Happening::Deadline => {}
+                Happening::Fault(..)
+                | Happening::Dropped(_)
+                | Happening::Link(true)
+                | Happening::Ended
+                | Happening::Deadline => {}
             }
         }
         Ok(results.into_iter().flatten().collect())

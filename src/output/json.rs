@@ -8,7 +8,7 @@ use crate::tasks::{Failure, Kind};
 use serde::Serialize;
 use std::io::{self, Write};
 
-fn line<T: Serialize>(out: &mut dyn Write, object: &T) -> io::Result<()> {
+pub(super) fn line<T: Serialize>(out: &mut dyn Write, object: &T) -> io::Result<()> {
     serde_json::to_writer(&mut *out, object)?;
     out.write_all(b"\n")
 }

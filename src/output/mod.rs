@@ -2,6 +2,8 @@
 
 pub mod console;
 pub mod csv;
+mod elapsed;
+pub mod interfaces;
 pub mod json;
 pub mod progress;
 pub mod rows;

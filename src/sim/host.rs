@@ -41,7 +41,7 @@ pub fn run(
         let deadline = until.map_or(next, |until| until.min(next));
         match bus.receive(deadline)? {
             Event::Frame(received) => host.hear(None, received.at.mono, &received.frame),
-            Event::Interrupted => break,
+            Event::Interrupted | Event::Ended => break,
             Event::Timeout if until.is_some_and(|until| bus.now().mono >= until) => break,
             Event::Link(true) => host.retime(bus.bit_rate()),
             Event::Timeout | Event::Fault(..) | Event::Dropped(_) | Event::Link(false) => {}

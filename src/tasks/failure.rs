@@ -102,7 +102,7 @@ impl From<SdoError> for Failure {
 impl From<BusError> for Failure {
     fn from(error: BusError) -> Failure {
         let kind = match &error {
-            BusError::Io { what, .. } if what.contains("trace") => Kind::Io,
+            BusError::File { .. } => Kind::Io,
             _ => Kind::Bus,
         };
         let hint = match &error {
@@ -114,8 +114,9 @@ impl From<BusError> for Failure {
                 Some(format!("bring it up: sudo ip link set {name} up type can bitrate 250000 (the sensors' bit rate)"))
             }
             BusError::NoInterface(_) | BusError::NotCan(_) => {
-                Some("see what is there: ip -br link show type can; without hardware: --bus sim".to_owned())
+                Some("see what is there: cangauge bus list; without hardware: --bus sim".to_owned())
             }
+            BusError::ReceiveOnly(_) => Some("what listens only can do it: log, scan --passive, nmt watch".to_owned()),
             BusError::Unsupported(_) => Some("without it: --bus sim".to_owned()),
             _ => None,
         };

@@ -1,6 +1,8 @@
 //! The procedures that users think in. They return reports and print nothing.
 
+pub mod detect;
 pub mod failure;
+pub mod host;
 pub mod log;
 pub mod nmt;
 pub mod read;

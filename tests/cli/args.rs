@@ -113,7 +113,8 @@ fn global_options_stand_before_and_after_the_command() {
 fn buses_that_are_none() {
     let bench = Bench::of(ALL);
     let run = |bus: &str| bench.finish(&mut bench.command(&["-b", bus, "scan"]));
-    run("foo:bar").refuses("\"foo:bar\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml)");
+    run("foo:bar")
+        .refuses("\"foo:bar\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE)");
     run("").refuses("\"\" is not a name of an interface");
     run("a-name-that-is-too-long").refuses("\"a-name-that-is-too-long\" is not a name of an interface");
     run("sim:mh4").refuses("\"mh4\" is not DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) and no file FILE.toml");

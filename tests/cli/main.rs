@@ -2,6 +2,7 @@
 //! frames. Benches go by the virtual clock, so that waiting takes no time.
 
 mod args;
+mod bus;
 mod examples;
 mod log;
 mod log_end;
@@ -9,6 +10,7 @@ mod log_file;
 mod nmt;
 mod output;
 mod read;
+mod replay;
 mod scan;
 mod sdo;
 

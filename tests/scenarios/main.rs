@@ -1,6 +1,7 @@
 //! Commands and recordings under bad conditions, on the virtual clock.
 
 mod answers;
+mod detect;
 mod full_queue;
 mod garbage;
 mod lss;

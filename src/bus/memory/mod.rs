@@ -40,6 +40,8 @@ pub struct MemoryBus {
     name: String,
     bit_rate: u32,
     mode: Mode,
+    /// Bit rate and mode before the program changed them.
+    before: Option<(u32, Mode)>,
     /// Whether the program may change the bit rate.
     can_retime: bool,
     queue_length: usize,
@@ -72,6 +74,7 @@ impl MemoryBus {
             name: "sim".to_owned(),
             bit_rate: BIT_RATE,
             mode: Mode::Normal,
+            before: None,
             can_retime: true,
             queue_length: QUEUE_LENGTH,
             time_line: TimeLine::open(clock),
@@ -241,7 +244,9 @@ impl Bus for MemoryBus {
     fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
         self.can_set_bit_rate()?;
         self.catch_up();
+        self.before.get_or_insert((self.bit_rate, self.mode));
         self.queue.clear();
+        self.inbox.retain(|event| *event == Event::Interrupted);
         if let Wire::Busy(transmission) = &mut self.wire {
             transmission.senders.retain(|(sender, _)| *sender != Sender::Program);
             if transmission.senders.is_empty() {
@@ -252,6 +257,13 @@ impl Bus for MemoryBus {
         self.bit_rate = bit_rate.max(1);
         self.mode = mode;
         self.places.iter_mut().for_each(|place| place.station.told_bit_rate(bit_rate));
+        Ok(())
+    }
+
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        let Some((bit_rate, mode)) = self.before else { return Ok(()) };
+        self.set_bit_rate(bit_rate, mode)?;
+        self.before = None;
         Ok(())
     }
 

@@ -13,7 +13,7 @@ use crate::canopen::nmt::Life;
 use crate::master::{Error, Happening, Master};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::instrument::Instrument;
-use crate::measure::sample::Sample;
+use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
@@ -147,7 +147,9 @@ impl Recording {
         let begin = master.now();
         self.end = begin;
         let stop = plan.duration.map(|duration| begin + duration);
-        let give_up = begin + plan.duration.unwrap_or(PATIENCE).min(PATIENCE);
+        // A recording may begin long before what is looked for in it, and it comes to an end.
+        let patience = if master.bus().is_live() { PATIENCE } else { Duration::MAX };
+        let give_up = begin + plan.duration.unwrap_or(patience).min(patience);
         let sync = match plan.mode {
             Mode::Sync(period) => Some((period, instruments.first().map_or(CanId::SYNC, |first| first.sync))),
             _ => None,
@@ -219,6 +221,7 @@ impl Recording {
                     observer.note(&Note::Link(up), master.bus().now());
                     ControlFlow::Continue(())
                 }
+                Happening::Ended => return Ok(()),
                 Happening::Interrupted => {
                     self.interrupted = true;
                     if self.rows == 0 {
@@ -340,10 +343,23 @@ impl Recording {
                 self.remarks.push(format!("node {node}: no measurements: {why}"));
             }
         }
+        // A unit or a mapping that was learned on the way replaces what was known before; what gave nothing
+        // under its old name is no source of its own.
+        let statistics: Vec<(Source, Statistics)> =
+            self.decoder.sources().iter().cloned().zip(self.statistics).collect();
+        let named_again = |at: usize, source: &Source| {
+            let others = statistics.iter().enumerate().filter(|&(other, _)| other > at);
+            others.into_iter().any(|(_, (other, _))| (other.node, &other.signal) == (source.node, &source.signal))
+        };
+        let kept = |(at, (source, statistics)): (usize, &(Source, Statistics))| {
+            let empty = statistics.count() == 0 && statistics.invalid() == 0;
+            (!(empty && named_again(at, source))).then(|| (source.clone(), statistics.clone()))
+        };
+        let statistics = statistics.iter().enumerate().filter_map(kept).collect();
         Outcome {
             rows: self.rows,
             length: self.first.map_or(Duration::ZERO, |first| self.end.since(first)),
-            statistics: self.decoder.sources().iter().cloned().zip(self.statistics).collect(),
+            statistics,
             lost,
             nothing,
             dropped: self.dropped,
