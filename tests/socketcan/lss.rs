@@ -63,7 +63,6 @@ fn fastscan_finds_one_device_within_a_second_and_several_one_after_the_other() {
         serials.sort_unstable();
         serials.dedup();
         assert_eq!(serials.len(), devices.len(), "{found:?}");
-        println!("{} devices: {found:?}", devices.len());
         // The last one is alone.
         let alone = found.last().unwrap().1;
         assert!(alone <= Duration::from_secs(1), "{found:?}");
