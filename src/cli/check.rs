@@ -1,11 +1,12 @@
 //! `cangauge check`.
 
-use super::args::{Duration, Nodes};
+use super::args::{BusSpec, Duration, Nodes};
 use super::exit::stdout;
 use super::file::OutFile;
-use super::log::{sync_period, tell};
+use super::log::{refuse_to_send, sync_period, tell};
 use super::{Format, Global, open};
 use crate::bus::Stamp;
+use crate::canopen::id::NodeId;
 use crate::measure::expression::Expression;
 use crate::measure::expression::judge::Jury;
 use crate::measure::expression::verdict::{Ruling, Verdict};
@@ -23,8 +24,8 @@ use std::path::PathBuf;
 
 /// Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data
 ///
-/// Without --for one reading by SDO is judged; with it every sample of a recording, as log records it. An
-/// invalid sample satisfies nothing.
+/// Without --for one reading by SDO is judged; with it every sample of a recording, as log records it, and of
+/// replay:FILE all of them. An invalid sample satisfies nothing.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Expressions, one word each for the shell, and all have to hold:
@@ -67,7 +68,8 @@ pub(crate) struct Check {
 
 impl Check {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        self.refuse_at_once()?;
+        refuse_to_send(global, self.sync.or(self.poll))?;
+        self.refuse_at_once(global)?;
         let file = self.junit.as_deref().map(|path| OutFile::create(path, self.force)).transpose()?;
         let report = match self.measure(global) {
             // A server that finds no file knows nothing of the checks that were to be.
@@ -90,12 +92,13 @@ impl Check {
     }
 
     /// What can be known to be wrong before the bus is opened.
-    fn refuse_at_once(&self) -> Result<(), Failure> {
+    fn refuse_at_once(&self, global: &Global) -> Result<(), Failure> {
         if let Nodes::These(nodes) = &self.nodes {
             self.expressions.iter().try_for_each(|expression| expression.names_only(nodes))?;
         }
         let function = self.expressions.iter().find_map(Expression::needs_many);
-        match function.filter(|_| self.duration.is_none()) {
+        let is_recorded = matches!(global.bus, Some(BusSpec::Replay(_)));
+        match function.filter(|_| self.duration.is_none() && !is_recorded) {
             Some(function) => {
                 let message = format!("{}() of one reading says nothing", function.as_str());
                 Err(Failure::new(Kind::Usage, message).hint("measure for a while: --for 10s"))
@@ -109,13 +112,19 @@ impl Check {
         let limits = Limits::new(duration.is_some() && global.shows_progress(), duration.unwrap_or_default());
         let console = Console { progress: Some(limits.multi()), ..global.console() };
         global.with_master(|master| {
-            let nodes = open::nodes(master, global, &self.nodes)?;
+            // A recording (`replay:`) can only be listened to, and is judged from its beginning to its end.
+            let live = master.bus().is_live();
+            let nodes = match &self.nodes {
+                Nodes::All if !live => NodeId::all().collect(),
+                nodes => open::nodes(master, global, nodes)?,
+            };
+            let mode = if live { self.mode() } else { Mode::Passive };
             let plan = Plan {
                 overrides: open::overrides(global, &nodes)?,
                 nodes,
                 excuse: self.nodes == Nodes::All,
                 expressions: self.expressions.clone(),
-                measuring: duration.map(|duration| (self.mode(), duration)),
+                measuring: (duration.is_some() || !live).then_some((mode, duration)),
             };
             let mut screen = Screen { limits, console, begun: None };
             let report = check(master, &plan, &mut screen);

@@ -13,6 +13,7 @@ use crate::measure::survey::Overrides;
 use crate::tasks::log::{self, Mode, Note, Observer, Outcome, log};
 use crate::tasks::read::{Target, requests, sample, surveyed, targets};
 use crate::tasks::{Failure, Kind};
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -25,8 +26,8 @@ pub struct Plan {
     pub excuse: bool,
     /// What is expected.
     pub expressions: Vec<Expression>,
-    /// How the values come, and for how long; `None` for one reading by SDO.
-    pub measuring: Option<(Mode, Duration)>,
+    /// How the values come, and for how long if not to the end of what is played; `None` for one reading by SDO.
+    pub measuring: Option<(Mode, Option<Duration>)>,
     /// Descriptions named by the user.
     pub overrides: Overrides,
 }
@@ -140,7 +141,7 @@ fn record(
     master: &mut Master<'_>,
     plan: &Plan,
     mode: Mode,
-    duration: Duration,
+    duration: Option<Duration>,
     observer: &mut dyn Observer,
 ) -> Result<Report, Failure> {
     let mut wanted = Vec::new();
@@ -153,7 +154,7 @@ fn record(
         nodes: plan.nodes.clone(),
         wanted,
         mode,
-        duration: Some(duration),
+        duration,
         count: None,
         nmt: true,
         overrides: plan.overrides.clone(),
@@ -176,8 +177,9 @@ pub struct Expecting<'a> {
     excuse: bool,
     /// Whether the devices were known before they were recorded.
     is_bound: bool,
-    /// How many sources there were at the last look.
-    sources: usize,
+    /// The sources that something has come of, where the devices were not known: what is known of another one
+    /// may yet be learned.
+    came: BTreeSet<usize>,
     begun: Option<Stamp>,
     failure: Option<Failure>,
     observer: &'a mut dyn Observer,
@@ -197,7 +199,7 @@ impl<'a> Expecting<'a> {
             nodes: nodes.to_vec(),
             excuse,
             is_bound: false,
-            sources: 0,
+            came: BTreeSet::new(),
             begun: None,
             failure: None,
             observer,
@@ -208,7 +210,7 @@ impl<'a> Expecting<'a> {
     ///
     /// # Errors
     /// An expression that turned out not to fit the devices.
-    pub fn verdicts(self, outcome: &Outcome) -> Result<Vec<Verdict>, Failure> {
+    pub fn verdicts(mut self, outcome: &Outcome) -> Result<Vec<Verdict>, Failure> {
         if let Some(failure) = self.failure {
             return Err(failure);
         }
@@ -218,6 +220,9 @@ impl<'a> Expecting<'a> {
             Silence { node: *node, signal: None, reason }
         };
         let silent: Vec<Silence> = outcome.lost.iter().map(silence).collect();
+        if !self.is_bound && !self.excuse {
+            self.jury.settle_missing(&self.nodes);
+        }
         let end = self.begun.map(|begun| begun.mono + outcome.length);
         Ok(self.jury.verdicts(end, &silent))
     }
@@ -231,9 +236,13 @@ impl Observer for Expecting<'_> {
     }
 
     fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
-        if !self.is_bound && sources.len() > self.sources {
-            self.sources = sources.len();
-            if let Err(error) = self.jury.bind_recorded(sources) {
+        let before = self.came.len();
+        if !self.is_bound {
+            self.came.extend(samples.iter().map(|sample| sample.source));
+        }
+        if self.came.len() > before {
+            let came: Vec<Source> = self.came.iter().filter_map(|&source| sources.get(source)).cloned().collect();
+            if let Err(error) = self.jury.bind_recorded(&came) {
                 self.failure = Some(error.into());
                 return ControlFlow::Break(());
             }

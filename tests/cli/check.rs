@@ -292,6 +292,29 @@ fn who_only_listens_learns_the_units_on_the_way() {
 }
 
 #[test]
+fn a_recording_is_judged_from_its_beginning_to_its_end() {
+    let bench = still();
+    bench.run("log 5,127 --sync 10ms --duration 2s").exit(0);
+    fs::rename(bench.path("trace"), bench.path("t.log")).expect("the trace");
+    let replay = |words: &[&str]| bench.finish(&mut bench.command(&[&["-b", "replay:t.log", "check"], words].concat()));
+    let done = replay(&["5,127", "pressure < 4 bar", "rate(pressure) > 1"]).exit(0);
+    assert!(
+        done.stdout.starts_with("ok    5    pressure < 4 bar    1.25 bar (n 200, 1.25..1.25)\n"),
+        "{}",
+        done.stdout
+    );
+    assert_eq!(done.stdout.lines().count(), 4);
+    replay(&["all", "pressure < 2 bar"]).exit(1);
+    // Who was named and is not in it is no success.
+    let done = replay(&["5,9", "pressure < 2 bar"]).exit(3);
+    assert!(done.stdout.contains("none  9  pressure < 2 bar  no data: node 9 gave nothing of it\n"), "{}", done.stdout);
+    replay(&["5", "humidity < 2"]).exit(3);
+    replay(&["5", "pressure < 2 degC"]).exit(2);
+    replay(&["5", "pressure < 2", "--for", "1s", "--poll", "10ms"])
+        .refuses("a recording (replay:) receives only: --sync and --poll send");
+}
+
+#[test]
 #[cfg(unix)]
 fn a_check_that_is_cut_short_says_nothing() {
     let bench = Bench::real("mh4@1");

@@ -90,7 +90,7 @@ impl Jury {
         Ok(())
     }
 
-    /// Finds the signals among what is recorded by now, of the nodes that were not bound before.
+    /// Finds the signals among those that have come by now, of the nodes that were not bound before.
     ///
     /// # Errors
     /// Units that do not go together.
@@ -108,6 +108,19 @@ impl Jury {
             }
         }
         Ok(())
+    }
+
+    /// Settles what was to be judged for each of `nodes` and could not be for one of them: it gave nothing.
+    pub fn settle_missing(&mut self, nodes: &[NodeId]) {
+        for expression in self.expressions.iter().filter(|expression| expression.is_of_every_node()) {
+            for &node in nodes {
+                let is_bound = |bound: &Bound| bound.text == expression.text() && bound.node == Some(node);
+                if !self.cases.iter().map(Case::bound).any(is_bound) {
+                    let reason = format!("node {node} gave nothing of it");
+                    self.settled.push(Verdict::nothing(expression.text(), Some(node), reason));
+                }
+            }
+        }
     }
 
     /// Every case, bound.
@@ -191,6 +204,8 @@ fn ways(cases: &[Case], source: &Source) -> Vec<Way> {
                 continue;
             }
             let unit = match (unit_of(source), known.unit) {
+                // Who did not know the unit compares with nothing that has one.
+                (_, None) => SlotUnit::Same,
                 (now, then) if now == then => SlotUnit::Same,
                 (Some(now), Some(then)) if now.convert(0.0, then).is_some() => SlotUnit::Changed(now, then),
                 _ => SlotUnit::Lost,
