@@ -29,6 +29,9 @@ fn at_every_step(bench: &str, target: &str, wanted: &Wanted, step: Duration) {
                 assert_eq!(failure.kind, Kind::Interrupted, "{moment:?}: {failure}");
                 interrupted += 1;
                 assert!(bus.bit_rate() == rate || failure.message.contains("configured"), "{moment:?}: {failure}");
+                if failure.message.contains("not stored") {
+                    assert_eq!((after[0].2, after[0].3), (before[0].2, before[0].3), "{moment:?}: {failure}");
+                }
                 if failure.message.contains("nothing was changed") {
                     let mut master = cangauge::master::Master::new(&mut bus, cangauge::master::Timing::default());
                     master.send("000#8105".parse().unwrap());
@@ -41,7 +44,7 @@ fn at_every_step(bench: &str, target: &str, wanted: &Wanted, step: Duration) {
         }
         moment += step;
     }
-    assert!(interrupted > 20, "{interrupted}");
+    assert!(interrupted > 12, "{interrupted}");
 }
 
 const MH4: &str =
@@ -73,7 +76,7 @@ fn the_bit_rate() {
 fn device_and_host_together() {
     let alone = "device = [{ kind = 'mh4', node = 5, latency = '1ms' }]";
     let wanted = Wanted { rate: Some(Rate::Bits(500_000)), retime: true, ..Wanted::default() };
-    at_every_step(alone, "5", &wanted, Duration::from_micros(31_000));
+    at_every_step(alone, "5", &wanted, Duration::from_micros(173_000));
 }
 
 #[test]
@@ -82,6 +85,6 @@ fn only() {
         "device = [{ kind = 'mh4', node = 5, latency = '1ms' }]",
         "only",
         &id(12),
-        Duration::from_micros(23_000),
+        Duration::from_micros(97_000),
     );
 }

@@ -173,6 +173,24 @@ fn without_a_serial_number_it_cannot_be_told_from_another() {
 }
 
 #[test]
+fn two_devices_with_one_identity() {
+    let mut bus = bus("device = [{ kind = 'mh4', node = 5, serial = 7 }, { kind = 'mh4', node = 6, serial = 7 }]");
+    let before = all_held(&bus);
+    for target in ["5", "6", "0x47:1:0x10007:7"] {
+        let done = run(&mut bus, target, &id(12));
+        assert_eq!(done.failure().0, Kind::CheckFailed, "{target}: {:?}", done.failure());
+        assert!(done.failure().1.ends_with("nothing was changed"), "{}", done.failure().1);
+    }
+    assert_eq!(all_held(&bus), before);
+    // One of them has no node-ID, so that SDO does not show it: both answer to their address.
+    let mut bus = super::bus("device = [{ kind = 'mh4', node = 5, serial = 7 }, { kind = 'mh4', serial = 7 }]");
+    let before = all_held(&bus);
+    let done = run(&mut bus, "5", &id(12));
+    assert_eq!(done.failure().0, Kind::CheckFailed, "{:?}", done.failure());
+    assert_eq!(all_held(&bus), before);
+}
+
+#[test]
 fn by_objects_of_its_own() {
     let cases = [("mh4", None), ("baumer", Some("baumer"))];
     for (kind, device) in cases {
