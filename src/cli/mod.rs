@@ -2,11 +2,15 @@
 //! it gets.
 
 pub mod args;
+mod autozero;
 mod bus;
+mod check;
 mod completions;
+mod each;
 pub mod exit;
 mod file;
 mod log;
+mod lss;
 mod nmt;
 mod open;
 pub mod parse;
@@ -14,6 +18,7 @@ mod read;
 mod scan;
 mod sdo;
 mod sim;
+mod store;
 
 use crate::master::{Master, Timing};
 use crate::output::console::Console;
@@ -32,6 +37,7 @@ Examples, on the simulated bus; leave `-b sim` out where one CAN interface is up
   cangauge -b sim log 1-3,127 --sync 10ms --duration 1h -o run.csv
   cangauge -b sim sdo read 1 0x1018:1                    one object, bare
   cangauge -b sim nmt reset 1                            restart it, wait for the boot-up
+  cangauge -b sim lss set-id 127 12                      give it a node-ID, and see it come back
 
 Exit codes:
   0  done                                    5  the bus fails: interface missing, down, bus-off
@@ -134,8 +140,18 @@ pub(crate) enum Command {
     Sdo(sdo::Sdo),
     /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data
+    Check(check::Check),
+    /// Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device's own)
+    Lss(lss::LssCommand),
     /// List CAN interfaces, switch them on and off, find the bit rate of a bus
     Bus(bus::BusCommand),
+    /// Make the present reading of a channel zero (6125h), with checks before and after
+    Autozero(autozero::Autozero),
+    /// Let devices keep their settings beyond power off (1010h)
+    Store(store::Store),
+    /// Give devices their settings as delivered (1011h); node-ID and bit rate stay
+    Restore(store::Restore),
     /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
     /// Print the completions for a shell
@@ -200,7 +216,12 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Check(command) => command.run(&cli.global),
+        Command::Lss(command) => command.run(&cli.global),
         Command::Bus(command) => command.run(&cli.global),
+        Command::Autozero(command) => command.run(&cli.global),
+        Command::Store(command) => command.run(&cli.global),
+        Command::Restore(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }

@@ -2,17 +2,21 @@
 //! frames. Benches go by the virtual clock, so that waiting takes no time.
 
 mod args;
+mod autozero;
 mod bus;
+mod check;
 mod examples;
 mod log;
 mod log_end;
 mod log_file;
+mod lss;
 mod nmt;
 mod output;
 mod read;
 mod replay;
 mod scan;
 mod sdo;
+mod store;
 
 use std::fs;
 use std::io::{self, Read};

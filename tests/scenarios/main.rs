@@ -1,6 +1,7 @@
 //! Commands and recordings under bad conditions, on the virtual clock.
 
 mod answers;
+mod assign;
 mod bit_rates;
 mod detect;
 mod full_queue;
@@ -9,6 +10,7 @@ mod lss;
 mod scan;
 mod second_master;
 mod second_sync;
+mod signatures;
 mod stalled;
 
 use cangauge::bus::Stamp;
