@@ -48,6 +48,8 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "read" -d 'Read me
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "nmt" -d 'Send NMT commands and tell states'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sdo" -d 'Read and write objects of the object dictionary'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "check" -d 'Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "lss" -d 'Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device\'s own)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "bus" -d 'List CAN interfaces, switch them on and off, find the bit rate of a bus'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "autozero" -d 'Make the present reading of a channel zero (6125h), with checks before and after'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "store" -d 'Let devices keep their settings beyond power off (1010h)'
@@ -396,6 +398,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sync -d 'Send 
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l poll -d 'Read by SDO at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s o -l output -d 'Write to a file instead of stdout' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l summary -d 'Write the summary as JSON to a file; - for stdout' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l expect -d 'Exit with 1 at the end unless this held: \'pressure in 9..11 bar\', see cangauge check --help' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s q -l quiet -d 'Say less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l passive -d 'Send nothing at all'
@@ -403,6 +406,242 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Lea
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite files that exist'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l for -d 'Judge all samples that come in this time' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sync -d 'Send SYNC at this interval' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l poll -d 'Read by SDO at this interval' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l junit -d 'Write the verdicts as JUnit XML, for CI servers: one test case per expression' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l force -d 'Overwrite a file that exists'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "scan" -d 'List who can be given a node-ID: those that have one by SDO, one that has none by fastscan'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "inquire" -d 'Ask a device for its identity and node-ID by LSS'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set-id" -d 'Give a device its node-ID: checked to be free, configured, stored, reset, and confirmed'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set-bitrate" -d 'Give a device its bit rate, by its own table'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set" -d 'Give a device its node-ID and its bit rate: one store, one reset'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "activate" -d 'Bring configured bit rates into force: so long they go on, as long again they are silent'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "store" -d 'Make node-ID and bit rate last'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "identify" -d 'Ask whether there are devices with numbers within limits; exit 3 where nobody answers'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l via -d 'By LSS, by objects of the device\'s own, or what its description says' -r -f -a "auto\t''
+lss\t''
+sdo\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l no-store -d 'Only until power off'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l force -d '"only" goes on where more than one device shows itself: all of them take it'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l table-index -d 'The entry of the device\'s bit rate table, where that table is not known' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l via -d 'By LSS, by objects of the device\'s own, or what its description says' -r -f -a "auto\t''
+lss\t''
+sdo\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l retime -d 'Take this side to the new bit rate, too, and store only once the device is heard there. Only for a device alone with this machine'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l no-store -d 'Only until power off'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l force -d '"only" goes on where more than one device shows itself: all of them take it'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l id -d 'Its new node-ID' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l bitrate -d '250k, 1M, 125000, auto where the device has it' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l table-index -d 'The entry of the device\'s bit rate table, where that table is not known' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l via -d 'By LSS, by objects of the device\'s own, or what its description says' -r -f -a "auto\t''
+lss\t''
+sdo\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l retime -d 'Take this side to the new bit rate, too, and store only once the device is heard there. Only for a device alone with this machine'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l no-store -d 'Only until power off'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l force -d '"only" goes on where more than one device shows itself: all of them take it'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l force -d '"only" goes on where more than one device shows itself'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l force -d '"only" goes on where more than one device shows itself'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "scan" -d 'List who can be given a node-ID: those that have one by SDO, one that has none by fastscan'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "inquire" -d 'Ask a device for its identity and node-ID by LSS'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set-id" -d 'Give a device its node-ID: checked to be free, configured, stored, reset, and confirmed'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set-bitrate" -d 'Give a device its bit rate, by its own table'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set" -d 'Give a device its node-ID and its bit rate: one store, one reset'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "activate" -d 'Bring configured bit rates into force: so long they go on, as long again they are silent'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "store" -d 'Make node-ID and bit rate last'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "identify" -d 'Ask whether there are devices with numbers within limits; exit 3 where nobody answers'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
@@ -620,15 +859,17 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s q -l q
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "nmt" -d 'Send NMT commands and tell states'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "bus" -d 'List CAN interfaces, switch them on and off, find the bit rate of a bus'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "autozero" -d 'Make the present reading of a channel zero (6125h), with checks before and after'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "store" -d 'Let devices keep their settings beyond power off (1010h)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "restore" -d 'Give devices their settings as delivered (1011h); node-ID and bit rate stay'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "completions" -d 'Print the completions for a shell'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus autozero store restore sim completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "nmt" -d 'Send NMT commands and tell states'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "check" -d 'Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "lss" -d 'Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device\'s own)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "bus" -d 'List CAN interfaces, switch them on and off, find the bit rate of a bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "autozero" -d 'Make the present reading of a channel zero (6125h), with checks before and after'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "store" -d 'Let devices keep their settings beyond power off (1010h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "restore" -d 'Give devices their settings as delivered (1011h); node-ID and bit rate stay'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "completions" -d 'Print the completions for a shell'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss bus autozero store restore sim completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'

@@ -4,7 +4,7 @@
 
 use cangauge::bus::memory::MemoryBus;
 use cangauge::bus::time::{Mono, Stamp};
-use cangauge::bus::{Bus, BusError, Event, Filters, TimestampSource};
+use cangauge::bus::{Bus, BusError, Event, Filters, Received, TimestampSource};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
@@ -26,6 +26,8 @@ enum Mishap {
     Restart,
     /// The device has restarted before, and nobody has seen its boot-up.
     Restarted,
+    /// The device refuses it with this code instead of its answer.
+    Refuse(u32),
 }
 
 const MISHAPS: [Mishap; 5] =
@@ -36,6 +38,8 @@ struct Unlucky {
     inner: MemoryBus,
     at: Option<(usize, Mishap)>,
     sent: Vec<String>,
+    /// What its answer becomes.
+    refusal: Option<u32>,
     /// Answers still to be lost.
     deaf: bool,
     interrupted: bool,
@@ -46,7 +50,7 @@ impl Unlucky {
     fn of(kind: &str, settings: &str, at: Option<(usize, Mishap)>) -> Unlucky {
         let bench = format!("clock = \"virtual\"\n[[device]]\nkind = \"{kind}\"\nnode = 5\n{settings}");
         let inner = Bench::from_toml(&bench, Path::new("")).expect("a bench").open().expect("a bus");
-        Unlucky { inner, at, sent: Vec::new(), deaf: false, interrupted: false, restarts: false }
+        Unlucky { inner, at, sent: Vec::new(), refusal: None, deaf: false, interrupted: false, restarts: false }
     }
 
     /// How often this went out.
@@ -111,6 +115,7 @@ impl Bus for Unlucky {
                 Mishap::Interrupt => self.interrupted = true,
                 Mishap::Restart => self.restarts = true,
                 Mishap::Restarted => self.reset(),
+                Mishap::Refuse(code) => self.refusal = Some(code),
             },
             _ => {}
         }
@@ -125,6 +130,12 @@ impl Bus for Unlucky {
             {
                 if std::mem::take(&mut self.restarts) {
                     self.inner.send(&"000#8105".parse().expect("a frame"))?;
+                }
+                if let Some(code) = self.refusal.take() {
+                    let [_, a, b, c, ..] = *received.frame.data() else { panic!("an answer has eight bytes") };
+                    let bytes = [&[0x80, a, b, c], code.to_le_bytes().as_slice()].concat();
+                    let frame = Frame::new(received.frame.id(), &bytes).expect("a frame");
+                    return Ok(Event::Frame(Received { frame, at: received.at }));
                 }
                 if std::mem::take(&mut self.deaf) {
                     continue;
@@ -308,4 +319,28 @@ fn what_is_told_as_restored_is_as_delivered() {
             }
         }
     }
+}
+
+#[test]
+fn a_refusal_is_told_in_the_words_of_the_device_and_only_its_form_is_tried_again() {
+    let place = |verify: bool| {
+        let mut usual = Unlucky::of("d20", "", None);
+        save(&mut usual, verify).expect("stored");
+        usual.sent.iter().position(|sent| sent.ends_with("2210100173617665")).expect("the signature")
+    };
+    // Page 12: "If the storing failed": 06060000h; a wrong signature: 0800002xh.
+    for (code, words) in [
+        (0x0606_0000, "access failed because of a hardware error"),
+        (0x0800_0020, "data cannot be transferred or stored"),
+    ] {
+        let mut bus = Unlucky::of("d20", "", Some((place(true), Mishap::Refuse(code))));
+        let failure = save(&mut bus, true).expect_err("refused");
+        assert_eq!((failure.kind, failure.abort.map(|abort| abort.0)), (Kind::Refused, Some(code)));
+        assert!(failure.message.contains(words), "{failure}");
+        assert_eq!((bus.count("73617665"), bus.count("000#8105")), (1, 0), "neither repeated nor reset");
+    }
+    // A device that takes the size, or its absence, amiss has not acted.
+    let mut bus = Unlucky::of("d20", "", Some((place(false), Mishap::Refuse(0x0504_0001))));
+    save(&mut bus, false).expect("stored");
+    assert_eq!((bus.count("2210100173617665"), bus.count("2310100173617665")), (1, 1));
 }
