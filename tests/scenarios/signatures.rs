@@ -264,7 +264,9 @@ fn what_is_told_as_stored_outlasts_a_reset() {
             drop(save(bus, verify));
         };
         let count = frames(run, "mh4", RUNS);
-        for (at, mishap) in (0..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
+        // What comes before is the same with and without proof.
+        let first = if verify { 0 } else { count.saturating_sub(20) };
+        for (at, mishap) in (first..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
             let mut bus = Unlucky::of("mh4", RUNS, Some((at, mishap)));
             set(&mut bus);
             let result = save(&mut bus, verify);
