@@ -47,6 +47,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('sdo', 'sdo', [CompletionResultType]::ParameterValue, 'Read and write objects of the object dictionary')
             [CompletionResult]::new('log', 'log', [CompletionResultType]::ParameterValue, 'Record measurements as CSV or JSON Lines')
             [CompletionResult]::new('check', 'check', [CompletionResultType]::ParameterValue, 'Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data')
+            [CompletionResult]::new('lss', 'lss', [CompletionResultType]::ParameterValue, 'Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device''s own)')
             [CompletionResult]::new('bus', 'bus', [CompletionResultType]::ParameterValue, 'List CAN interfaces, switch them on and off, find the bit rate of a bus')
             [CompletionResult]::new('autozero', 'autozero', [CompletionResultType]::ParameterValue, 'Make the present reading of a channel zero (6125h), with checks before and after')
             [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Let devices keep their settings beyond power off (1010h)')
@@ -506,8 +507,8 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;check' {
-            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
-            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
             [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
             [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
@@ -531,6 +532,278 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;lss' {
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('scan', 'scan', [CompletionResultType]::ParameterValue, 'List who can be given a node-ID: those that have one by SDO, one that has none by fastscan')
+            [CompletionResult]::new('inquire', 'inquire', [CompletionResultType]::ParameterValue, 'Ask a device for its identity and node-ID by LSS')
+            [CompletionResult]::new('set-id', 'set-id', [CompletionResultType]::ParameterValue, 'Give a device its node-ID: checked to be free, configured, stored, reset, and confirmed')
+            [CompletionResult]::new('set-bitrate', 'set-bitrate', [CompletionResultType]::ParameterValue, 'Give a device its bit rate, by its own table')
+            [CompletionResult]::new('set', 'set', [CompletionResultType]::ParameterValue, 'Give a device its node-ID and its bit rate: one store, one reset')
+            [CompletionResult]::new('activate', 'activate', [CompletionResultType]::ParameterValue, 'Bring configured bit rates into force: so long they go on, as long again they are silent')
+            [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Make node-ID and bit rate last')
+            [CompletionResult]::new('identify', 'identify', [CompletionResultType]::ParameterValue, 'Ask whether there are devices with numbers within limits; exit 3 where nobody answers')
+            [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
+            break
+        }
+        'cangauge;lss;scan' {
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;lss;inquire' {
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;lss;set-id' {
+            [CompletionResult]::new('--via', '--via', [CompletionResultType]::ParameterName, 'By LSS, by objects of the device''s own, or what its description says')
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('--no-store', '--no-store', [CompletionResultType]::ParameterName, 'Only until power off')
+            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, '"only" goes on where more than one device shows itself: all of them take it')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;lss;set-bitrate' {
+            [CompletionResult]::new('--table-index', '--table-index', [CompletionResultType]::ParameterName, 'The entry of the device''s bit rate table, where that table is not known')
+            [CompletionResult]::new('--via', '--via', [CompletionResultType]::ParameterName, 'By LSS, by objects of the device''s own, or what its description says')
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('--retime', '--retime', [CompletionResultType]::ParameterName, 'Take this side to the new bit rate, too, and store only once the device is heard there. Only for a device alone with this machine')
+            [CompletionResult]::new('--no-store', '--no-store', [CompletionResultType]::ParameterName, 'Only until power off')
+            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, '"only" goes on where more than one device shows itself: all of them take it')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;lss;set' {
+            [CompletionResult]::new('--id', '--id', [CompletionResultType]::ParameterName, 'Its new node-ID')
+            [CompletionResult]::new('--bitrate', '--bitrate', [CompletionResultType]::ParameterName, '250k, 1M, 125000, auto where the device has it')
+            [CompletionResult]::new('--table-index', '--table-index', [CompletionResultType]::ParameterName, 'The entry of the device''s bit rate table, where that table is not known')
+            [CompletionResult]::new('--via', '--via', [CompletionResultType]::ParameterName, 'By LSS, by objects of the device''s own, or what its description says')
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('--retime', '--retime', [CompletionResultType]::ParameterName, 'Take this side to the new bit rate, too, and store only once the device is heard there. Only for a device alone with this machine')
+            [CompletionResult]::new('--no-store', '--no-store', [CompletionResultType]::ParameterName, 'Only until power off')
+            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, '"only" goes on where more than one device shows itself: all of them take it')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;lss;activate' {
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, '"only" goes on where more than one device shows itself')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;lss;store' {
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, '"only" goes on where more than one device shows itself')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;lss;identify' {
+            [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
+            [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--timeout', '--timeout', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
+            [CompletionResult]::new('--retries', '--retries', [CompletionResultType]::ParameterName, 'How often a request that got no answer is repeated [default: 1]')
+            [CompletionResult]::new('--device', '--device', [CompletionResultType]::ParameterName, 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several')
+            [CompletionResult]::new('--eds', '--eds', [CompletionResultType]::ParameterName, 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several')
+            [CompletionResult]::new('-f', '-f', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv')
+            [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
+            [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
+            [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
+            [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
+            [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
+            [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
+            [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
+            break
+        }
+        'cangauge;lss;help' {
+            [CompletionResult]::new('scan', 'scan', [CompletionResultType]::ParameterValue, 'List who can be given a node-ID: those that have one by SDO, one that has none by fastscan')
+            [CompletionResult]::new('inquire', 'inquire', [CompletionResultType]::ParameterValue, 'Ask a device for its identity and node-ID by LSS')
+            [CompletionResult]::new('set-id', 'set-id', [CompletionResultType]::ParameterValue, 'Give a device its node-ID: checked to be free, configured, stored, reset, and confirmed')
+            [CompletionResult]::new('set-bitrate', 'set-bitrate', [CompletionResultType]::ParameterValue, 'Give a device its bit rate, by its own table')
+            [CompletionResult]::new('set', 'set', [CompletionResultType]::ParameterValue, 'Give a device its node-ID and its bit rate: one store, one reset')
+            [CompletionResult]::new('activate', 'activate', [CompletionResultType]::ParameterValue, 'Bring configured bit rates into force: so long they go on, as long again they are silent')
+            [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Make node-ID and bit rate last')
+            [CompletionResult]::new('identify', 'identify', [CompletionResultType]::ParameterValue, 'Ask whether there are devices with numbers within limits; exit 3 where nobody answers')
+            [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
+            break
+        }
+        'cangauge;lss;help;scan' {
+            break
+        }
+        'cangauge;lss;help;inquire' {
+            break
+        }
+        'cangauge;lss;help;set-id' {
+            break
+        }
+        'cangauge;lss;help;set-bitrate' {
+            break
+        }
+        'cangauge;lss;help;set' {
+            break
+        }
+        'cangauge;lss;help;activate' {
+            break
+        }
+        'cangauge;lss;help;store' {
+            break
+        }
+        'cangauge;lss;help;identify' {
+            break
+        }
+        'cangauge;lss;help;help' {
             break
         }
         'cangauge;bus' {
@@ -811,6 +1084,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('sdo', 'sdo', [CompletionResultType]::ParameterValue, 'Read and write objects of the object dictionary')
             [CompletionResult]::new('log', 'log', [CompletionResultType]::ParameterValue, 'Record measurements as CSV or JSON Lines')
             [CompletionResult]::new('check', 'check', [CompletionResultType]::ParameterValue, 'Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data')
+            [CompletionResult]::new('lss', 'lss', [CompletionResultType]::ParameterValue, 'Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device''s own)')
             [CompletionResult]::new('bus', 'bus', [CompletionResultType]::ParameterValue, 'List CAN interfaces, switch them on and off, find the bit rate of a bus')
             [CompletionResult]::new('autozero', 'autozero', [CompletionResultType]::ParameterValue, 'Make the present reading of a channel zero (6125h), with checks before and after')
             [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Let devices keep their settings beyond power off (1010h)')
@@ -836,6 +1110,9 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;help;check' {
+            break
+        }
+        'cangauge;help;lss' {
             break
         }
         'cangauge;help;bus' {
