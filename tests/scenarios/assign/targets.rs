@@ -87,6 +87,22 @@ fn two_devices_with_one_node_id() {
 }
 
 #[test]
+fn one_of_two_with_one_node_id_that_tells_it() {
+    let twins = "device = [
+        { kind = 'mh4', node = 5, serial = 100, twin = true }, { kind = 'mh4', node = 5, serial = 200, twin = true },
+    ]";
+    let mut bus = bus(twins);
+    let mut expected = all_held(&bus);
+    let done = run(&mut bus, "0x47:1:0x10007:200", &id(12));
+    assert_eq!(done.failure().0, Kind::Unexpected);
+    assert!(done.failure().1.contains("another device has node-ID 5 too"), "{}", done.failure().1);
+    assert!(done.warns("it is not reset"), "{:?}", done.notes);
+    // Reset, it would be at 12 now, and the other one would have lost what it was doing.
+    expected[1].2 = Some(12);
+    assert_eq!(all_held(&bus), expected);
+}
+
+#[test]
 fn unconfigured_devices_one_after_the_other() {
     let mut bus =
         bus("device = [{ kind = 'mh4', serial = 9 }, { kind = 'mh4', node = 6 }, { kind = 'mh4', serial = 4 }]");
