@@ -277,7 +277,12 @@ impl Change<'_, '_, '_> {
         let (mut deaf, mut waited) = (DEAF, false);
         let last = loop {
             match self.put_back(&trouble) {
-                Ok(Left::New) => return Ok(()),
+                Ok(Left::New) => {
+                    if matches!(trouble, Trouble::Restarted) {
+                        self.warnings.push(format!("node {} restarted in the middle", self.device.node));
+                    }
+                    return Ok(());
+                }
                 Ok(Left::Old) => {
                     let said = self.put_state_back().map(|said| format!("; {said}")).unwrap_or_default();
                     let end = format!("{} has its old mapping and parameters{said}", self.old.number);
