@@ -85,11 +85,10 @@ impl Settings {
 fn optional(result: Result<u32, Trouble>) -> Result<Option<u16>, Trouble> {
     match result {
         Ok(number) => Ok(u16::try_from(number).ok()),
-        Err(Trouble::Refused(SdoError { failure: SdoFailure::Refused(code), .. }))
-            if matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUB_INDEX) =>
-        {
-            Ok(None)
-        }
+        Err(Trouble::Refused(SdoError {
+            failure: SdoFailure::Refused(AbortCode::NO_OBJECT | AbortCode::NO_SUB_INDEX),
+            ..
+        })) => Ok(None),
         Err(trouble) => Err(trouble),
     }
 }
