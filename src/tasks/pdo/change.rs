@@ -146,9 +146,7 @@ impl Change<'_, '_, '_> {
         let last = loop {
             match self.put_back(&trouble) {
                 Ok(Left::New) => {
-                    if matches!(trouble, Trouble::Restarted) {
-                        self.warnings.push(format!("node {} restarted in the middle", self.device.node));
-                    }
+                    self.warnings.extend(self.in_spite_of(&trouble));
                     return Ok(());
                 }
                 Ok(Left::Old) => {
@@ -175,8 +173,7 @@ impl Change<'_, '_, '_> {
         self.device.clear_the_air()?;
         let (old, wanted) = (self.old.clone(), self.wanted.clone());
         let now = Settings::read(&mut self.device, old.number, old.inhibit_100us.is_some())?;
-        let may_stand = !matches!(trouble, Trouble::Refused(_) | Trouble::NotKept(..));
-        if may_stand && now.difference(&wanted).is_none() {
+        if now.difference(&wanted).is_none() {
             return Ok(Left::New);
         }
         let restarted = matches!(trouble, Trouble::Restarted);

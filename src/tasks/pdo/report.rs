@@ -32,6 +32,14 @@ impl Change<'_, '_, '_> {
         }
     }
 
+    /// What is to be said of a change that is there in spite of some trouble. An answer that was lost, and Ctrl-C
+    /// when all was done, are none.
+    pub(super) fn in_spite_of(&self, trouble: &Trouble) -> Option<String> {
+        let told = matches!(trouble, Trouble::Refused(_) | Trouble::Restarted | Trouble::NotKept(..));
+        let what = Self::what(trouble, self.failed_at.as_ref());
+        told.then(|| format!("node {}: {what}; yet {} is as wanted", self.device.node, self.old.number))
+    }
+
     /// The failure of the change, with how it ended.
     pub(super) fn failure(&self, trouble: &Trouble, end: &str) -> Failure {
         let node = self.device.node;
