@@ -15,7 +15,7 @@ const ONLY: &[(&str, &str, &[&str])] = &[
     ("output", "bus", STAMPS),
     ("output", "canopen", &["id", "value"]),
     ("sim", "canopen", &["frame", "id", "object", "value", "wire_length"]),
-    ("cli", "canopen", &["emcy", "id", "nmt", "object", "value"]),
+    ("cli", "canopen", &["emcy", "id", "nmt", "object", "pdo", "value"]),
 ];
 
 /// The trait and what it speaks of; no transport.
