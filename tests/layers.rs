@@ -20,7 +20,7 @@ const ONLY: &[(&str, &str, &[&str])] = &[
 
 /// The trait and what it speaks of; no transport.
 const THE_TRAIT: &[&str] =
-    &["Bus", "BusError", "Event", "Fault", "Filters", "Mono", "Received", "Stamp", "TimestampSource", "time"];
+    &["Bus", "BusError", "Event", "Fault", "Filters", "Mode", "Mono", "Received", "Stamp", "TimestampSource", "time"];
 
 /// Moments, and a frame with the moment it was received.
 const STAMPS: &[&str] = &["Mono", "Received", "Stamp", "time"];

@@ -14,9 +14,14 @@
 //! Block transfers have long runs of segments. `fill=LENGTH` names bytes 0, 1, … 250, 0, 1, …, `zeros=LENGTH`
 //! zeros. `segments 605 1-127 at 889` stands for the frames with these sequence numbers that carry the fill
 //! from byte 889 on; with `last` at the end, the last of them says so. As a value, `fill` is just these bytes.
+//!
+//! LSS collects answers until the time is over, which `=` says; `! ask again` is the repetition, `sent` the result
+//! of what nobody answers. Of a fastscan, every `<` and every `!` ends a step.
 
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
+use cangauge::canopen::lss::{self, Answer, Exchange, ExchangeError, Fastscan, Part, Request};
+use cangauge::canopen::nmt::NmtCommand;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::{
     BlockDownload, BlockSize, BlockUpload, Download, DownloadSize, Progress, TransferError, Upload, Uploaded, fit,
@@ -29,6 +34,9 @@ enum Machine {
     Download(Download),
     BlockUpload(BlockUpload, Option<DataType>),
     BlockDownload(BlockDownload),
+    Nmt,
+    Lss(Exchange),
+    Fastscan(Fastscan),
 }
 
 struct Case {
@@ -43,6 +51,9 @@ impl Case {
         let mut words = line.split_whitespace();
         let kind = words.next().expect("a kind");
         let keys: HashMap<&str, &str> = words.filter_map(|word| word.split_once('=')).collect();
+        if let Some(case) = Case::start_lss(kind, &keys) {
+            return case;
+        }
         let node: NodeId = keys["node"].parse().expect("a node-ID");
         let object: ObjectId = keys["object"].parse().expect("an object");
         let data_type: Option<DataType> = keys.get("type").map(|name| name.parse().expect("a type"));
@@ -87,6 +98,81 @@ impl Case {
             other => panic!("no such case: {other}"),
         };
         Case { machine, fill, sent: VecDeque::from([request]), outcome: None }
+    }
+
+    /// Cases that are no SDO transfers.
+    fn start_lss(kind: &str, keys: &HashMap<&str, &str>) -> Option<Case> {
+        let number = |key: &str| keys[key].parse().expect("a number");
+        let request = match kind {
+            "nmt" => {
+                let command = match keys["command"] {
+                    "preop" => NmtCommand::EnterPreOperational,
+                    "reset" => NmtCommand::ResetNode,
+                    other => panic!("no such command: {other}"),
+                };
+                let sent = VecDeque::from([command.frame(Some(keys["node"].parse().expect("a node-ID")))]);
+                return Some(Case { machine: Machine::Nmt, fill: Vec::new(), sent, outcome: None });
+            }
+            "lss-fastscan" => {
+                let scan = Fastscan::new(1);
+                let sent = VecDeque::from([scan.step().request.frame()]);
+                return Some(Case { machine: Machine::Fastscan(scan), fill: Vec::new(), sent, outcome: None });
+            }
+            "lss-select" => return Some(Case::of(Exchange::select(&keys["address"].parse().expect("an address")))),
+            "lss-identify" => return Some(Case::of(Exchange::identify(&keys["range"].parse().expect("a range")))),
+            "lss-switch" if keys["to"] == "configuration" => Request::SwitchGlobal(lss::Mode::Configuration),
+            "lss-switch" => Request::SwitchGlobal(lss::Mode::Waiting),
+            "lss-node" => Request::ConfigureNodeId(keys["id"].parse().ok()),
+            "lss-bit-timing" => {
+                let [table, index] = [number("table"), number("index")];
+                Request::ConfigureBitTiming { table, index }
+            }
+            "lss-activate" => Request::ActivateBitTiming { delay_ms: keys["ms"].parse().expect("a number") },
+            "lss-store" => Request::Store,
+            "lss-inquire" => match keys["what"] {
+                "node" => Request::InquireNodeId,
+                part => Request::Inquire(Part::from_number(part.parse().expect("a number")).expect("a part")),
+            },
+            "lss-unconfigured" => Request::IdentifyUnconfigured,
+            _ => return None,
+        };
+        Some(Case::of(Exchange::new(request)))
+    }
+
+    fn of(mut exchange: Exchange) -> Case {
+        let sent = exchange.ask().into();
+        Case { machine: Machine::Lss(exchange), fill: Vec::new(), sent, outcome: None }
+    }
+
+    fn outcome(&self) -> Option<String> {
+        match &self.machine {
+            Machine::Nmt => Some("sent".to_owned()),
+            Machine::Lss(exchange) if !exchange.is_answered() => Some("sent".to_owned()),
+            Machine::Lss(exchange) => Some(match exchange.one() {
+                Ok(Answer::Acknowledge(_) | Answer::Selected | Answer::Here) => "done".to_owned(),
+                Ok(Answer::Number(number)) => number.to_string(),
+                Ok(Answer::NodeId(node)) => node.map_or("none".to_owned(), |node| node.to_string()),
+                Err(ExchangeError::NoAnswer) => "no answer".to_owned(),
+                Err(ExchangeError::Several(frames)) => format!("several: {frames:?}"),
+                Err(ExchangeError::Refused(code)) => format!("refused: {}", code.spoken(exchange.service())),
+                Err(ExchangeError::Violation(violation, frame)) => format!("violation: {violation}: {frame}"),
+            }),
+            _ => self.outcome.clone(),
+        }
+    }
+
+    /// The end of a step of a fastscan.
+    fn end_step(&mut self, answers: usize) {
+        let Machine::Fastscan(scan) = &mut self.machine else { return };
+        self.outcome = match scan.on_end(answers) {
+            lss::Progress::Continue => {
+                self.sent.push_back(scan.step().request.frame());
+                None
+            }
+            lss::Progress::Found(address) => Some(address.to_string()),
+            lss::Progress::Nobody => Some("nobody".to_owned()),
+            lss::Progress::Failed(error) => Some(error.to_string()),
+        };
     }
 
     /// The frames of one line.
@@ -135,6 +221,15 @@ impl Case {
                 Progress::Done(()) => Some("done".to_owned()),
                 other => outcome(other),
             },
+            Machine::Nmt => None,
+            Machine::Lss(exchange) => {
+                exchange.on_frame(frame);
+                None
+            }
+            Machine::Fastscan(_) => {
+                assert!(Fastscan::is_answer(frame), "an answer to a step");
+                return self.end_step(1);
+            }
         };
         self.sent.extend(out);
         self.outcome = progress;
@@ -147,6 +242,12 @@ impl Case {
             Machine::Download(download) => Some(download.on_timeout(&mut out)),
             Machine::BlockUpload(upload, _) => upload.on_timeout(&mut out),
             Machine::BlockDownload(download) => Some(download.on_timeout(&mut out)),
+            Machine::Nmt => None,
+            Machine::Lss(exchange) => {
+                out.extend(exchange.ask());
+                None
+            }
+            Machine::Fastscan(_) => return self.end_step(0),
         };
         self.sent.extend(out);
         self.outcome = error.map(failure);
@@ -222,7 +323,7 @@ fn transcripts() {
                 "!" => case.as_mut().expect("a case").time_out(),
                 "=" => {
                     let case = case.take().expect("a case");
-                    assert_eq!(case.outcome.as_deref(), Some(rest), "{place}: outcome");
+                    assert_eq!(case.outcome().as_deref(), Some(rest), "{place}: outcome");
                     assert_eq!(case.sent, [], "{place}: and nothing else was sent");
                     cases += 1;
                 }

@@ -77,12 +77,20 @@ impl<B: Bus> Bus for Faulty<B> {
         self.bus.timestamps()
     }
 
+    fn is_live(&self) -> bool {
+        self.bus.is_live()
+    }
+
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
         self.bus.can_set_bit_rate()
     }
 
     fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
         self.bus.set_bit_rate(bit_rate, mode)
+    }
+
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        self.bus.put_back_bit_rate()
     }
 
     fn now(&self) -> Stamp {

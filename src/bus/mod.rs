@@ -6,6 +6,7 @@ pub mod interrupt;
 pub mod memory;
 #[cfg(unix)]
 mod poll;
+pub mod replay;
 #[cfg(test)]
 mod script;
 #[cfg(target_os = "linux")]
@@ -30,6 +31,11 @@ pub trait Bus {
 
     /// Where the wall time of received frames comes from.
     fn timestamps(&self) -> TimestampSource;
+
+    /// Whether there is somebody on it now. A recording only receives, and it comes to an end.
+    fn is_live(&self) -> bool {
+        true
+    }
 
     /// The present moment.
     fn now(&self) -> Stamp;
@@ -59,12 +65,21 @@ pub trait Bus {
     }
 
     /// Takes this side of the bus to another bit rate in bit/s: the interface goes down and comes up at the new
-    /// one. Frames that wait to be sent are lost.
+    /// one. Frames that wait to be sent, and received ones that nobody has asked for yet, are lost.
     ///
     /// # Errors
-    /// What the interface says; it may then be down.
+    /// What the interface says; where it says no it is left as it was, as far as it can be put back.
     fn set_bit_rate(&mut self, _bit_rate: u32, _mode: Mode) -> Result<(), BusError> {
         self.can_set_bit_rate()
+    }
+
+    /// Puts the interface back as it was before the first [`Bus::set_bit_rate`]: bit rate, mode, switched off
+    /// where it was. Nothing where none was set.
+    ///
+    /// # Errors
+    /// What the interface says; it is then as the error tells.
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        Ok(())
     }
 
     /// Writes out what is still buffered (a trace). To be called when the work is done: dropping a
@@ -85,6 +100,10 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 
     fn timestamps(&self) -> TimestampSource {
         (**self).timestamps()
+    }
+
+    fn is_live(&self) -> bool {
+        (**self).is_live()
     }
 
     fn now(&self) -> Stamp {
@@ -115,6 +134,10 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
         (**self).set_bit_rate(bit_rate, mode)
     }
 
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        (**self).put_back_bit_rate()
+    }
+
     fn finish(&mut self) -> Result<(), BusError> {
         (**self).finish()
     }
@@ -143,6 +166,8 @@ pub enum Event {
     Link(bool),
     /// The deadline was reached.
     Timeout,
+    /// The recording is over. Reported once; from then on time passes and nothing comes.
+    Ended,
     /// The user asked to stop (Ctrl-C, SIGTERM). Reported once a signal: what comes after it is
     /// tidying up, which may use the bus again.
     Interrupted,
@@ -213,6 +238,8 @@ pub enum TimestampSource {
     Program,
     /// The clock of the simulated bus.
     Simulated,
+    /// Whatever recorded it.
+    Recorded,
 }
 
 impl fmt::Display for TimestampSource {
@@ -222,6 +249,7 @@ impl fmt::Display for TimestampSource {
             TimestampSource::Kernel => "kernel",
             TimestampSource::Program => "program",
             TimestampSource::Simulated => "simulated",
+            TimestampSource::Recorded => "recorded",
         })
     }
 }
@@ -266,9 +294,27 @@ pub enum BusError {
     /// This bus only receives.
     #[error("{0} is receive only")]
     ReceiveOnly(String),
+    /// The interface cannot do that bit rate; it is as it was.
+    #[error("{name} cannot do {bit_rate} bit/s: {why}")]
+    BitRate {
+        /// The interface.
+        name: String,
+        /// The bit rate asked for.
+        bit_rate: u32,
+        /// What the driver says.
+        why: String,
+    },
     /// This system or this build has no such bus.
     #[error("{0}")]
     Unsupported(String),
+    /// A local file fails: a trace, a recording.
+    #[error("{what}: {source}")]
+    File {
+        /// What was being done.
+        what: String,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
     /// Anything else, with what was being done.
     #[error("{what}: {source}")]
     Io {

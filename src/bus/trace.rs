@@ -50,7 +50,7 @@ impl<B: Bus> Traced<B> {
 
     fn check(&mut self, written: io::Result<()>) {
         if let Err(source) = written {
-            self.failed = Some(BusError::Io { what: format!("write trace {}", self.file), source });
+            self.failed = Some(BusError::File { what: format!("write trace {}", self.file), source });
             // Dropping the writer would try to write the rest once more.
             if let Some(out) = self.out.take() {
                 let _ = out.into_parts();
@@ -78,12 +78,20 @@ impl<B: Bus> Bus for Traced<B> {
         self.bus.timestamps()
     }
 
+    fn is_live(&self) -> bool {
+        self.bus.is_live()
+    }
+
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
         self.bus.can_set_bit_rate()
     }
 
     fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
         self.bus.set_bit_rate(bit_rate, mode)
+    }
+
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        self.bus.put_back_bit_rate()
     }
 
     fn now(&self) -> Stamp {

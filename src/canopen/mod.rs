@@ -5,6 +5,7 @@
 pub mod emcy;
 pub mod frame;
 pub mod id;
+pub mod lss;
 pub mod nmt;
 pub mod object;
 pub mod pdo;

@@ -24,6 +24,30 @@ impl FromStr for Duration {
     }
 }
 
+/// A bit rate in bit/s: `250k`, `1M`, `125000`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rate(pub u32);
+
+/// The bit rates of classic CAN, in bit/s.
+const RATES: std::ops::RangeInclusive<u32> = 1_000..=1_000_000;
+
+impl FromStr for Rate {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Rate, String> {
+        let (number, factor) = match text.strip_suffix(['k', 'K']) {
+            Some(number) => (number, 1_000),
+            None => text.strip_suffix('M').map_or((text, 1), |number| (number, 1_000_000)),
+        };
+        let digits = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+        let rate = number.parse::<u32>().ok().filter(|_| digits).and_then(|number| number.checked_mul(factor));
+        match rate.filter(|rate| RATES.contains(rate)) {
+            Some(rate) => Ok(Rate(rate)),
+            None => Err(format!("\"{text}\" is not a bit rate of CAN (250k, 1M, 125000)")),
+        }
+    }
+}
+
 /// Which nodes: `5`, `0x7f`, `1-16`, `1,5,0x10-0x1f`, `all`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Nodes {
@@ -130,6 +154,8 @@ pub enum BusSpec {
     SocketCan(String),
     /// The simulated bus: what stands behind `sim:`, or nothing.
     Sim(Option<String>),
+    /// A candump log.
+    Replay(String),
 }
 
 impl FromStr for BusSpec {
@@ -140,10 +166,26 @@ impl FromStr for BusSpec {
             None if text == "sim" => Ok(BusSpec::Sim(None)),
             Some(("sim", rest)) => Ok(BusSpec::Sim(Some(rest.to_owned()))),
             Some(("socketcan", name)) => interface(name),
+            Some(("replay", file)) if !file.is_empty() => Ok(BusSpec::Replay(file.to_owned())),
             None => interface(text),
-            Some(_) => {
-                Err(format!("\"{text}\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml)"))
-            }
+            Some(_) => Err(format!(
+                "\"{text}\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE)"
+            )),
+        }
+    }
+}
+
+/// The name of an interface: `can0`, `socketcan:can0`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InterfaceName(pub String);
+
+impl FromStr for InterfaceName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<InterfaceName, String> {
+        match text.parse()? {
+            BusSpec::SocketCan(name) => Ok(InterfaceName(name)),
+            BusSpec::Sim(_) | BusSpec::Replay(_) => Err(format!("\"{text}\" is no interface of this machine (can0)")),
         }
     }
 }
@@ -219,12 +261,24 @@ mod tests {
     }
 
     #[test]
+    fn bit_rates() {
+        let rate = |text: &str| text.parse::<Rate>().ok().map(|rate| rate.0);
+        assert_eq!(rate("250k"), Some(250_000));
+        assert_eq!(rate("1M"), Some(1_000_000));
+        assert_eq!(rate("125000"), Some(125_000));
+        for wrong in ["", "k", "0", "0k", "2M", "1m", "250", "+250k", "-1", "250 k", "83.3k", "5000000k", "auto"] {
+            assert_eq!(rate(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
     fn buses() {
         assert_eq!("can0".parse(), Ok(BusSpec::SocketCan("can0".into())));
         assert_eq!("socketcan:vcan1".parse(), Ok(BusSpec::SocketCan("vcan1".into())));
         assert_eq!("sim".parse(), Ok(BusSpec::Sim(None)));
         assert_eq!("sim:mh4@5,dps@127".parse(), Ok(BusSpec::Sim(Some("mh4@5,dps@127".into()))));
-        for wrong in ["", "foo:bar", "a/b", "a-name-that-is-too-long"] {
+        assert_eq!("replay:a:b.log".parse(), Ok(BusSpec::Replay("a:b.log".into())));
+        for wrong in ["", "foo:bar", "replay:", "a/b", "a-name-that-is-too-long"] {
             assert!(wrong.parse::<BusSpec>().is_err(), "{wrong}");
         }
     }

@@ -3,11 +3,19 @@
 
 pub mod args;
 mod autozero;
+mod bus;
+mod check;
 mod completions;
 mod each;
+mod errors;
 pub mod exit;
 mod file;
+mod filter;
+mod info;
+mod limits;
 mod log;
+mod lss;
+mod minmax;
 mod nmt;
 mod open;
 pub mod parse;
@@ -17,6 +25,7 @@ mod scan;
 mod sdo;
 mod sim;
 mod store;
+mod unit;
 
 use crate::master::{Master, Timing};
 use crate::output::console::Console;
@@ -33,8 +42,11 @@ Examples, on the simulated bus; leave `-b sim` out where one CAN interface is up
   cangauge -b sim read 1                                 its measured values now
   cangauge -b sim log 1 --sync 100ms --count 20          its measurements as CSV
   cangauge -b sim log 1-3,127 --sync 10ms --duration 1h -o run.csv
+  cangauge -b sim info 1                                 all of one device on one page
+  cangauge -b sim unit 127 bar                           its unit, and what that rescales
   cangauge -b sim sdo read 1 0x1018:1                    one object, bare
   cangauge -b sim nmt reset 1                            restart it, wait for the boot-up
+  cangauge -b sim lss set-id 127 12                      give it a node-ID, and see it come back
 
 Exit codes:
   0  done                                    5  the bus fails: interface missing, down, bus-off
@@ -59,8 +71,8 @@ pub struct Cli {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
-    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml. Not given: the only CAN
-    /// interface that is up
+    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a
+    /// candump -L log; receives only). Not given: the only CAN interface that is up
     #[arg(short, long, global = true, env = "CANGAUGE_BUS", value_name = "BUS")]
     pub(crate) bus: Option<BusSpec>,
 
@@ -137,6 +149,24 @@ pub(crate) enum Command {
     Sdo(sdo::Sdo),
     /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data
+    Check(check::Check),
+    /// Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device's own)
+    Lss(lss::LssCommand),
+    /// Tell everything about one device on one page
+    Info(info::Info),
+    /// Tell or set the physical unit of a signal (6131h)
+    Unit(unit::Unit),
+    /// Tell or set the filter of a signal: type (61A0h) and constant (61A1h)
+    Filter(filter::Filter),
+    /// Tell or set what makes a TPDO of a signal go out by itself: delta, limits, hysteresis (x133h to x136h)
+    Limits(limits::Limits),
+    /// Tell the lowest and highest value that the device has measured, or reset them
+    Minmax(minmax::Minmax),
+    /// Tell the errors of a device: register (1001h) and history (1003h) in words, or clear the history
+    Errors(errors::Errors),
+    /// List CAN interfaces, switch them on and off, find the bit rate of a bus
+    Bus(bus::BusCommand),
     /// Show, change and watch what the nodes' transmit PDOs carry
     Pdo(pdo::Pdo),
     /// Make the present reading of a channel zero (6125h), with checks before and after
@@ -209,6 +239,15 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Check(command) => command.run(&cli.global),
+        Command::Lss(command) => command.run(&cli.global),
+        Command::Info(command) => command.run(&cli.global),
+        Command::Unit(command) => command.run(&cli.global),
+        Command::Filter(command) => command.run(&cli.global),
+        Command::Limits(command) => command.run(&cli.global),
+        Command::Minmax(command) => command.run(&cli.global),
+        Command::Errors(command) => command.run(&cli.global),
+        Command::Bus(command) => command.run(&cli.global),
         Command::Pdo(command) => command.run(&cli.global),
         Command::Autozero(command) => command.run(&cli.global),
         Command::Store(command) => command.run(&cli.global),

@@ -7,6 +7,7 @@ use super::read::everybody;
 use crate::bus::Bus;
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
+use crate::bus::replay::Replay;
 use crate::bus::trace::Traced;
 use crate::canopen::id::NodeId;
 use crate::device::catalog::{self, Model};
@@ -26,6 +27,11 @@ pub(super) fn open(global: &Global) -> anyhow::Result<Box<dyn Bus>> {
         Some(spec) => spec.clone(),
         None => only_interface()?,
     };
+    open_as(global, &spec, false)
+}
+
+/// Opens this bus, whatever the options name; an interface that is down too, where that is wanted.
+pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyhow::Result<Box<dyn Bus>> {
     // Before the bus: a trace that cannot be written is found before anything is sent.
     let trace: Option<(Box<dyn Write>, String)> = match &global.trace {
         None => None,
@@ -37,9 +43,12 @@ pub(super) fn open(global: &Global) -> anyhow::Result<Box<dyn Bus>> {
             Some((Box::new(file), name))
         }
     };
-    let bus: Box<dyn Bus> = match &spec {
+    let bus: Box<dyn Bus> = match spec {
         BusSpec::Sim(bench) => Box::new(simulated(bench.as_deref())?),
-        BusSpec::SocketCan(name) => socketcan(name)?,
+        BusSpec::Replay(file) => {
+            Box::new(Replay::open(file).map_err(|source| FileError { what: format!("replay {file}"), source })?)
+        }
+        BusSpec::SocketCan(name) => socketcan(name, even_down)?,
     };
     Ok(match trace {
         Some((out, name)) => Box::new(Traced::new(bus, out, &name)),
@@ -66,12 +75,14 @@ pub(super) fn bench_error(error: BenchError) -> anyhow::Error {
 }
 
 #[cfg(target_os = "linux")]
-fn socketcan(name: &str) -> Result<Box<dyn Bus>, Failure> {
-    Ok(Box::new(crate::bus::socketcan::SocketCan::open(name).or_fail()?))
+fn socketcan(name: &str, even_down: bool) -> Result<Box<dyn Bus>, Failure> {
+    use crate::bus::socketcan::SocketCan;
+    let open = if even_down { SocketCan::open_even_down } else { SocketCan::open };
+    Ok(Box::new(open(name).or_fail()?))
 }
 
 #[cfg(not(target_os = "linux"))]
-fn socketcan(name: &str) -> Result<Box<dyn Bus>, Failure> {
+fn socketcan(name: &str, _: bool) -> Result<Box<dyn Bus>, Failure> {
     let error = crate::bus::BusError::Unsupported(format!("{name}: this system has no SocketCAN"));
     Err(error).or_fail()
 }

@@ -33,7 +33,7 @@ pub(crate) struct Read {
     unit: Option<Unit>,
 }
 
-fn parse_unit(text: &str) -> Result<Unit, String> {
+pub(super) fn parse_unit(text: &str) -> Result<Unit, String> {
     Unit::from_symbol(text)
         .ok_or_else(|| format!("\"{text}\" is not a known unit (bar, mbar, kPa, MPa, psi, degC, degF, K, 0x4E0000)"))
 }

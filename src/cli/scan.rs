@@ -42,7 +42,9 @@ impl Scan {
         let (found, took) = global.with_master(|master| {
             let begun = master.now();
             let found = if self.passive {
-                listen(master, &nodes, global.timeout.map_or(LISTEN, |timeout| timeout.0)).or_fail()?
+                // A recording is listened to as a whole.
+                let long = if master.bus().is_live() { LISTEN } else { Duration::MAX };
+                listen(master, &nodes, global.timeout.map_or(long, |timeout| timeout.0)).or_fail()?
             } else {
                 let wait = global.timing(WAIT).timeout;
                 let rounds = 1 + global.timing(WAIT).retries;

@@ -79,7 +79,8 @@ impl Model {
             wanted.is_none() || wanted == found
         }
         let wanted = &self.description.identify;
-        agrees(&wanted.device_type, &traits.device_type)
+        !wanted.is_empty()
+            && agrees(&wanted.device_type, &traits.device_type)
             && agrees(&wanted.vendor_id, &traits.vendor_id)
             && agrees(&wanted.product_code, &traits.product_code)
             && agrees(&wanted.device_name, &traits.device_name)
@@ -113,7 +114,7 @@ macro_rules! built_in {
 pub fn built_in() -> &'static [Arc<Model>] {
     static MODELS: OnceLock<Vec<Arc<Model>>> = OnceLock::new();
     MODELS.get_or_init(|| {
-        built_in!("mh4", "d20", "dps", "mc1609")
+        built_in!("mh4", "d20", "dps", "mc1609", "hydac-old", "baumer", "hydac", "jumo")
             .into_iter()
             .filter_map(|(_, text)| Model::from_toml(text).ok().map(Arc::new))
             .collect()
@@ -123,6 +124,16 @@ pub fn built_in() -> &'static [Arc<Model>] {
 /// The built-in description of a name.
 pub fn by_name(name: &str) -> Option<Arc<Model>> {
     built_in().iter().find(|model| model.description.name == name).cloned()
+}
+
+/// The built-in description of a device of which only vendor-ID and product code are known: one that asks for both.
+pub fn by_identity(vendor: u32, product: u32) -> Option<Arc<Model>> {
+    let wanted = (Some(vendor), Some(product));
+    let fits = |model: &&Arc<Model>| {
+        let identify = &model.description.identify;
+        (identify.vendor_id, identify.product_code) == wanted
+    };
+    built_in().iter().find(fits).cloned()
 }
 
 /// What has still to be read to tell which description a device's answers fit: empty when one fits,
@@ -194,11 +205,11 @@ mod tests {
 
     #[test]
     fn every_built_in_description_loads() {
-        for (name, text) in built_in!("mh4", "d20", "dps", "mc1609") {
+        for (name, text) in built_in!("mh4", "d20", "dps", "mc1609", "hydac-old", "baumer", "hydac", "jumo") {
             let model = Model::from_toml(text).unwrap_or_else(|error| panic!("{name}: {error}"));
             assert_eq!(model.description.name, name);
         }
-        assert_eq!(built_in().len(), 4);
+        assert_eq!(built_in().len(), 8);
     }
 
     #[test]
@@ -324,8 +335,13 @@ mod tests {
     fn each_device_is_recognised_by_its_own_answers() {
         for model in built_in() {
             let mut traits = traits_of(model);
+            if model.description.identify.is_empty() {
+                assert_eq!(recognise(&traits).map(|found| found.description.name.clone()), None);
+                continue;
+            }
             for object in to_ask(&traits) {
-                let entry = model.dictionary.get(object).expect("only its own objects are asked for");
+                // What another description would like to know it refuses.
+                let Some(entry) = model.dictionary.get(object) else { continue };
                 let mut bytes = entry.default_bytes(node()).expect("a default");
                 bytes.resize(4, 0xff);
                 traits.answers.insert(object, bytes);
@@ -341,15 +357,18 @@ mod tests {
     #[test]
     fn another_device_of_the_same_profile_is_not_recognised() {
         // 0x00020194 is the device type of many: the rest decides.
-        let mut traits = Traits { device_type: Some(0x0002_0194), vendor_id: Some(0xda), ..Traits::default() };
+        let mut traits = Traits { device_type: Some(0x0002_0194), vendor_id: Some(0x99), ..Traits::default() };
         assert_eq!(recognise(&traits).map(|model| model.description.name.clone()), None);
         let asked = to_ask(&traits);
-        assert_eq!(asked, [ObjectId::new(0x7121, 16), ObjectId::new(0x7122, 16), ObjectId::new(0x7123, 16)]);
+        let scaling = [0x7121, 0x7122, 0x7123].map(|index| ObjectId::new(index, 16));
+        let fixed_mapping = [0x1a00, 0x1a04].map(|index| ObjectId::new(index, 1));
+        assert_eq!(asked, [&fixed_mapping[..], &scaling[..]].concat());
         // It has a 7122h and no 7121h; an empty answer is no answer.
-        traits.answers.insert(asked[1], vec![0xff, 0xff]);
-        traits.answers.insert(asked[0], Vec::new());
+        traits.answers.insert(scaling[1], vec![0xff, 0xff]);
+        traits.answers.insert(scaling[0], Vec::new());
+        traits.answers.insert(fixed_mapping[0], vec![0x20, 0x01, 0x30, 0x61]);
         assert_eq!(recognise(&traits).map(|model| model.description.name.clone()), None);
-        assert_eq!(to_ask(&traits), [asked[2]]);
+        assert_eq!(to_ask(&traits), [fixed_mapping[1], scaling[2]]);
         // A silent device is asked nothing.
         assert_eq!(to_ask(&Traits::default()), []);
         assert_eq!(recognise(&Traits::default()).map(|model| model.description.name.clone()), None);

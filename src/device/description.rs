@@ -2,6 +2,7 @@
 //!
 //! Unknown keys are errors, so that a typing error in a description is never silently ignored.
 
+use super::assign::AssignEntry;
 use crate::canopen::id::{NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
@@ -34,11 +35,17 @@ pub struct Description {
     /// Deviations from the standard that code has to know about.
     #[serde(default)]
     pub quirks: Vec<super::quirk::Quirk>,
+    /// How an entry of its error history (1003h) is laid out.
+    #[serde(default)]
+    pub error_history: ErrorHistory,
     /// Index of the LSS bit rate table to bit rate in bit/s.
     #[serde(default)]
     pub bit_rates: BTreeMap<String, u32>,
     /// Index that stands for automatic bit rate detection, if the device has one.
     pub auto_bit_rate: Option<u8>,
+    /// The ways to a new node-ID and bit rate, the one to take first.
+    #[serde(default)]
+    pub assign: Vec<AssignEntry>,
     /// Which object decides who starts it after power on.
     pub startup: Option<Startup>,
     /// How its channels are set to zero; none that are not named.
@@ -68,6 +75,34 @@ pub struct Startup {
     pub wait: u32,
     /// The device starts itself.
     pub auto: u32,
+    /// What the manual contradicts or leaves open.
+    #[serde(default)]
+    pub doubt: String,
+}
+
+/// How an entry of the error history (1003h:1 …) holds an emergency.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ErrorHistory {
+    /// CiA 301, 7.5.2.5: the code in bits 0 to 15; what the upper half says is the manufacturer's secret.
+    #[default]
+    CodeLow,
+    /// The code in bits 0 to 15, byte 4 of the emergency in 16 to 23 and byte 3 in 24 to 31 (MH-4).
+    CodeLowBytesSwapped,
+    /// The code in bits 16 to 31 (HYDAC).
+    CodeHigh,
+}
+
+impl ErrorHistory {
+    /// The emergency code of an entry, and bytes 3 and 4 of the emergency where the entry holds them.
+    pub fn read(self, entry: u32) -> (u16, Option<[u8; 2]>) {
+        let [a, b, c, d] = entry.to_le_bytes();
+        match self {
+            ErrorHistory::CodeLow => (u16::from_le_bytes([a, b]), None),
+            ErrorHistory::CodeLowBytesSwapped => (u16::from_le_bytes([a, b]), Some([d, c])),
+            ErrorHistory::CodeHigh => (u16::from_le_bytes([c, d]), None),
+        }
+    }
 }
 
 /// How a channel is set to zero.
@@ -115,7 +150,8 @@ fn zero() -> String {
     "zero".to_owned()
 }
 
-/// What a device answers that tells its kind; everything given must agree.
+/// What a device answers that tells its kind; everything given must agree. Where nothing is given nothing is
+/// recognised: such a description is taken only when it is named.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identify {
@@ -130,6 +166,15 @@ pub struct Identify {
     /// Objects to read where all of the above is not proof enough, and what they must hold.
     #[serde(default)]
     pub confirm: BTreeMap<ObjectId, Scalar>,
+}
+
+impl Identify {
+    /// Whether nothing is given: then nothing is recognised.
+    pub fn is_empty(&self) -> bool {
+        let Identify { device_type, vendor_id, product_code, device_name, confirm } = self;
+        let numbers = [device_type, vendor_id, product_code];
+        numbers.iter().all(|number| number.is_none()) && device_name.is_none() && confirm.is_empty()
+    }
 }
 
 /// The settings of a new device.
@@ -155,6 +200,9 @@ pub struct SdoStyle {
     /// Whether it knows block transfer.
     #[serde(default)]
     pub block: bool,
+    /// The abort codes that its manual lists; empty where none are printed.
+    #[serde(default)]
+    pub aborts: Vec<u32>,
 }
 
 /// Whether the command specifier of an expedited transfer tells the size.
@@ -256,6 +304,8 @@ pub struct ObjectEntry {
     pub unit: Option<String>,
     /// The channel whose physical unit (6131h) its number is in, for objects of which CiA 404 does not say so.
     pub follows_unit: Option<u8>,
+    /// The object that holds the code of its unit (as 6131h), where that is not the channel's present one.
+    pub unit_at: Option<ObjectId>,
     /// Which store group keeps it: `comm`, `app`, `all`; absent when 1010h does not.
     pub stored: Option<String>,
     /// What it is and does, in one or two sentences.
@@ -267,6 +317,18 @@ pub struct ObjectEntry {
     /// What the manual contradicts or leaves open.
     #[serde(default)]
     pub doubt: String,
+}
+
+impl Description {
+    /// The entry that describes `object`, be it of a run.
+    pub fn object(&self, object: ObjectId) -> Option<&ObjectEntry> {
+        self.objects.iter().find(|entry| entry.objects().is_ok_and(|mut objects| objects.any(|other| other == object)))
+    }
+
+    /// What an emergency code means on this device.
+    pub fn emergency(&self, code: u16) -> Option<&EmergencyEntry> {
+        self.emergencies.iter().find(|entry| entry.code == code)
+    }
 }
 
 impl ObjectEntry {
@@ -291,6 +353,12 @@ impl ObjectEntry {
     /// Whether the entry stands for a run of sub-indices, be it of one.
     pub fn is_run(&self) -> bool {
         self.at.split_once(':').is_some_and(|(_, subs)| subs.contains('-'))
+    }
+
+    /// What a number in this object means, where the description says.
+    pub fn meaning(&self, number: u64) -> Option<&str> {
+        let is = |key: &str| parse_u32(key).is_some_and(|key| u64::from(key) == number);
+        self.values.iter().find(|(key, _)| is(key)).map(|(_, meaning)| meaning.as_str())
     }
 
     /// Whether `number` lies within the limits and, where values are listed, is one of them.
@@ -385,9 +453,39 @@ pub struct SimEntry {
     pub overload_percent: f64,
     /// The emergency of an overload, if it raises one.
     pub overload_emcy: Option<u16>,
+    /// What its LSS slave knows.
+    #[serde(default)]
+    pub lss: SimLss,
     /// The measured quantities, one per signal.
     #[serde(default, rename = "channel")]
     pub channels: Vec<SimChannel>,
+}
+
+/// What the LSS slave of a simulated device knows.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimLss {
+    /// The services, by the command specifier of the request; all of CiA 305 if there are none.
+    #[serde(default)]
+    pub services: Vec<u8>,
+    /// The NMT states in which it listens to LSS; all if there are none.
+    #[serde(default)]
+    pub states: Vec<SimState>,
+    /// Whether the answer to the selective switch tells the mode (44h 01h) instead of nothing.
+    #[serde(default)]
+    pub tells_mode: bool,
+}
+
+/// An NMT state of a simulated device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SimState {
+    /// STOPPED.
+    Stopped,
+    /// PRE-OPERATIONAL.
+    PreOperational,
+    /// OPERATIONAL.
+    Operational,
 }
 
 /// How a simulated quantity moves: a slow sine with noise.
@@ -414,7 +512,7 @@ pub struct SimChannel {
     pub field: Option<[f64; 2]>,
 }
 
-fn from_text<'de, D, T>(deserializer: D) -> Result<T, D::Error>
+pub(super) fn from_text<'de, D, T>(deserializer: D) -> Result<T, D::Error>
 where
     D: serde::Deserializer<'de>,
     T: std::str::FromStr,

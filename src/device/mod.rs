@@ -1,9 +1,12 @@
 //! What is known of measuring devices: descriptions as data, units, and the objects of CiA 404.
 
+pub mod assign;
 pub mod catalog;
 pub mod description;
 pub mod dictionary;
 pub mod eds;
+pub mod nearest;
 pub mod quirk;
+pub mod sensor;
 pub mod standard;
 pub mod unit;

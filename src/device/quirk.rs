@@ -18,4 +18,14 @@ pub enum Quirk {
     /// Device: WIKA MH-4-CAN. Evidence: manual 14547342.01, object 1010h. Trigger: "save" written to
     /// 1010h:1.
     SaveAllResetsCobIds,
+    /// Writing 0 to a COB-ID (1014h, 180xh:1) puts back the default that follows the node-ID; any other
+    /// value stays where it is when the node-ID changes.
+    ///
+    /// Device: HYDAC. Evidence: protocol description VFL 4639928, 2021-10-25. Trigger: 0 written to a COB-ID.
+    CobIdZeroIsDefault,
+    /// An emergency is sent again and again while its error is pending, every 2002h milliseconds.
+    ///
+    /// Device: JUMO CANtrans. Evidence: operating instructions B 902910, 5.4. Trigger: an error that is
+    /// pending while `emcy-repeat-time` is not 0.
+    EmergencyRepeats,
 }

@@ -5,12 +5,14 @@
 //! and says what happened. Everything that blocks is built on it.
 
 mod company;
+pub mod lss;
 mod machine;
 mod request;
 mod sdo;
 mod send;
 pub mod transfer;
 
+pub use lss::{Lss, LssError};
 pub use request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, Way, read_object, write_object};
 
@@ -75,6 +77,8 @@ pub enum Happening {
     Link(bool),
     /// The moment waited for is there.
     Deadline,
+    /// The recording that is played again is over.
+    Ended,
     /// The user asked to stop.
     Interrupted,
 }
@@ -96,6 +100,18 @@ impl<'bus> Master<'bus> {
     pub fn new(bus: &'bus mut dyn Bus, timing: Timing) -> Master<'bus> {
         let outgoing = Outgoing::new();
         Master { bus, timing, sdo: SdoClient::default(), outgoing, put_back: None, seen: Mono::START }
+    }
+
+    /// Takes this side of the bus to another bit rate in bit/s. Transfers under way end, and what waits to be sent is
+    /// lost.
+    ///
+    /// # Errors
+    /// What the interface says; it may then be down.
+    pub fn set_bit_rate(&mut self, bit_rate: u32) -> Result<(), BusError> {
+        self.sdo.cancel(&mut Vec::new());
+        self.outgoing = Outgoing::new();
+        self.put_back = None;
+        self.bus.set_bit_rate(bit_rate, crate::bus::Mode::Normal)
     }
 
     /// The bus.
@@ -233,6 +249,7 @@ impl<'bus> Master<'bus> {
                 Event::Dropped(count) => return Ok(Happening::Dropped(count)),
                 Event::Link(up) => return Ok(Happening::Link(up)),
                 Event::Interrupted => return Ok(Happening::Interrupted),
+                Event::Ended => return Ok(Happening::Ended),
                 Event::Timeout => {
                     self.sdo.on_time(deadline, &self.timing, &mut self.outgoing);
                     if deadline >= until && !self.sdo.has_finished() {
@@ -299,7 +316,11 @@ impl<'bus> Master<'bus> {
                     self.cancel();
                     return Err(Error::Bus(BusError::Down(self.bus.name().to_owned())));
                 }
-                Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) | Happening::Deadline => {}
+                Happening::Fault(..)
+                | Happening::Dropped(_)
+                | Happening::Link(true)
+                | Happening::Ended
+                | Happening::Deadline => {}
             }
         }
         Ok(results.into_iter().flatten().collect())

@@ -55,6 +55,11 @@ impl Outgoing {
         self.rides_out = rides_out;
     }
 
+    /// Forgets a frame that is no part of an SDO transfer, if it still waits.
+    pub(super) fn take_back(&mut self, gone: &Frame) {
+        self.queue.retain(|(frame, ticket)| ticket.is_some() || frame != gone);
+    }
+
     /// Forgets the frames of SDO transfers.
     pub(super) fn drop_requests(&mut self) {
         self.queue.retain(|(_, ticket)| ticket.is_none());

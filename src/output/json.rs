@@ -3,6 +3,7 @@
 use crate::canopen::id::NodeId;
 use crate::measure::sample::{Number, Sample, Source, Status};
 use crate::tasks::autozero::Zeroed;
+use crate::tasks::failure::Place;
 use crate::tasks::nmt::Report;
 use crate::tasks::scan::Found;
 use crate::tasks::store::Done;
@@ -45,6 +46,8 @@ pub fn failure(out: &mut dyn Write, failure: &Failure, exit: u8) -> io::Result<(
         object: Option<String>,
         abort: Option<String>,
         hint: Option<&'a str>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        column: Option<usize>,
     }
     let inner = Inner {
         kind: kind_name(failure.kind),
@@ -54,6 +57,7 @@ pub fn failure(out: &mut dyn Write, failure: &Failure, exit: u8) -> io::Result<(
         object: failure.object.map(|object| object.to_string()),
         abort: failure.abort.map(|abort| format!("0x{:08X}", abort.0)),
         hint: failure.hint.as_deref(),
+        column: failure.place.as_ref().map(Place::column),
     };
     line(out, &Error { error: inner })
 }

@@ -2,10 +2,19 @@
 
 pub mod console;
 pub mod csv;
+mod elapsed;
+pub mod info;
+pub mod info_json;
+pub mod interfaces;
 pub mod json;
+pub mod json_lss;
+pub mod junit;
+pub mod limits;
 pub mod pdo;
 pub mod progress;
 pub mod rows;
+pub mod settings;
 pub mod summary;
 pub mod table;
 pub mod text;
+pub mod verdict;

@@ -1,5 +1,6 @@
 //! The rows of a log, as CSV or JSON Lines, written whole.
 
+use super::elapsed::Elapsed;
 use super::json;
 use crate::bus::{Mono, Stamp};
 use crate::measure::sample::{Number, Sample, Source};
@@ -51,7 +52,7 @@ pub struct Rows {
     waiting: u64,
     /// When the first of them was put there.
     since: Option<Mono>,
-    first: Option<Mono>,
+    elapsed: Option<Elapsed>,
     lost: u64,
     scratch: String,
     header: bool,
@@ -67,7 +68,7 @@ impl Rows {
             block: Vec::with_capacity(BLOCK + 4096),
             waiting: 0,
             since: None,
-            first: None,
+            elapsed: None,
             lost: 0,
             scratch: String::new(),
             header: form == Form::Csv,
@@ -76,14 +77,13 @@ impl Rows {
 
     /// Adds a row.
     pub fn add(&mut self, sample: &Sample, source: &Source) -> io::Result<()> {
-        if self.first.is_none()
+        if self.elapsed.is_none()
             && let Target::File(file) = &self.target
             && file.metadata()?.is_file()
         {
             file.set_len(0)?;
         }
-        let first = *self.first.get_or_insert(sample.at.mono);
-        let elapsed = sample.at.mono.since(first);
+        let elapsed = self.elapsed.get_or_insert_default().take(sample.at);
         if std::mem::take(&mut self.header) {
             self.block.extend_from_slice(HEADER.as_bytes());
             self.block.push(b'\n');
@@ -92,7 +92,7 @@ impl Rows {
             Form::Csv => self.csv(sample, source, elapsed)?,
             Form::Json => {
                 let time = humantime::format_rfc3339_micros(sample.at.wall.system_time()).to_string();
-                let elapsed_s = (elapsed.as_secs_f64() * 1e6).round() / 1e6;
+                let elapsed_s = elapsed.as_secs_f64();
                 json::row(&mut self.block, &time, elapsed_s, sample, source)?;
             }
         }

@@ -5,6 +5,23 @@
 pub struct Abort(pub u32);
 
 impl Abort {
+    /// The code that a device sends whose manual lists only `listed`: this one, or the next of its kind that
+    /// is listed. Where nothing is listed, and for what no other code says, it stays.
+    pub(super) fn of_list(self, listed: &[u32]) -> Abort {
+        let kin: &[Abort] = match self {
+            Abort::VALUE | Abort::TOO_HIGH | Abort::TOO_LOW => &[Abort::VALUE, Abort::TOO_HIGH],
+            Abort::NOT_MAPPABLE | Abort::PDO_LENGTH => &[Abort::NOT_MAPPABLE, Abort::VALUE],
+            Abort::LENGTH => &[Abort::COMMAND],
+            Abort::UNSUPPORTED | Abort::DEVICE_STATE => &[Abort::NOT_STORED],
+            Abort::TIMEOUT | Abort::TOGGLE => return self,
+            _ => &[],
+        };
+        let is_listed = |abort: &&Abort| listed.contains(&abort.0);
+        let general = &[Abort::GENERAL];
+        let mut candidates = std::iter::once(&self).chain(kin).chain(general);
+        candidates.find(is_listed).copied().unwrap_or(self)
+    }
+
     /// Toggle bit not alternated.
     pub const TOGGLE: Abort = Abort(0x0503_0000);
     /// The client did not go on.

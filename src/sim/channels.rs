@@ -35,7 +35,9 @@ enum Kind {
 }
 
 /// What CiA 404 keeps in the unit of 6131h beside the value itself.
-const IN_PV_UNIT: [(u16, Kind); 7] = [
+const IN_PV_UNIT: [(u16, Kind); 9] = [
+    (0x121, Kind::Point),
+    (0x123, Kind::Point),
     (0x124, Kind::Distance),
     (0x133, Kind::Distance),
     (0x134, Kind::Point),
@@ -97,7 +99,7 @@ impl Channels {
         let list: Vec<Channel> = list.collect();
         let mut shown = BTreeMap::new();
         for (index, channel) in list.iter().enumerate() {
-            channel.shown(objects).into_iter().for_each(|(object, shows)| {
+            channel.shown(objects, list.len() == 1).into_iter().for_each(|(object, shows)| {
                 shown.insert(object, (index, shows));
             });
         }
@@ -205,6 +207,19 @@ impl Channels {
         true
     }
 
+    /// A damping that was written makes a constant of the moving average (MH-4, 4.3.7). How is not printed:
+    /// the steps of the sample time that it lasts.
+    pub(super) fn damp(&self, objects: &mut Objects, object: ObjectId) {
+        if objects.spec(object).is_none_or(|spec| spec.name != "damping") {
+            return;
+        }
+        let [kind, constant] = [0x61a0, 0x61a1].map(|index| ObjectId::new(index, object.sub));
+        let Some(channel) = self.by_number(object.sub).filter(|_| objects.number(kind) == 1) else { return };
+        let steps = Duration::from_millis(objects.number(object).into()).as_micros() / channel.quantity.sample_us();
+        let steps = u16::try_from(steps).unwrap_or(u16::MAX).max(1);
+        objects.put(constant, steps.to_le_bytes().to_vec());
+    }
+
     fn by_number(&self, number: u8) -> Option<&Channel> {
         self.list.iter().find(|channel| channel.signal.channel == number)
     }
@@ -229,7 +244,7 @@ impl Channel {
     }
 
     /// The objects that show this channel.
-    fn shown(&self, objects: &Objects) -> Vec<(ObjectId, Shows)> {
+    fn shown(&self, objects: &Objects, alone: bool) -> Vec<(ObjectId, Shows)> {
         let sub = self.signal.channel;
         let mut shown: Vec<(ObjectId, Shows)> = Vec::new();
         for family in FAMILIES {
@@ -240,7 +255,9 @@ impl Channel {
         shown.extend(self.signal.also.iter().map(|object| (*object, Shows::Value)));
         shown.extend(self.signal.status.map(|object| (object, Shows::Status)));
         // The two are the manufacturer's own and have names instead of fixed indices.
-        shown.extend(objects.specs().filter(|(object, _)| object.sub == sub).filter_map(|(object, spec)| {
+        // A device that measures one thing may keep them without sub-indices.
+        let mine = |object: &ObjectId| object.sub == sub || (object.sub == 0 && alone);
+        shown.extend(objects.specs().filter(|(object, _)| mine(object)).filter_map(|(object, spec)| {
             match spec.name.as_str() {
                 "minimum-pv" => Some((object, Shows::Lowest)),
                 "maximum-pv" => Some((object, Shows::Highest)),

@@ -1,15 +1,19 @@
 //! A simulated device: NMT, heartbeat, guarding, and what makes it send.
 
+mod assign;
+
 use super::channels::{Channels, status};
 use super::emergency::Emergencies;
+use super::lss::Slave;
 use super::memory::Memory;
 use super::nmt::{Command, State};
-use super::objects::{Area, Objects, Signature};
+use super::objects::{Area, Objects};
 use super::record::{Line, Recorder, line, plain};
 use super::sdo_server::SdoServer;
-use super::setup::Setup;
+use super::settings::{Pair, Rate, Settings};
+use super::setup::{GoneAfter, Setup};
 use super::tpdo::{Cause, Tpdo};
-use crate::bus::memory::{Outbox, Station};
+use crate::bus::memory::{Outbox, Station, Tuning};
 use crate::bus::time::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
@@ -37,7 +41,15 @@ enum Phase {
     Off,
     /// Away until then.
     Starting(Mono),
+    /// Without a node-ID: only LSS.
+    Unconfigured,
     Running(State),
+    /// It changes its bit rate at the moment `switch` and is silent until `until`; the state then is `after`.
+    Retiming {
+        after: Option<State>,
+        switch: Option<Mono>,
+        until: Mono,
+    },
 }
 
 /// A simulated device.
@@ -45,6 +57,7 @@ pub struct Device {
     setup: Setup,
     memory: Memory,
     sdo: SdoServer,
+    lss: Slave,
     tpdos: Vec<Tpdo>,
     phase: Phase,
     heartbeat: Option<Mono>,
@@ -52,6 +65,8 @@ pub struct Device {
     toggle: bool,
     /// When an overload may begin or end.
     overload_look: Option<Mono>,
+    /// Answers that it still thinks about.
+    thinking: VecDeque<(Mono, Frame)>,
     recorder: Option<Recorder>,
     /// TPDOs on their way to the wire, with what the record says of them.
     under_way: VecDeque<(Frame, Vec<Line>)>,
@@ -65,13 +80,14 @@ impl Device {
     pub fn new(setup: Setup) -> Result<Device, String> {
         let model = &setup.model;
         let description = &model.description;
-        let mut objects = Objects::new(model, setup.node);
+        let node = setup.node.unwrap_or(NodeId::MIN);
+        let mut objects = Objects::new(model, node);
         objects.preset(SERIAL_NUMBER, setup.serial.to_le_bytes().to_vec());
         for (object, value) in &setup.set {
             let bytes = objects
                 .spec(*object)
                 .ok_or_else(|| format!("{} has no object {object}", description.name))?
-                .encode(value, setup.node)
+                .encode(value, node)
                 .map_err(|error| format!("{object}: {error}"))?;
             objects.preset(*object, bytes);
         }
@@ -79,17 +95,23 @@ impl Device {
         let tpdos = Tpdo::all(&objects);
         let answers_60 = description.quirks.contains(&Quirk::UploadAnswered60);
         let sdo = SdoServer::new(description.sdo.clone(), answers_60);
-        let emergencies = Emergencies::new(&description.emergencies);
-        let memory = Memory { node: setup.node, objects, channels, emergencies, remap: description.pdo.remap };
+        let emergencies = Emergencies::new(description);
+        let pair = Pair { node: setup.node, rate: setup.bit_rate.map_or(Rate::Auto, Rate::At) };
+        let settings = Settings::new(description, &objects, pair);
+        let memory = Memory { node, settings, objects, channels, emergencies, remap: description.pdo.remap };
+        let oddities = &setup.oddities;
+        let lss = Slave::new(description.sim.lss.clone(), oddities.refuse.clone(), oddities.scans_for_ever);
         Ok(Device {
             setup,
             memory,
             sdo,
+            lss,
             tpdos,
             phase: Phase::Off,
             heartbeat: None,
             toggle: false,
             overload_look: None,
+            thinking: VecDeque::new(),
             recorder: None,
             under_way: VecDeque::new(),
         })
@@ -101,16 +123,33 @@ impl Device {
         self
     }
 
-    /// Its present node-ID.
-    pub fn node(&self) -> NodeId {
-        self.memory.node
+    /// Its present node-ID; `None` if it has none.
+    pub fn node(&self) -> Option<NodeId> {
+        self.memory.settings.active.node
+    }
+
+    /// Its present bit rate in bit/s; `None` if it is that of the bus.
+    pub fn bit_rate(&self) -> Option<u32> {
+        fixed(self.memory.settings.active.rate)
+    }
+
+    /// The node-ID and the bit rate in bit/s that it will have after power on.
+    pub fn stored(&self) -> (Option<NodeId>, Option<u32>) {
+        let Pair { node, rate } = self.memory.settings.persistent;
+        (node, fixed(rate))
+    }
+
+    /// Whether it is in the configuration state of LSS.
+    pub fn is_configuring(&self) -> bool {
+        self.lss.is_configuring()
     }
 
     /// Its NMT state; `None` without power and while it starts.
     pub fn state(&self) -> Option<State> {
         match self.phase {
             Phase::Running(state) => Some(state),
-            Phase::Off | Phase::Starting(_) => None,
+            Phase::Retiming { after, .. } => after,
+            Phase::Off | Phase::Starting(_) | Phase::Unconfigured => None,
         }
     }
 
@@ -125,12 +164,18 @@ impl Device {
 
     /// Initialisation is over: boot-up, then PRE-OPERATIONAL or at once OPERATIONAL.
     fn boot(&mut self, now: Mono, out: &mut Outbox) {
+        if self.node().is_none() {
+            self.phase = Phase::Unconfigured;
+            return;
+        }
         out.send(Frame::byte(CanId::heartbeat(self.memory.node), 0x00));
         self.toggle = false;
         self.restart_heartbeat(now + self.heartbeat_period().unwrap_or_default());
         // MH-4, 4.1.16: 8 starts by itself. CiA 302-2: bit 3 set with bit 2 clear.
         let startup = self.memory.objects.number(NMT_STARTUP);
-        let starts = self.setup.start || startup & 0b1100 == 0b1000;
+        let other = self.setup.model.description.startup.as_ref().filter(|startup| startup.object != NMT_STARTUP);
+        let by_other = other.is_some_and(|other| self.memory.objects.number(other.object) == other.auto);
+        let starts = self.setup.start || by_other || startup & 0b1100 == 0b1000;
         self.enter(if starts { State::Operational } else { State::PreOperational }, now);
         self.memory.emergencies.publish(&mut self.memory.objects);
         self.look_for_overload(now);
@@ -158,6 +203,19 @@ impl Device {
 
     /// A reset: nothing that waits is sent any more, and the device is away for a while.
     fn reset(&mut self, area: Area, now: Mono, out: &mut Outbox) {
+        self.fall_silent(out);
+        if area == Area::All {
+            self.memory.emergencies.forget();
+        }
+        self.memory.settings.reset();
+        self.restart(area);
+        let is_gone = self.setup.oddities.gone_after.contains(&GoneAfter::Reset);
+        let away = if area == Area::All { RESTART } else { RECONNECT };
+        self.phase = if is_gone { Phase::Off } else { Phase::Starting(now + away) };
+    }
+
+    /// Nothing that waits is sent any more, and nothing is made that could be.
+    fn fall_silent(&mut self, out: &mut Outbox) {
         // What is on the wire already gets there, and into the record.
         let mut dropped: Vec<Frame> = std::iter::from_fn(|| out.pop()).collect();
         while let Some(frame) = dropped.pop() {
@@ -165,25 +223,21 @@ impl Device {
                 self.under_way.pop_back();
             }
         }
+        self.thinking.clear();
         self.sdo.forget();
         self.tpdos.iter_mut().for_each(Tpdo::stop);
         self.heartbeat = None;
         self.overload_look = None;
-        if area == Area::All {
-            self.memory.emergencies.forget();
-            self.memory.node = self.saved_node();
-        }
         self.memory.emergencies.drop_waiting();
-        self.memory.objects.reset(area, self.memory.node);
-        self.phase = Phase::Starting(now + if area == Area::All { RESTART } else { RECONNECT });
     }
 
-    /// A node-ID that was written with its signature and saved is taken at the next reset.
-    fn saved_node(&self) -> NodeId {
-        let objects = &self.memory.objects;
-        let object = objects.specs().find(|(_, spec)| spec.signature == Some(Signature::Set) && spec.name == "node-id");
-        let saved = object.and_then(|(object, _)| objects.saved(object)?.first().copied());
-        saved.and_then(|id| NodeId::new(id).ok()).unwrap_or(self.memory.node)
+    /// What is saved comes into force, under the node-ID that does.
+    fn restart(&mut self, area: Area) {
+        let Memory { node, settings, objects, .. } = &mut self.memory;
+        *node = settings.active.node.unwrap_or(NodeId::MIN);
+        objects.reset(area, *node);
+        settings.show(objects);
+        self.lss.reset();
     }
 
     fn heartbeat_period(&self) -> Option<Duration> {
@@ -224,7 +278,8 @@ impl Device {
             // The rest of a sub-block that the client has given up.
             out.retain(|frame| frame.id() != id);
         }
-        answers.into_iter().for_each(|answer| out.send(Frame::full(id, answer)));
+        let thought = now + self.setup.oddities.latency;
+        answers.into_iter().for_each(|answer| self.answer(Frame::full(id, answer), thought, now, out));
         match written {
             // "The heartbeat protocol begins immediately" (CiA 301, 7.5.2.14).
             Some(HEARTBEAT_TIME) => self.restart_heartbeat(now),
@@ -323,6 +378,7 @@ impl Device {
     }
 
     fn send_emergencies(&mut self, now: Mono, out: &mut Outbox) {
+        self.memory.emergencies.repeat(&self.memory.objects, now);
         if matches!(self.phase, Phase::Running(State::Stopped)) {
             self.memory.emergencies.drop_waiting();
         }
@@ -341,12 +397,25 @@ pub(super) fn next_turn(due: Mono, period: Duration, now: Mono) -> Mono {
 
 impl Station for Device {
     fn power_on(&mut self, now: Mono, out: &mut Outbox) {
-        self.memory.node = self.saved_node();
-        self.memory.objects.reset(Area::All, self.memory.node);
+        self.fall_silent(out);
+        self.memory.emergencies.forget();
+        self.memory.settings.power_on();
+        self.restart(Area::All);
         self.boot(now, out);
     }
 
     fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
+        if frame.id() == CanId::LSS_MASTER
+            && !frame.is_remote()
+            && let Some(request) = frame.all_eight()
+        {
+            // Of a device that changes its bit rate nobody expects more than that it goes back to waiting.
+            let is_retiming = matches!(self.phase, Phase::Retiming { .. });
+            if self.hears_lss() || is_retiming && request[0] == 0x04 {
+                self.configure(request, now, out);
+            }
+            return;
+        }
         let Phase::Running(state) = self.phase else { return };
         if let Some(command) = Command::for_node(self.memory.node, frame) {
             self.obey(command, now, out);
@@ -373,6 +442,9 @@ impl Station for Device {
             }
             return;
         }
+        self.retime(now, out);
+        let thought = self.thinking.partition_point(|(due, _)| *due <= now);
+        self.thinking.drain(..thought).for_each(|(_, frame)| out.send(frame));
         let Phase::Running(state) = self.phase else { return };
         if let Some(due) = self.heartbeat.filter(|due| *due <= now) {
             out.send(Frame::byte(CanId::heartbeat(self.memory.node), state.code()));
@@ -400,9 +472,16 @@ impl Station for Device {
         match self.phase {
             Phase::Off => None,
             Phase::Starting(until) => Some(until),
+            Phase::Unconfigured => self.thinking.front().map(|(due, _)| *due),
+            Phase::Retiming { switch, until, .. } => Some(switch.unwrap_or(until)),
             Phase::Running(_) => {
-                let own =
-                    [self.heartbeat, self.sdo.deadline(), self.overload_look, self.memory.emergencies.next_wake()];
+                let own = [
+                    self.heartbeat,
+                    self.sdo.deadline(),
+                    self.overload_look,
+                    self.memory.emergencies.next_wake(),
+                    self.thinking.front().map(|(due, _)| *due),
+                ];
                 own.into_iter().flatten().chain(self.tpdos.iter().filter_map(Tpdo::next_wake)).min()
             }
         }
@@ -418,6 +497,26 @@ impl Station for Device {
         {
             lines.iter().for_each(|line| recorder.write(now, line));
         }
+    }
+
+    fn tuning(&self) -> Tuning {
+        match self.memory.settings.active.rate {
+            _ if self.phase == Phase::Off => Tuning::Off,
+            Rate::At(rate) => Tuning::At(rate),
+            Rate::Auto => Tuning::Follows,
+        }
+    }
+
+    fn told_bit_rate(&mut self, bit_rate: u32) {
+        let settings = &mut self.memory.settings;
+        settings.tell_wire(bit_rate, self.setup.bit_rate.is_some());
+    }
+}
+
+fn fixed(rate: Rate) -> Option<u32> {
+    match rate {
+        Rate::At(rate) => Some(rate),
+        Rate::Auto => None,
     }
 }
 

@@ -1,11 +1,13 @@
 //! Emergencies of a simulated device: what is pending, the error register, the history, and the frames.
 
+use super::device::next_turn;
 use super::objects::Objects;
 use crate::bus::time::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
-use crate::device::description::EmergencyEntry;
+use crate::device::description::{Description, EmergencyEntry, ErrorHistory};
+use crate::device::quirk::Quirk;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
@@ -18,17 +20,24 @@ const INHIBIT_TIME: ObjectId = ObjectId::new(0x1015, 0);
 #[derive(Clone, Debug, Default)]
 pub(super) struct Emergencies {
     described: Vec<EmergencyEntry>,
+    layout: ErrorHistory,
     /// Codes that are pending, and on which channels; channel 0 stands for the device.
     pending: BTreeMap<u16, BTreeSet<u8>>,
     history: VecDeque<u32>,
     waiting: VecDeque<[u8; 8]>,
     /// Before this moment the inhibit time forbids the next frame.
     free: Mono,
+    /// The deviation [`Quirk::EmergencyRepeats`].
+    repeats: bool,
+    /// What is said again while an error is pending, and when.
+    again: Option<([u8; 8], Mono)>,
 }
 
 impl Emergencies {
-    pub(super) fn new(described: &[EmergencyEntry]) -> Emergencies {
-        Emergencies { described: described.to_vec(), ..Emergencies::default() }
+    pub(super) fn new(description: &Description) -> Emergencies {
+        let described = description.emergencies.clone();
+        let repeats = description.quirks.contains(&Quirk::EmergencyRepeats);
+        Emergencies { described, layout: description.error_history, repeats, ..Emergencies::default() }
     }
 
     /// Whether the device knows this emergency.
@@ -50,9 +59,12 @@ impl Emergencies {
         }
         let entries = self.capacity(objects);
         if entries > 0 {
-            // MH-4, 4.1.3: byte 4 of the message in bits 16 to 23, byte 3 in bits 24 to 31.
             let [low, high] = code.to_le_bytes();
-            self.history.push_front(u32::from_le_bytes([low, high, extra[1], extra[0]]));
+            self.history.push_front(u32::from_le_bytes(match self.layout {
+                ErrorHistory::CodeLow => [low, high, 0, 0],
+                ErrorHistory::CodeLowBytesSwapped => [low, high, extra[1], extra[0]],
+                ErrorHistory::CodeHigh => [0, 0, low, high],
+            }));
             self.history.truncate(entries);
         }
         self.publish(objects);
@@ -79,6 +91,7 @@ impl Emergencies {
     /// As after power-on.
     pub(super) fn forget(&mut self) {
         self.pending.clear();
+        self.again = None;
         self.history.clear();
         self.waiting.clear();
     }
@@ -123,20 +136,42 @@ impl Emergencies {
         self.waiting.push_back([low, high, register, a, b, c, d, e]);
     }
 
+    /// Puts the emergency of a pending error behind those that wait when its time has come again.
+    pub(super) fn repeat(&mut self, objects: &Objects, now: Mono) {
+        let Some((message, due)) = self.again else { return };
+        if self.pending.is_empty() {
+            self.again = None;
+        } else if due <= now {
+            self.waiting.push_back(message);
+            self.again = repeat_time(objects).map(|period| (message, next_turn(due, period, now)));
+        }
+    }
+
     /// The next message, if one waits and the inhibit time allows it.
     pub(super) fn next_frame(&mut self, objects: &Objects, node: NodeId, now: Mono) -> Option<Frame> {
         if now < self.free {
             return None;
         }
         let message = self.waiting.pop_front()?;
+        if self.repeats && self.again.is_none() && !self.pending.is_empty() {
+            self.again = repeat_time(objects).map(|period| (message, now + period));
+        }
         self.free = now + Duration::from_micros(100) * objects.number(INHIBIT_TIME);
         Some(Frame::full(cob_id(objects, node)?, message))
     }
 
     /// When [`Emergencies::next_frame`] has something.
     pub(super) fn next_wake(&self) -> Option<Mono> {
-        self.waiting.front().map(|_| self.free)
+        let waiting = self.waiting.front().map(|_| self.free);
+        let again = self.again.map(|(_, due)| due);
+        waiting.into_iter().chain(again).min()
     }
+}
+
+/// How often a pending error is told again; `None` where it is told once.
+fn repeat_time(objects: &Objects) -> Option<Duration> {
+    let (object, _) = objects.specs().find(|(_, spec)| spec.name == "emcy-repeat-time")?;
+    Some(objects.number(object)).filter(|&period| period > 0).map(|period| Duration::from_millis(period.into()))
 }
 
 /// The identifier of emergencies: 1014h, unless its bit 31 switches them off.
@@ -172,7 +207,7 @@ mod tests {
 
     fn mh4() -> (Objects, Emergencies) {
         let model = catalog::by_name("mh4").expect("built in");
-        (Objects::new(&model, node()), Emergencies::new(&model.description.emergencies))
+        (Objects::new(&model, node()), Emergencies::new(&model.description))
     }
 
     fn frames(objects: &Objects, emergencies: &mut Emergencies) -> Vec<String> {
@@ -256,7 +291,7 @@ mod tests {
     fn dps_has_its_own_codes_and_registers() {
         let model = catalog::by_name("dps").expect("built in");
         let mut objects = Objects::new(&model, node());
-        let mut emergencies = Emergencies::new(&model.description.emergencies);
+        let mut emergencies = Emergencies::new(&model.description);
         emergencies.raise(&mut objects, 0x3201, 1, 0x03);
         assert_eq!(frames(&objects, &mut emergencies), ["085#0132050000000000"]);
     }

@@ -1,6 +1,6 @@
 //! Simulated devices on a bus with other participants: a real interface, or a socket.
 
-use crate::bus::memory::{Outbox, Station};
+use crate::bus::memory::{Outbox, Station, Tuning};
 use crate::bus::time::Mono;
 use crate::bus::{Bus, BusError, Event};
 use crate::canopen::frame::Frame;
@@ -15,7 +15,8 @@ const IDLE: Duration = Duration::from_secs(3600);
 
 /// Runs stations on `bus` until the user asks to stop, or until `until`.
 ///
-/// They hear each other, too, as they would on a wire: a bus does not give back what was sent on it.
+/// They hear each other, too, as they would on a wire: a bus does not give back what was sent on it. A station
+/// at another bit rate than the bus, where that is known, is deaf and mute; errors it cannot make.
 ///
 /// # Errors
 /// When the bus fails; a transmit queue that is full is waited for.
@@ -24,9 +25,13 @@ pub fn run(
     stations: Vec<Box<dyn Station>>,
     until: Option<Mono>,
 ) -> Result<Vec<Box<dyn Station>>, BusError> {
-    let mut host = Host { places: stations.into_iter().map(|station| (station, Outbox::default())).collect() };
+    let places = stations.into_iter().map(|station| (station, Outbox::default())).collect();
+    let mut host = Host { places, bit_rate: bus.bit_rate() };
     let now = bus.now().mono;
-    host.places.iter_mut().for_each(|(station, out)| station.power_on(now, out));
+    for (station, out) in &mut host.places {
+        host.bit_rate.into_iter().for_each(|bit_rate| station.told_bit_rate(bit_rate));
+        station.power_on(now, out);
+    }
     loop {
         let now = bus.now().mono;
         host.wake(now);
@@ -36,9 +41,10 @@ pub fn run(
         let deadline = until.map_or(next, |until| until.min(next));
         match bus.receive(deadline)? {
             Event::Frame(received) => host.hear(None, received.at.mono, &received.frame),
-            Event::Interrupted => break,
+            Event::Interrupted | Event::Ended => break,
             Event::Timeout if until.is_some_and(|until| bus.now().mono >= until) => break,
-            Event::Timeout | Event::Fault(..) | Event::Dropped(_) | Event::Link(_) => {}
+            Event::Link(true) => host.retime(bus.bit_rate()),
+            Event::Timeout | Event::Fault(..) | Event::Dropped(_) | Event::Link(false) => {}
         }
     }
     Ok(host.places.into_iter().map(|(station, _)| station).collect())
@@ -46,6 +52,8 @@ pub fn run(
 
 struct Host {
     places: Vec<(Box<dyn Station>, Outbox)>,
+    /// That of the bus, where it is known.
+    bit_rate: Option<u32>,
 }
 
 impl Host {
@@ -61,10 +69,30 @@ impl Host {
         }
     }
 
+    /// The interface came back, perhaps at another bit rate.
+    fn retime(&mut self, bit_rate: Option<u32>) {
+        if bit_rate != self.bit_rate {
+            self.bit_rate = bit_rate;
+            for (station, _) in &mut self.places {
+                bit_rate.into_iter().for_each(|bit_rate| station.told_bit_rate(bit_rate));
+            }
+        }
+    }
+
+    /// Whether a station takes part.
+    fn is_on_the_bus(&self, station: &dyn Station) -> bool {
+        match station.tuning() {
+            Tuning::Follows => true,
+            Tuning::At(rate) => self.bit_rate.is_none_or(|bit_rate| bit_rate == rate),
+            Tuning::Off => false,
+        }
+    }
+
     /// A frame that everybody but its sender gets.
     fn hear(&mut self, sender: Option<usize>, now: Mono, frame: &Frame) {
-        for (index, (station, out)) in self.places.iter_mut().enumerate() {
-            if sender != Some(index) {
+        for index in 0..self.places.len() {
+            if sender != Some(index) && self.is_on_the_bus(&*self.places[index].0) {
+                let (station, out) = &mut self.places[index];
                 station.receive(now, frame, out);
             }
         }
@@ -72,6 +100,11 @@ impl Host {
 
     /// Hands over what waits, the lowest identifier first; `false` when the bus takes no more.
     fn send(&mut self, bus: &mut dyn Bus) -> Result<bool, BusError> {
+        for index in 0..self.places.len() {
+            if !self.is_on_the_bus(&*self.places[index].0) {
+                self.places[index].1.clear();
+            }
+        }
         loop {
             let waiting = self.places.iter().enumerate();
             let heads = waiting.filter_map(|(index, (_, out))| Some((priority(out.front()?), index)));
@@ -180,6 +213,19 @@ mod tests {
             ["703#00", "183#0A0014001E002800", "283#32003C0046005000", "383#5A0064006E007800", "483#82008C009600A000"]
                 .map(str::to_owned)
         );
+    }
+
+    #[test]
+    fn a_device_that_has_left_the_bit_rate_is_gone() {
+        // 125 kbit/s by LSS, at once; then a request at the 250 of the bus, and a heartbeat that would come.
+        let configure = ["7E5#0401000000000000", "7E5#1300040000000000", "7E5#1500000000000000"];
+        let mut plan = vec![(1, "605#2B17100064000000")];
+        plan.extend(configure.iter().zip([10, 20, 30]).map(|(frame, at)| (at, *frame)));
+        plan.push((40, "605#4000100000000000"));
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(master(&plan));
+        run(&mut bus, vec![device("mh4", 5)], Some(ms(500))).expect("no error");
+        assert_eq!(received(&bus), ["705#00", "585#6017100000000000", "705#7F", "7E4#1300000000000000"]);
     }
 
     #[test]

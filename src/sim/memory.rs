@@ -6,6 +6,7 @@ use super::channels::Channels;
 use super::emergency::Emergencies;
 use super::objects::{Group, Objects, Signature};
 use super::sdo_server::Dictionary;
+use super::settings::Settings;
 use super::tpdo;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -16,7 +17,9 @@ use std::time::Duration;
 /// Objects, measuring channels and errors of one device.
 #[derive(Clone, Debug)]
 pub(super) struct Memory {
+    /// The node-ID in force; without one nothing asks for it.
     pub(super) node: NodeId,
+    pub(super) settings: Settings,
     pub(super) objects: Objects,
     pub(super) channels: Channels,
     pub(super) emergencies: Emergencies,
@@ -44,6 +47,9 @@ impl Memory {
 
     /// A write that has passed every check.
     fn act(&mut self, object: ObjectId, bytes: &[u8], time: Duration) -> Result<(), Abort> {
+        if !self.settings.allows(object, bytes) {
+            return Err(Abort::VALUE);
+        }
         match self.objects.spec(object).and_then(|spec| spec.signature) {
             Some(Signature::Save) => {
                 let group = Group::of_sub(object.sub).ok_or(Abort::NOT_STORED)?;
@@ -72,8 +78,13 @@ impl Memory {
                     return Err(Abort::VALUE);
                 }
             }
-            None => self.objects.put(object, bytes.to_vec()),
+            None if self.objects.asks_for_default(object, bytes) => self.objects.put_default(object, self.node),
+            None => {
+                self.objects.put(object, bytes.to_vec());
+                self.channels.damp(&mut self.objects, object);
+            }
         }
+        self.settings.keep(object, &self.objects);
         Ok(())
     }
 }
@@ -85,6 +96,14 @@ pub(super) struct Access<'a> {
     pre_operational: bool,
     /// The object that was written.
     pub(super) written: Option<ObjectId>,
+}
+
+impl Access<'_> {
+    fn finish(&mut self, object: ObjectId, bytes: &[u8]) -> Result<(), Abort> {
+        self.memory.act(object, bytes, self.time)?;
+        self.written = Some(object);
+        Ok(())
+    }
 }
 
 impl Dictionary for Access<'_> {
@@ -99,6 +118,10 @@ impl Dictionary for Access<'_> {
 
     fn download(&mut self, object: ObjectId, bytes: &[u8]) -> Result<(), Abort> {
         let objects = &self.memory.objects;
+        if objects.asks_for_default(object, bytes) {
+            objects.check_length(object, bytes)?;
+            return self.finish(object, bytes);
+        }
         let pdo = || tpdo::check(objects, self.memory.remap, self.pre_operational, object, bytes);
         // What cannot be mapped is told as that, before the limits of the entry are.
         if (0x1a00..0x1c00).contains(&object.index) && object.sub > 0 {
@@ -109,8 +132,6 @@ impl Dictionary for Access<'_> {
             objects.check_write(object, bytes)?;
             pdo()?;
         }
-        self.memory.act(object, bytes, self.time)?;
-        self.written = Some(object);
-        Ok(())
+        self.finish(object, bytes)
     }
 }

@@ -1,5 +1,5 @@
 //! Simulated devices, built from the device descriptions: object dictionary, SDO server, NMT, heartbeat,
-//! TPDOs, emergencies and a measured quantity that moves.
+//! TPDOs, emergencies, LSS and a measured quantity that moves.
 //!
 //! Written from CiA 301, CiA 404 and the manuals, not with the client's encoders: two halves that share a
 //! mistake would agree with each other. Nothing here asks for a device's name; what differs between
@@ -14,6 +14,7 @@ mod channels;
 mod device;
 mod emergency;
 pub mod host;
+mod lss;
 mod memory;
 mod model;
 mod nmt;
@@ -22,6 +23,7 @@ mod objects;
 mod record;
 mod sdo_block;
 mod sdo_server;
+mod settings;
 mod setup;
 mod tpdo;
 
@@ -31,4 +33,4 @@ pub use device::Device;
 pub use model::{Direction, Overload};
 pub use nmt::State;
 pub use record::{HEADER, Recorder};
-pub use setup::Setup;
+pub use setup::{GoneAfter, Oddities, Setup};

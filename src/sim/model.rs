@@ -49,6 +49,11 @@ impl Quantity {
         Quantity { channel, sample: sample.max(Duration::from_nanos(1)), margin, overloads, key }
     }
 
+    /// The sample time in microseconds, at least 1.
+    pub(super) fn sample_us(&self) -> u128 {
+        self.sample.as_micros().max(1)
+    }
+
     pub(super) fn channel(&self) -> &SimChannel {
         &self.channel
     }

@@ -68,6 +68,8 @@ pub(super) enum Group {
     All,
     Communication,
     Application,
+    /// What only the manufacturer knows; none of the entries with a value.
+    Other,
 }
 
 impl Group {
@@ -77,6 +79,7 @@ impl Group {
             1 => Group::All,
             2 => Group::Communication,
             3 => Group::Application,
+            4..=0x7f => Group::Other,
             _ => return None,
         })
     }
@@ -119,6 +122,8 @@ pub(super) struct Objects {
     marked: bool,
     /// The deviation [`Quirk::SaveAllResetsCobIds`].
     resets_cob_ids: bool,
+    /// The deviation [`Quirk::CobIdZeroIsDefault`].
+    zero_is_default: bool,
     values: BTreeMap<ObjectId, Vec<u8>>,
     saved: BTreeMap<ObjectId, Vec<u8>>,
 }
@@ -137,6 +142,7 @@ impl Objects {
             specs: Arc::new(specs),
             marked,
             resets_cob_ids: model.description.quirks.contains(&Quirk::SaveAllResetsCobIds),
+            zero_is_default: model.description.quirks.contains(&Quirk::CobIdZeroIsDefault),
             values: BTreeMap::new(),
             saved: BTreeMap::new(),
         };
@@ -180,6 +186,18 @@ impl Objects {
         self.spec(object)?.data_type.decode(self.bytes(object)?).ok()?.as_f64()
     }
 
+    /// Whether a write asks for the default of a COB-ID instead of the value written.
+    pub(super) fn asks_for_default(&self, object: ObjectId, bytes: &[u8]) -> bool {
+        self.zero_is_default && is_cob_id(object) && bytes.iter().all(|&byte| byte == 0)
+    }
+
+    /// Puts the value as delivered in place.
+    pub(super) fn put_default(&mut self, object: ObjectId, node: NodeId) {
+        if let Some(value) = self.spec(object).map(|spec| spec.delivered(node)) {
+            self.values.insert(object, value);
+        }
+    }
+
     /// Puts a working value in place, whatever the access says.
     pub(super) fn put(&mut self, object: ObjectId, bytes: Vec<u8>) {
         if self.has(object) {
@@ -193,11 +211,6 @@ impl Objects {
             self.saved.insert(object, bytes.clone());
             self.values.insert(object, bytes);
         }
-    }
-
-    /// What is saved of an entry, if it differs from what was delivered.
-    pub(super) fn saved(&self, object: ObjectId) -> Option<&[u8]> {
-        self.saved.get(&object).map(Vec::as_slice)
     }
 
     /// Whether the entry exists and can be written.

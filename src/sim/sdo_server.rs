@@ -124,7 +124,7 @@ impl SdoServer {
             match self.block(now, request, memory) {
                 Ok(Some(answers)) => return answers,
                 Ok(None) => {}
-                Err(code) => return vec![abort(in_transfer, code)],
+                Err(code) => return vec![abort(in_transfer, code.of_list(&self.style.aborts))],
             }
         }
         let (answer, object) = match command >> 5 {
@@ -148,7 +148,7 @@ impl SdoServer {
             Ok(answer) => vec![answer],
             Err(code) => {
                 self.transfer = Transfer::None;
-                vec![abort(object, code)]
+                vec![abort(object, code.of_list(&self.style.aborts))]
             }
         }
     }

@@ -126,7 +126,7 @@ pub fn autozero(
     notes.extend(written.shown_by.map(|what| format!("no answer came to the signature; {what} shows that it acted")));
     let mut report = procedure.report(Some(&written), notes);
     report.notes.push(procedure.undo(&written.offsets, options.store));
-    procedure.keep(master, plan, &mut report)?;
+    procedure.keep(master, plan, &written, &mut report)?;
     Ok(report)
 }
 
@@ -193,12 +193,13 @@ impl<'a> Procedure<'a> {
             Err(error) if matches!(error.failure, SdoFailure::Cancelled) => return Err(unsure(error.into())),
             Err(error) => Some(error),
         };
-        let offsets = channel::offsets(master, device, channel).map_err(unsure)?;
         let after = samples::take(master, device, &channel.signal.name, count).map_err(unsure)?;
+        // Last, so that a device that has restarted meanwhile shows the offset of before.
+        let offsets = channel::offsets(master, device, channel).map_err(unsure)?;
         let shown_by = match error {
             None => None,
             Some(_) if self.moved(&offsets).is_some() => Some("the offset"),
-            Some(_) if self.came_to_zero(&after) => Some("the reading"),
+            Some(_) if self.shows_it(&after) && self.is_zero(&after) => Some("the reading"),
             Some(error) => {
                 let now = if self.offsets.is_empty() {
                     "no offset can be read here, and the reading has not come to zero"
@@ -228,8 +229,21 @@ impl<'a> Procedure<'a> {
         samples.mean().is_some_and(|mean| mean.abs() <= self.tolerance())
     }
 
-    fn came_to_zero(&self, after: &Samples) -> bool {
-        self.before.mean().is_some_and(|_| !self.is_zero(&self.before)) && self.is_zero(after)
+    /// Whether the reading shows that the signature acted: it has come nearer to zero than its unrest explains. Where
+    /// an offset is known to be moved, that alone counts.
+    fn shows_it(&self, after: &Samples) -> bool {
+        let means = self.before.mean().zip(after.mean()).filter(|_| !self.channel.is_described);
+        means.is_some_and(|(before, after)| after.abs() + self.before.spread() < before.abs())
+    }
+
+    /// Whether there was nothing to be moved: the reading was zero before, up to its unrest and the last digit of the
+    /// offset.
+    fn was_zero(&self) -> bool {
+        let digit = match self.offsets.first().map(|offset| offset.number) {
+            Some(Number::Decimal { digits, .. }) => 10f64.powi(-i32::from(digits)),
+            _ => 0.0,
+        };
+        self.before.mean().is_some_and(|before| before.abs() <= self.before.spread() + digit)
     }
 
     /// That the reading is zero now.
@@ -241,12 +255,14 @@ impl<'a> Procedure<'a> {
         if written.after.booted {
             return fail("it took the signature and restarted: a zero that was not stored is gone".to_owned());
         }
-        if self.is_zero(&written.after) {
+        let acted = self.moved(&written.offsets).is_some() || self.shows_it(&written.after) || self.was_zero();
+        if acted && self.is_zero(&written.after) {
             return Ok(());
         }
         let signal = &self.channel.signal.name;
         let reads = match written.after.mean() {
-            Some(mean) => format!("{signal} reads {} afterwards, which is not zero", self.show(mean)),
+            Some(mean) if acted => format!("{signal} reads {} afterwards, which is not zero", self.show(mean)),
+            Some(mean) => format!("nothing has changed: {signal} reads {}", self.show(mean)),
             None => format!("{signal} has no valid value afterwards"),
         };
         let offset = match self.moved(&written.offsets) {
@@ -257,20 +273,32 @@ impl<'a> Procedure<'a> {
         fail(format!("it took the signature, and {reads}; {offset}"))
     }
 
-    /// Stores, if that was asked for.
-    fn keep(&self, master: &mut Master<'_>, plan: Option<Plan>, report: &mut Zeroed) -> Result<(), Failure> {
+    /// Stores, if that was asked for, and looks whether what was stored is this zero: a device that restarts just
+    /// before stores the old one.
+    fn keep(
+        &self,
+        master: &mut Master<'_>,
+        plan: Option<Plan>,
+        written: &Written,
+        report: &mut Zeroed,
+    ) -> Result<(), Failure> {
+        let node = self.device.node;
         let Some(plan) = plan else {
-            let (node, group) = (self.device.node, self.group.as_str());
+            let group = self.group.as_str();
             report.notes.push(format!("not stored, gone with the power: cangauge store {node} --group {group}"));
             return Ok(());
         };
-        let done = store::carry_out(master, self.device, plan, false).map_err(|failure| {
-            let set = match report.shift() {
-                Some(shift) => format!("the zero was moved by {}", self.show(shift)),
-                None => "the zero was set".to_owned(),
-            };
-            failure.knowing(self.device.node, set)
-        })?;
+        let set = match report.shift() {
+            Some(shift) => format!("the zero was moved by {}", self.show(shift)),
+            None => "the zero was set".to_owned(),
+        };
+        let done = store::carry_out(master, self.device, plan, false).map_err(|failure| failure.knowing(node, &set))?;
+        let now = channel::offsets(master, self.device, &self.channel)
+            .map_err(|failure| failure.knowing(node, format!("{set}, and stored")))?;
+        if now != written.offsets {
+            let message = "the offset has changed since it was set: what was stored is not this zero";
+            return Err(Failure::of_node(Kind::Unexpected, node, message).hint(self.look()));
+        }
         report.stored = true;
         report.notes.push(format!("stored: {}", done.groups()));
         report.notes.extend(done.notes);

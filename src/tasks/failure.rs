@@ -2,9 +2,11 @@
 
 use crate::bus::BusError;
 use crate::canopen::id::NodeId;
+use crate::canopen::lss::Service;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
-use crate::master::{Error, SdoError, SdoFailure};
+use crate::master::{Error, LssError, SdoError, SdoFailure};
+use crate::measure::expression::ExpressionError;
 use std::fmt;
 
 /// The kinds of failure that scripts tell apart.
@@ -45,12 +47,30 @@ pub struct Failure {
     pub abort: Option<AbortCode>,
     /// What to type next.
     pub hint: Option<String>,
+    /// The place in what was typed.
+    pub place: Option<Place>,
+}
+
+/// A character of something that was typed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// What was typed.
+    pub text: String,
+    /// The characters before it.
+    pub before: String,
+}
+
+impl Place {
+    /// The character, counted from 1.
+    pub fn column(&self) -> usize {
+        self.before.chars().count() + 1
+    }
 }
 
 impl Failure {
     /// A failure that concerns no node in particular.
     pub fn new(kind: Kind, message: impl Into<String>) -> Failure {
-        Failure { kind, message: message.into(), node: None, object: None, abort: None, hint: None }
+        Failure { kind, message: message.into(), node: None, object: None, abort: None, hint: None, place: None }
     }
 
     /// A failure of one node.
@@ -108,10 +128,17 @@ impl From<SdoError> for Failure {
     }
 }
 
+impl From<ExpressionError> for Failure {
+    fn from(error: ExpressionError) -> Failure {
+        let place = Place { before: error.before().to_owned(), text: error.text };
+        Failure { hint: error.hint, place: Some(place), ..Failure::new(Kind::Usage, error.message) }
+    }
+}
+
 impl From<BusError> for Failure {
     fn from(error: BusError) -> Failure {
         let kind = match &error {
-            BusError::Io { what, .. } if what.contains("trace") => Kind::Io,
+            BusError::File { .. } => Kind::Io,
             _ => Kind::Bus,
         };
         let hint = match &error {
@@ -123,8 +150,9 @@ impl From<BusError> for Failure {
                 Some(format!("bring it up: sudo ip link set {name} up type can bitrate 250000 (the sensors' bit rate)"))
             }
             BusError::NoInterface(_) | BusError::NotCan(_) => {
-                Some("see what is there: ip -br link show type can; without hardware: --bus sim".to_owned())
+                Some("see what is there: cangauge bus list; without hardware: --bus sim".to_owned())
             }
+            BusError::ReceiveOnly(_) => Some("what listens only can do it: log, scan --passive, nmt watch".to_owned()),
             BusError::Unsupported(_) => Some("without it: --bus sim".to_owned()),
             _ => None,
         };
@@ -139,6 +167,54 @@ impl From<Error> for Failure {
             Error::Sdo(error) => error.into(),
             Error::Interrupted => Failure::new(Kind::Interrupted, "interrupted"),
         }
+    }
+}
+
+impl From<LssError> for Failure {
+    fn from(error: LssError) -> Failure {
+        const BY_NAME: &str = "name the one you mean, by its node-ID or as VENDOR:PRODUCT:REVISION:SERIAL, or connect \
+                               it alone";
+        let message = error.to_string();
+        let (kind, hint) = match error {
+            LssError::Master(error) => return error.into(),
+            LssError::Refused { service, .. } => (Kind::Refused, refusal_hint(service)),
+            LssError::NoAnswer { service, .. } => (Kind::NoAnswer, silence_hint(service)),
+            LssError::Several { service, .. } if changes(service) => (Kind::Unexpected, Some(BY_NAME)),
+            LssError::Several { .. } => (Kind::CheckFailed, Some(BY_NAME)),
+            LssError::Violation { .. } => (Kind::Unexpected, None),
+            LssError::Disturbed(_) => (Kind::Unexpected, Some("stop the other program, or try again")),
+            LssError::Fastscan(_) | LssError::Mistaken { .. } => {
+                (Kind::Unexpected, Some("connect one device without a node-ID after the other"))
+            }
+        };
+        Failure { hint: hint.map(str::to_owned), ..Failure::new(kind, message) }
+    }
+}
+
+/// Whether more than one slave that answers means that more than one has been changed.
+fn changes(service: Service) -> bool {
+    matches!(service, Service::ConfigureNodeId | Service::ConfigureBitTiming | Service::Store)
+}
+
+fn refusal_hint(service: Service) -> Option<&'static str> {
+    match service {
+        Service::ConfigureBitTiming => Some("the device's own table of bit rates is in its manual: --table-index N"),
+        Service::Store => Some("some devices store it through objects: --via sdo"),
+        _ => None,
+    }
+}
+
+fn silence_hint(service: Service) -> Option<&'static str> {
+    match service {
+        Service::SwitchSelective => Some(
+            "no slave has this address, or it knows no LSS in its present state: see who is there with \
+             cangauge lss scan, or stop it first: cangauge nmt stop NODE",
+        ),
+        Service::Store => Some("whether it stored is not known: read it again after power off and on"),
+        Service::Inquire(_) | Service::InquireNodeId => {
+            Some("not every device knows this service; its identity by SDO: cangauge scan")
+        }
+        _ => None,
     }
 }
 

@@ -83,7 +83,7 @@ fn plain(instrument: &Instrument, object: ObjectId, name: &str, number: usize) -
     }
 }
 
-fn find<'a>(instrument: &'a Instrument, name: &str) -> Result<&'a Signal, Failure> {
+pub(super) fn find<'a>(instrument: &'a Instrument, name: &str) -> Result<&'a Signal, Failure> {
     instrument.signals.iter().find(|signal| signal.name == name).ok_or_else(|| {
         let names: Vec<&str> = instrument.signals.iter().map(|signal| signal.name.as_str()).collect();
         let message = format!("it has no signal \"{name}\"");
@@ -165,7 +165,10 @@ pub fn read(
 }
 
 /// Every node's instrument; where one of them does not answer, each is asked for itself.
-fn surveyed(
+///
+/// # Errors
+/// What stops everything.
+pub(super) fn surveyed(
     master: &mut Master<'_>,
     nodes: &[NodeId],
     overrides: &Overrides,

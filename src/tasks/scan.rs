@@ -97,7 +97,7 @@ pub fn scan(
                 Happening::Link(false) => {
                     return Err(Error::Bus(crate::bus::BusError::Down(master.bus().name().to_owned())));
                 }
-                Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {}
+                Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) | Happening::Ended => {}
             }
         }
         master.forget(open.keys().copied());
@@ -160,8 +160,7 @@ pub fn listen(master: &mut Master<'_>, nodes: &[NodeId], length: Duration) -> Re
     loop {
         match master.next(until)? {
             Happening::Frame(received) => seen.take_any(&received),
-            Happening::Deadline => break,
-            Happening::Interrupted => break,
+            Happening::Deadline | Happening::Interrupted | Happening::Ended => break,
             Happening::Link(false) => {
                 return Err(Error::Bus(crate::bus::BusError::Down(master.bus().name().to_owned())));
             }
@@ -213,7 +212,11 @@ impl Seen {
                 Happening::Link(false) => {
                     return Err(Error::Bus(crate::bus::BusError::Down(master.bus().name().to_owned())));
                 }
-                Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {}
+                Happening::Sdo(..)
+                | Happening::Fault(..)
+                | Happening::Dropped(_)
+                | Happening::Link(true)
+                | Happening::Ended => {}
             }
         }
         Ok(())

@@ -7,6 +7,7 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::catalog::Model;
 use crate::device::description::SizeIndication;
 use crate::device::dictionary::Entry;
+use crate::device::nearest::distance;
 use crate::device::standard;
 use crate::master::transfer::{BlockMode, Moved, read_object};
 use crate::master::{Error, Master, Request, SdoError, SdoFailure};
@@ -134,22 +135,6 @@ pub(super) fn nearest(word: &str, known: impl Iterator<Item = String>) -> Vec<St
         .collect();
     near.sort();
     near.into_iter().take(3).map(|(_, name)| name).collect()
-}
-
-/// How many letters have to be changed, added or left out to get from one word to the other.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (at, letter) in a.chars().enumerate() {
-        let mut corner = at;
-        row[0] = at + 1;
-        for (column, other) in b.iter().enumerate() {
-            let kept = corner + usize::from(letter != *other);
-            corner = row[column + 1];
-            row[column + 1] = kept.min(corner + 1).min(row[column] + 1);
-        }
-    }
-    row.last().copied().unwrap_or(0)
 }
 
 /// Reads an object.

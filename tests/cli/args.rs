@@ -113,11 +113,13 @@ fn global_options_stand_before_and_after_the_command() {
 fn buses_that_are_none() {
     let bench = Bench::of(ALL);
     let run = |bus: &str| bench.finish(&mut bench.command(&["-b", bus, "scan"]));
-    run("foo:bar").refuses("\"foo:bar\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml)");
+    run("foo:bar")
+        .refuses("\"foo:bar\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE)");
     run("").refuses("\"\" is not a name of an interface");
     run("a-name-that-is-too-long").refuses("\"a-name-that-is-too-long\" is not a name of an interface");
     run("sim:mh4").refuses("\"mh4\" is not DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) and no file FILE.toml");
-    run("sim:mh5@5").refuses("there is no device \"mh5\" (mh4, d20, dps, mc1609, or FILE.toml)");
+    run("sim:mh5@5")
+        .refuses("there is no device \"mh5\" (mh4, d20, dps, mc1609, hydac-old, baumer, hydac, jumo, or FILE.toml)");
     run("sim:mh4@128").refuses("mh4@128: \"128\" is not a node-ID (1 to 127)");
     run("sim:none.toml").fails(8, "cangauge: none.toml: No such file or directory (os error 2)\n");
     std::fs::write(bench.path("bad.toml"), "clock = \"virtual\"\nsped = 1\n").expect("written");
@@ -128,7 +130,9 @@ fn buses_that_are_none() {
 #[test]
 fn simulated_devices_are_for_others() {
     Bench::of(ALL).run("sim mh4@5").refuses("nobody else can reach the simulated bus: it is inside this program");
-    Bench::of(ALL).run("sim mh5@5").refuses("there is no device \"mh5\" (mh4, d20, dps, mc1609, or FILE.toml)");
+    Bench::of(ALL)
+        .run("sim mh5@5")
+        .refuses("there is no device \"mh5\" (mh4, d20, dps, mc1609, hydac-old, baumer, hydac, jumo, or FILE.toml)");
 }
 
 #[test]

@@ -3,16 +3,21 @@
 
 mod args;
 mod autozero;
+mod bus;
+mod check;
 mod examples;
 mod log;
 mod log_end;
 mod log_file;
+mod lss;
 mod nmt;
 mod output;
 mod pdo;
 mod read;
+mod replay;
 mod scan;
 mod sdo;
+mod settings;
 mod store;
 
 use std::fs;

@@ -1,7 +1,7 @@
 //! A transmit queue that has no room: nothing is lost by it, and nobody is missed.
 
 use cangauge::bus::faults::{FaultPlan, Faulty};
-use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::bus::memory::{BIT_RATE, Clock, MemoryBus};
 use cangauge::bus::{Bus, Event};
 use cangauge::canopen::id::NodeId;
 use cangauge::master::{Error, Master, Timing};
@@ -14,7 +14,11 @@ const WAIT: Duration = Duration::from_millis(200);
 
 /// A bus with simulated devices on these nodes.
 fn bus(nodes: &[u8]) -> MemoryBus {
-    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus_at(BIT_RATE, nodes)
+}
+
+fn bus_at(bit_rate: u32, nodes: &[u8]) -> MemoryBus {
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(bit_rate);
     for (&node, model) in nodes.iter().zip(["mh4", "dps", "d20", "mc1609"].into_iter().cycle()) {
         let model = cangauge::device::catalog::by_name(model).unwrap();
         bus.attach(Device::new(Setup::new(model, NodeId::new(node).unwrap())).unwrap());
@@ -58,7 +62,7 @@ fn a_scan_finds_the_same_nodes_however_often_the_queue_is_full() {
 fn a_short_queue_of_a_slow_bus_is_waited_for() {
     let present: Vec<u8> = (1..=127).collect();
     for queue_length in [1, 2, 10] {
-        let mut slow = bus(&present).with_bit_rate(10_000).with_queue_length(queue_length);
+        let mut slow = bus_at(10_000, &present).with_queue_length(queue_length);
         // The boot-up messages of all of them take their time.
         let booted = slow.now().mono + Duration::from_secs(5);
         while slow.receive(booted).unwrap() != Event::Timeout {}

@@ -8,9 +8,13 @@
 //! ```
 #![cfg(target_os = "linux")]
 
+mod controller;
 mod frames;
 mod link;
 mod load;
+mod lss;
+mod program;
+mod virtual_interfaces;
 
 use cangauge::bus::socketcan::SocketCan;
 use cangauge::bus::{Bus, Event, Mono};

@@ -2,17 +2,21 @@
 //! people and virtual for tests, and stations on it. The simulated devices are such stations.
 
 mod clock;
+mod controller;
 mod station;
+mod wire;
 
 use super::time::{Mono, Stamp};
-use super::{Bus, BusError, Event, Filters, Received, TimestampSource};
+use super::{Bus, BusError, Event, Filters, Mode, TimestampSource};
 use crate::canopen::frame::Frame;
-use crate::canopen::wire_length::{INTERMISSION, bit_time, frame_bits, priority};
+use crate::canopen::wire_length::{INTERMISSION, bit_time};
 use clock::TimeLine;
 pub use clock::{Clock, Sleeper, Uninterrupted, VIRTUAL_EPOCH};
-pub use station::{Outbox, Station};
+use controller::Controller;
+pub use station::{Outbox, Station, Tuning};
 use std::any::Any;
 use std::collections::{BTreeSet, VecDeque};
+use wire::{Sender, Wire};
 
 /// How many frames of the program wait for the wire before [`BusError::QueueFull`]: Linux's default
 /// `txqueuelen` of a CAN interface.
@@ -26,18 +30,32 @@ pub const BIT_RATE: u32 = 250_000;
 /// The program is one of the participants. It gets what the others send and not its own frames, as on
 /// SocketCAN. Everything happens in [`Bus::receive`] and [`Bus::send`]; there is no thread. On the real clock
 /// what was due while the program did something else is made up for, each happening at its own time.
+///
+/// Every participant has a bit rate. A frame arrives if somebody at the sender's rate acknowledges it and
+/// nobody destroys it: who listens at another rate sees errors only and, until he is error-passive, destroys
+/// what he does not understand. Two frames with one identifier that begin together merge if they are the
+/// same and destroy each other if not. What failed is sent again. The program is told of every error on the
+/// wire, and of the state of its controller; after bus-off only [`Bus::set_bit_rate`] brings it back.
 pub struct MemoryBus {
     name: String,
     bit_rate: u32,
+    mode: Mode,
+    /// Bit rate and mode before the program changed them.
+    before: Option<(u32, Mode)>,
+    /// Whether the program may change the bit rate.
+    can_retime: bool,
     queue_length: usize,
     time_line: TimeLine,
     /// How far the bus has been played.
     now: Mono,
     places: Vec<Place>,
     queue: VecDeque<Frame>,
+    controller: Controller,
     inbox: VecDeque<Event>,
     filters: Filters,
     wire: Wire,
+    /// The bit rate of the last frame that arrived: that of stations which follow the others.
+    heard_rate: u32,
     interrupts: BTreeSet<Mono>,
     sleeper: Box<dyn Sleeper>,
 }
@@ -46,24 +64,7 @@ pub struct MemoryBus {
 struct Place {
     station: Box<dyn Station>,
     out: Outbox,
-}
-
-/// Who is sending.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sender {
-    Program,
-    Station(usize),
-}
-
-/// What the wire is doing.
-enum Wire {
-    /// Nothing until then (the pause after a frame); afterwards whoever wants may begin.
-    Free(Mono),
-    Busy {
-        sender: Sender,
-        frame: Frame,
-        complete: Mono,
-    },
+    controller: Controller,
 }
 
 impl MemoryBus {
@@ -72,14 +73,19 @@ impl MemoryBus {
         MemoryBus {
             name: "sim".to_owned(),
             bit_rate: BIT_RATE,
+            mode: Mode::Normal,
+            before: None,
+            can_retime: true,
             queue_length: QUEUE_LENGTH,
             time_line: TimeLine::open(clock),
             now: Mono::START,
             places: Vec::new(),
             queue: VecDeque::new(),
+            controller: Controller::default(),
             inbox: VecDeque::new(),
             filters: Filters::All,
             wire: Wire::Free(Mono::START),
+            heard_rate: BIT_RATE,
             interrupts: BTreeSet::new(),
             sleeper: Box::new(Uninterrupted),
         }
@@ -88,6 +94,13 @@ impl MemoryBus {
     /// The same bus at another bit rate, in bit/s.
     pub fn with_bit_rate(mut self, bit_rate: u32) -> MemoryBus {
         self.bit_rate = bit_rate.max(1);
+        self.heard_rate = self.bit_rate;
+        self
+    }
+
+    /// The same bus, whose bit rate the program may or may not change.
+    pub fn with_retiming(mut self, allowed: bool) -> MemoryBus {
+        self.can_retime = allowed;
         self
     }
 
@@ -105,9 +118,19 @@ impl MemoryBus {
 
     /// Connects a station and switches its power on.
     pub fn attach(&mut self, station: impl Station) {
-        let mut place = Place { station: Box::new(station), out: Outbox::default() };
+        let mut place = Place { station: Box::new(station), out: Outbox::default(), controller: Controller::default() };
+        place.station.told_bit_rate(self.bit_rate);
         place.station.power_on(self.now, &mut place.out);
         self.places.push(place);
+    }
+
+    /// Switches the power of every station off and on.
+    pub fn power_cycle(&mut self) {
+        for place in &mut self.places {
+            place.out.clear();
+            place.controller = Controller::default();
+            place.station.power_on(self.now, &mut place.out);
+        }
     }
 
     /// The stations of one kind, in the order in which they were attached.
@@ -134,23 +157,12 @@ impl MemoryBus {
     /// The next moment at which something happens by itself, not before the present one.
     fn next_happening(&self) -> Option<Mono> {
         let wire = match &self.wire {
-            Wire::Busy { complete, .. } => Some(*complete),
-            Wire::Free(from) => self.contender().map(|_| *from),
+            Wire::Busy(transmission) => Some(transmission.complete),
+            Wire::Free(from) => self.contenders().map(|(ready, ..)| ready.max(*from)).min(),
         };
         let wakes = self.places.iter().filter_map(|place| place.station.next_wake());
         let interrupt = self.interrupts.first().copied();
         wakes.chain(wire).chain(interrupt).min().map(|moment| moment.max(self.now))
-    }
-
-    /// Who wins the wire if it is free: the lowest identifier among the heads of all queues.
-    fn contender(&self) -> Option<Sender> {
-        let program = self.queue.front().map(|frame| (priority(frame), Sender::Program));
-        let stations = self
-            .places
-            .iter()
-            .enumerate()
-            .filter_map(|(index, place)| Some((priority(place.out.front()?), Sender::Station(index))));
-        program.into_iter().chain(stations).min_by_key(|(priority, _)| *priority).map(|(_, sender)| sender)
     }
 
     /// Plays everything that happens up to and including `limit`, at most until the program has something
@@ -165,12 +177,13 @@ impl MemoryBus {
         }
         // What is complete now is delivered before anybody who wakes now, and everybody who wakes now takes
         // part in the arbitration of now.
-        if let Wire::Busy { sender, frame, complete } = &self.wire
-            && *complete <= moment
+        if let Wire::Busy(transmission) = &self.wire
+            && transmission.complete <= moment
         {
-            let (sender, frame) = (*sender, *frame);
-            self.wire = Wire::Free(moment + bit_time(INTERMISSION, self.bit_rate));
-            self.deliver(sender, &frame);
+            let free = Wire::Free(moment + bit_time(INTERMISSION, transmission.bit_rate));
+            if let Wire::Busy(transmission) = std::mem::replace(&mut self.wire, free) {
+                self.conclude(&transmission);
+            }
             return true;
         }
         let mut woken = false;
@@ -184,33 +197,6 @@ impl MemoryBus {
             self.begin();
         }
         true
-    }
-
-    /// The winner of the arbitration begins to send.
-    fn begin(&mut self) {
-        let frame = match self.contender() {
-            Some(Sender::Program) => self.queue.pop_front().map(|frame| (Sender::Program, frame)),
-            Some(Sender::Station(index)) => self.places[index].out.pop().map(|frame| (Sender::Station(index), frame)),
-            None => None,
-        };
-        if let Some((sender, frame)) = frame {
-            let complete = self.now + bit_time(frame_bits(&frame), self.bit_rate);
-            self.wire = Wire::Busy { sender, frame, complete };
-        }
-    }
-
-    /// A frame is complete: everybody but its sender gets it, the sender learns that it is out.
-    fn deliver(&mut self, sender: Sender, frame: &Frame) {
-        if sender != Sender::Program && self.filters.wants(frame) {
-            self.inbox.push_back(Event::Frame(Received { frame: *frame, at: self.stamp(self.now) }));
-        }
-        for (index, place) in self.places.iter_mut().enumerate() {
-            if sender == Sender::Station(index) {
-                place.station.sent(self.now, frame);
-            } else {
-                place.station.receive(self.now, frame, &mut place.out);
-            }
-        }
     }
 
     /// On the real clock: plays what is due by now. Returns the host's time.
@@ -250,7 +236,41 @@ impl Bus for MemoryBus {
         Ok(())
     }
 
+    fn can_set_bit_rate(&self) -> Result<(), BusError> {
+        let what = || format!("change the bit rate of {}", self.name);
+        if self.can_retime { Ok(()) } else { Err(BusError::Permission(what())) }
+    }
+
+    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
+        self.can_set_bit_rate()?;
+        self.catch_up();
+        self.before.get_or_insert((self.bit_rate, self.mode));
+        self.queue.clear();
+        self.inbox.retain(|event| *event == Event::Interrupted);
+        if let Wire::Busy(transmission) = &mut self.wire {
+            transmission.senders.retain(|(sender, _)| *sender != Sender::Program);
+            if transmission.senders.is_empty() {
+                self.wire = Wire::Free(self.now);
+            }
+        }
+        self.controller = Controller::default();
+        self.bit_rate = bit_rate.max(1);
+        self.mode = mode;
+        self.places.iter_mut().for_each(|place| place.station.told_bit_rate(bit_rate));
+        Ok(())
+    }
+
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        let Some((bit_rate, mode)) = self.before else { return Ok(()) };
+        self.set_bit_rate(bit_rate, mode)?;
+        self.before = None;
+        Ok(())
+    }
+
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        if self.mode == Mode::ListenOnly {
+            return Err(BusError::ReceiveOnly(self.name.clone()));
+        }
         self.catch_up();
         if self.queue.len() >= self.queue_length {
             return Err(BusError::QueueFull);

@@ -25,6 +25,25 @@ pub trait Station: Any + Send {
 
     /// A frame from this station's outbox has left it and is complete on the wire.
     fn sent(&mut self, now: Mono, frame: &Frame);
+
+    /// At which bit rate it takes part.
+    fn tuning(&self) -> Tuning {
+        Tuning::Follows
+    }
+
+    /// The bit rate of the bus, in bit/s: before [`Station::power_on`], and whenever the program changes it.
+    fn told_bit_rate(&mut self, _bit_rate: u32) {}
+}
+
+/// At which bit rate a station takes part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tuning {
+    /// Whatever rate the others have.
+    Follows,
+    /// This one, in bit/s.
+    At(u32),
+    /// It takes no part: no power, or its controller is off.
+    Off,
 }
 
 /// Frames that a station wants to send, in order.
@@ -37,6 +56,11 @@ impl Outbox {
     /// Puts a frame behind those already waiting.
     pub fn send(&mut self, frame: Frame) {
         self.frames.push_back(frame);
+    }
+
+    /// Puts back a frame that has to be sent again.
+    pub(super) fn put_back(&mut self, frame: Frame) {
+        self.frames.push_front(frame);
     }
 
     /// The next frame to send, left in place.

@@ -7,16 +7,20 @@
 mod clocks;
 mod faults;
 mod interfaces;
+mod netlink;
 mod receive;
+mod setup;
 
 use super::interrupt::Interrupts;
-use super::{Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall, poll};
+use super::{Bus, BusError, Event, Filters, Mode, Mono, Received, Stamp, TimestampSource, Wall, poll};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 use clocks::Clocks;
 pub use interfaces::{Interface, interfaces};
+pub use netlink::{BitTiming, Link, State};
 use receive::{Batch, Message};
-use socketcan::{CanAddr, CanFrame, CanInterface, CanSocket, Socket, SocketOptions};
+pub use setup::{Change, bring_down, bring_up, link};
+use socketcan::{CanAddr, CanFrame, CanSocket, Socket, SocketOptions};
 use std::cell::Cell;
 use std::collections::{HashSet, VecDeque};
 use std::io;
@@ -58,6 +62,8 @@ pub struct SocketCan {
     timestamps: TimestampSource,
     /// Asked for once while the interface stays up: it costs some system calls.
     bit_rate: Cell<Option<Option<u32>>>,
+    /// The interface before its bit rate was set.
+    before: Option<Link>,
 }
 
 impl SocketCan {
@@ -66,8 +72,28 @@ impl SocketCan {
         SocketCan::open_filtered(name, &Filters::All)
     }
 
+    /// Opens the CAN interface `name`, which may be down: for setting its bit rate.
+    pub fn open_even_down(name: &str) -> Result<SocketCan, BusError> {
+        let mut bus = SocketCan::bound(name, &Filters::All)?;
+        match bus.socket.as_raw_socket().take_error() {
+            Ok(None) => {}
+            Ok(Some(error)) | Err(error) if error.raw_os_error() == Some(libc::ENETDOWN) => bus.up = false,
+            Ok(Some(error)) | Err(error) => return Err(bus.error("open", error)),
+        }
+        Ok(bus)
+    }
+
     /// Opens the CAN interface `name` with filters that hold from the first frame on.
     pub fn open_filtered(name: &str, filters: &Filters) -> Result<SocketCan, BusError> {
+        let bus = SocketCan::bound(name, filters)?;
+        // Binding to an interface that is down succeeds and leaves the error on the socket.
+        match bus.socket.as_raw_socket().take_error() {
+            Ok(Some(error)) | Err(error) => Err(bus.error("open", error)),
+            Ok(None) => Ok(bus),
+        }
+    }
+
+    fn bound(name: &str, filters: &Filters) -> Result<SocketCan, BusError> {
         let interrupts =
             Interrupts::new().map_err(|source| BusError::Io { what: "watch for signals".into(), source })?;
         let socket = new_socket()?;
@@ -99,6 +125,7 @@ impl SocketCan {
             wanted: None,
             timestamps,
             bit_rate: Cell::new(None),
+            before: None,
         };
         bus.listen(filters)?;
         let socket = bus.socket.as_raw_socket();
@@ -106,11 +133,7 @@ impl SocketCan {
             Some(libc::ENODEV) => BusError::NotCan(name.to_owned()),
             _ => failed("open", error),
         })?;
-        // Binding to an interface that is down succeeds and leaves the error on the socket.
-        match socket.take_error() {
-            Ok(Some(error)) | Err(error) => Err(bus.error("open", error)),
-            Ok(None) => Ok(bus),
-        }
+        Ok(bus)
     }
 
     fn error(&self, doing: &str, source: io::Error) -> BusError {
@@ -131,6 +154,24 @@ impl SocketCan {
             self.bit_rate.set(None);
             self.ready.push_back(Event::Link(up));
         }
+    }
+
+    /// Does `work` to the interface, which may take it down and up again: that is no news to the user of this
+    /// bus. What was received before goes when `work` calls for it, that nothing of it is taken for new.
+    fn reset<T>(&mut self, work: impl FnOnce(&str, &mut dyn FnMut()) -> Result<T, BusError>) -> Result<T, BusError> {
+        let (batch, ready, socket) = (&mut self.batch, &mut self.ready, self.socket.as_fd());
+        let result = work(&self.name, &mut || {
+            ready.clear();
+            // Frames until there are none, and the news that the interface is down, which comes once.
+            while batch.fill(socket, false).is_ok() {}
+            while batch.fill(socket, false).is_ok() {}
+        });
+        // No news either: that it went down once more, on the way back from a rate that it cannot do.
+        let _ = self.socket.as_raw_socket().take_error();
+        self.drained = false;
+        self.bit_rate.set(None);
+        self.up = interfaces::is_up(&self.name).unwrap_or(result.is_ok());
+        result
     }
 
     /// Reads what the kernel holds for this socket.
@@ -222,9 +263,7 @@ impl Bus for SocketCan {
 
     fn bit_rate(&self) -> Option<u32> {
         if self.bit_rate.get().is_none() {
-            let details = CanInterface::open(&self.name).and_then(|interface| interface.details());
-            let timing = details.ok().and_then(|details| details.can.bit_timing);
-            self.bit_rate.set(Some(timing.map(|timing| timing.bitrate).filter(|&rate| rate > 0)));
+            self.bit_rate.set(Some(netlink::get(&self.name).ok().and_then(|link| link.bit_rate())));
         }
         self.bit_rate.get().flatten()
     }
@@ -261,6 +300,23 @@ impl Bus for SocketCan {
         set.map_err(|error| self.error("set the filters of", error))?;
         self.wanted = ids.filter(|ids| ids.len() > MAX_FILTERS);
         Ok(())
+    }
+
+    fn can_set_bit_rate(&self) -> Result<(), BusError> {
+        setup::can_set_bit_rate(&self.name)
+    }
+
+    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
+        let now = setup::link(&self.name)?;
+        self.before.get_or_insert_with(|| now.clone());
+        self.reset(|name, while_down| setup::retime(name, &now, bit_rate, mode, while_down)).map(|_| ())
+    }
+
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        match self.before.take() {
+            Some(before) => self.reset(|name, while_down| setup::put_back(name, &before, while_down)),
+            None => Ok(()),
+        }
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {

@@ -9,6 +9,7 @@ use crate::sim::model::Overload;
 use std::sync::Arc;
 use std::sync::Mutex;
 
+mod lss;
 mod stored;
 mod tpdo;
 
@@ -44,7 +45,8 @@ fn hear(bus: &mut MemoryBus, until: Mono) -> Vec<String> {
     timed(bus, until).into_iter().map(|(_, frame)| frame).collect()
 }
 
-/// Every frame up to `until`, with the whole millisecond in which it was complete.
+/// Every frame up to `until`, with the whole millisecond in which it was complete. What goes wrong on the wire is
+/// not of interest.
 fn timed(bus: &mut MemoryBus, until: Mono) -> Vec<(u128, String)> {
     let mut heard = Vec::new();
     loop {
@@ -53,6 +55,7 @@ fn timed(bus: &mut MemoryBus, until: Mono) -> Vec<(u128, String)> {
                 heard.push((received.at.mono.since_start().as_millis(), received.frame.to_string()));
             }
             Event::Timeout => return heard,
+            Event::Fault(..) => {}
             other => panic!("{other:?}"),
         }
     }

@@ -48,7 +48,11 @@ impl Samples {
                 Happening::Deadline => return Ok(()),
                 Happening::Interrupted => return Err(Error::Interrupted),
                 Happening::Link(false) => return Err(Error::Bus(BusError::Down(master.bus().name().to_owned()))),
-                Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {}
+                Happening::Sdo(..)
+                | Happening::Fault(..)
+                | Happening::Dropped(_)
+                | Happening::Link(true)
+                | Happening::Ended => {}
             }
         }
     }

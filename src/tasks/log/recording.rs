@@ -10,10 +10,11 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::Life;
+use crate::device::quirk::Quirk;
 use crate::master::{Error, Happening, Master};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::instrument::Instrument;
-use crate::measure::sample::Sample;
+use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
@@ -49,6 +50,8 @@ pub(super) struct Recording {
     emergencies_of: BTreeMap<CanId, NodeId>,
     /// What the descriptions say of each emergency code.
     meanings: BTreeMap<(NodeId, u16), String>,
+    /// The last emergency of nodes that tell a pending one again and again ([`Quirk::EmergencyRepeats`]).
+    repeating: BTreeMap<NodeId, Option<Emergency>>,
     timestamps: TimestampSource,
     pub(super) rows: u64,
     first: Option<Mono>,
@@ -81,6 +84,11 @@ impl Recording {
                 .map(|&node| (node, Pulse::default()))
                 .collect(),
             meanings: instruments.iter().flat_map(meanings).collect(),
+            repeating: instruments
+                .iter()
+                .filter(|instrument| repeats(instrument))
+                .map(|instrument| (instrument.node, None))
+                .collect(),
             emergencies_of: instruments.iter().map(|instrument| (instrument.emergency, instrument.node)).collect(),
             timestamps,
             rows: 0,
@@ -147,7 +155,9 @@ impl Recording {
         let begin = master.now();
         self.end = begin;
         let stop = plan.duration.map(|duration| begin + duration);
-        let give_up = begin + plan.duration.unwrap_or(PATIENCE).min(PATIENCE);
+        // A recording may begin long before what is looked for in it, and it comes to an end.
+        let patience = if master.bus().is_live() { PATIENCE } else { Duration::MAX };
+        let give_up = begin + plan.duration.unwrap_or(patience).min(patience);
         let sync = match plan.mode {
             Mode::Sync(period) => Some((period, instruments.first().map_or(CanId::SYNC, |first| first.sync))),
             _ => None,
@@ -219,6 +229,7 @@ impl Recording {
                     observer.note(&Note::Link(up), master.bus().now());
                     ControlFlow::Continue(())
                 }
+                Happening::Ended => return Ok(()),
                 Happening::Interrupted => {
                     self.interrupted = true;
                     if self.rows == 0 {
@@ -258,6 +269,9 @@ impl Recording {
                 let frame = &received.frame;
                 if let (Some(&node), Some(emergency)) = (self.emergencies_of.get(&frame.id()), Emergency::parse(frame))
                 {
+                    if self.repeating.get_mut(&node).is_some_and(|last| last.replace(emergency) == Some(emergency)) {
+                        return ControlFlow::Continue(());
+                    }
                     self.emergencies += 1;
                     let meaning = self.meanings.get(&(node, emergency.code));
                     let meaning = meaning.map_or_else(|| Emergency::class(emergency.code), String::as_str);
@@ -340,10 +354,23 @@ impl Recording {
                 self.remarks.push(format!("node {node}: no measurements: {why}"));
             }
         }
+        // A unit or a mapping that was learned on the way replaces what was known before; what gave nothing
+        // under its old name is no source of its own.
+        let statistics: Vec<(Source, Statistics)> =
+            self.decoder.sources().iter().cloned().zip(self.statistics).collect();
+        let named_again = |at: usize, source: &Source| {
+            let others = statistics.iter().enumerate().filter(|&(other, _)| other > at);
+            others.into_iter().any(|(_, (other, _))| (other.node, &other.signal) == (source.node, &source.signal))
+        };
+        let kept = |(at, (source, statistics)): (usize, &(Source, Statistics))| {
+            let empty = statistics.count() == 0 && statistics.invalid() == 0;
+            (!(empty && named_again(at, source))).then(|| (source.clone(), statistics.clone()))
+        };
+        let statistics = statistics.iter().enumerate().filter_map(kept).collect();
         Outcome {
             rows: self.rows,
             length: self.first.map_or(Duration::ZERO, |first| self.end.since(first)),
-            statistics: self.decoder.sources().iter().cloned().zip(self.statistics).collect(),
+            statistics,
             lost,
             nothing,
             dropped: self.dropped,
@@ -373,6 +400,10 @@ fn next_slot(begin: Mono, now: Mono, period: Duration, slot: u64) -> u64 {
 /// How long a node may be silent: five of its usual intervals, at least a second.
 fn patience(pulse: &Pulse) -> Duration {
     (pulse.interval.unwrap_or_default() * 5).max(Duration::from_secs(1))
+}
+
+fn repeats(instrument: &Instrument) -> bool {
+    instrument.model.as_ref().is_some_and(|model| model.description.quirks.contains(&Quirk::EmergencyRepeats))
 }
 
 fn meanings(instrument: &Instrument) -> impl Iterator<Item = ((NodeId, u16), String)> {

@@ -92,7 +92,7 @@ pub fn watch(
                     },
                 )
             }
-            Happening::Interrupted => return Ok(()),
+            Happening::Interrupted | Happening::Ended => return Ok(()),
             Happening::Link(false) => {
                 return Err(Error::Bus(crate::bus::BusError::Down(master.bus().name().to_owned())));
             }

@@ -162,7 +162,7 @@ impl<'a, 'bus> Device<'a, 'bus> {
                     }
                     _ => {}
                 },
-                Happening::Deadline => return Ok(false),
+                Happening::Deadline | Happening::Ended => return Ok(false),
                 Happening::Interrupted => return Err(Error::Interrupted),
                 Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(_) => {}
             }

@@ -104,6 +104,7 @@ pub fn watch(
                     },
                 }
             }
+            Happening::Ended => return if came { Ok(()) } else { Err(nothing()) },
             Happening::Deadline if next == end => return if came { Ok(()) } else { Err(nothing()) },
             Happening::Deadline => {
                 next = end;

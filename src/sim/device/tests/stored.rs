@@ -62,7 +62,7 @@ fn a_node_id_with_its_signature_is_taken_at_the_reset_after_saving() {
         ],
     );
     assert_eq!(hear(&mut bus, ms(300)), ["703#00"]);
-    assert_eq!(device(&mut bus).node(), node(3));
+    assert_eq!(device(&mut bus).node(), Some(node(3)));
     play(
         &mut bus,
         &[
@@ -102,4 +102,67 @@ fn the_scaling_factor_counts() {
             ("605#2326610200000040", "585#8026610202000106"),
         ],
     );
+}
+
+/// What a reset brings, from the boot-up on.
+fn reset(bus: &mut MemoryBus, command: &str) -> Vec<String> {
+    ask(bus, command);
+    let until = bus.now().mono + Duration::from_millis(150);
+    hear(bus, until)
+}
+
+#[test]
+fn a_d20_stores_and_restores_as_pages_12_and_13_have_it() {
+    let mut bus = bus([still("d20", 1, 0.5)]);
+    play(
+        &mut bus,
+        &[
+            ("601#4010100100000000", "701#00 581#4210100101000000"),
+            ("601#4010100200000000", "581#8010100211000906"),
+            ("601#2217100064000000", "581#6017100000000000 701#7F"),
+            ("601#2210100165766173", "581#8010100120000008"),
+            ("601#2210100173617665", "581#6010100100000000"),
+            ("601#2217100000000000", "581#6017100000000000"),
+        ],
+    );
+    assert_eq!(reset(&mut bus, "000#8101"), ["701#00"]);
+    play(
+        &mut bus,
+        &[
+            ("601#4017100000000000", "581#4217100064000000"),
+            ("601#2211100173617665", "581#8011100120000008"),
+            ("601#221110016C6F6164", "581#6011100100000000"),
+            // "The default values are set valid after the device is reset."
+            ("601#4017100000000000", "581#4217100064000000"),
+        ],
+    );
+    assert_eq!(reset(&mut bus, "000#8101"), ["701#00"]);
+    play(&mut bus, &[("601#4017100000000000", "581#4217100000000000")]);
+}
+
+#[test]
+fn a_dps_zeroes_as_table_30_has_it_and_keeps_no_pdo_settings() {
+    let mut bus = bus([still("dps", 127, 0.5)]);
+    play(
+        &mut bus,
+        &[
+            ("67F#4030610100000000", "77F#00 5FF#42306101F4010000"),
+            ("67F#222561017A65726F", "5FF#6025610100000000"),
+            ("67F#4030610100000000", "5FF#4230610100000000"),
+            ("67F#4024610100000000", "5FF#422461010CFEFFFF"),
+            ("67F#22001805E8030000", "5FF#6000180500000000"),
+            ("67F#2210100173617665", "5FF#6010100100000000"),
+        ],
+    );
+    assert_eq!(reset(&mut bus, "000#817F"), ["77F#00"]);
+    play(
+        &mut bus,
+        &[
+            ("67F#4030610100000000", "5FF#4230610100000000"),
+            ("67F#4000180500000000", "5FF#4200180564000000"),
+            ("67F#221110016C6F6164", "5FF#6011100100000000"),
+        ],
+    );
+    assert_eq!(reset(&mut bus, "000#817F"), ["77F#00"]);
+    play(&mut bus, &[("67F#4030610100000000", "5FF#42306101F4010000")]);
 }

@@ -1,0 +1,210 @@
+//! Bit rates: who understands whom, and what those see who do not.
+
+use super::*;
+use crate::bus::{Fault, Mode};
+
+fn seconds(seconds: u64) -> Mono {
+    Mono::at(Duration::from_secs(seconds))
+}
+
+/// A script at a bit rate of its own.
+struct Tuned {
+    script: Script,
+    tuning: Tuning,
+    told: Vec<u32>,
+}
+
+impl Station for Tuned {
+    fn power_on(&mut self, now: Mono, out: &mut Outbox) {
+        self.script.power_on(now, out);
+    }
+
+    fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
+        self.script.receive(now, frame, out);
+    }
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        self.script.wake(now, out);
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.script.next_wake()
+    }
+
+    fn sent(&mut self, now: Mono, frame: &Frame) {
+        self.script.sent(now, frame);
+    }
+
+    fn tuning(&self) -> Tuning {
+        self.tuning
+    }
+
+    fn told_bit_rate(&mut self, bit_rate: u32) {
+        self.told.push(bit_rate);
+    }
+}
+
+fn tuned(tuning: Tuning, frames: &[(u64, &str)]) -> Tuned {
+    Tuned { script: script(frames), tuning, told: Vec::new() }
+}
+
+fn bus(stations: impl IntoIterator<Item = Tuned>) -> MemoryBus {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    stations.into_iter().for_each(|station| bus.attach(station));
+    bus
+}
+
+/// Frames and faults up to `until`, each with how often it came in a row.
+fn seen(bus: &mut MemoryBus, until: Mono) -> Vec<(String, u32)> {
+    let mut seen: Vec<(String, u32)> = Vec::new();
+    loop {
+        let text = match bus.receive(until).expect("a memory bus never fails") {
+            Event::Frame(received) => received.frame.to_string(),
+            Event::Fault(fault, _) => format!("{fault:?}"),
+            Event::Timeout => return seen,
+            other => panic!("{other:?}"),
+        };
+        match seen.last_mut() {
+            Some((last, times)) if *last == text => *times += 1,
+            _ => seen.push((text, 1)),
+        }
+    }
+}
+
+fn received(bus: &MemoryBus, index: usize) -> usize {
+    bus.stations::<Tuned>().nth(index).map_or(0, |station| station.script.received.len())
+}
+
+fn own(text: &str, times: u32) -> (String, u32) {
+    (text.to_owned(), times)
+}
+
+#[test]
+fn nobody_acknowledges() {
+    // No station, one without power, and one that only could if it were there.
+    for stations in [vec![], vec![tuned(Tuning::Off, &[(10, "701#00")])]] {
+        let mut bus = bus(stations);
+        bus.send(&frame("080#")).expect("room");
+        let events = seen(&mut bus, us(100_000));
+        assert_eq!(
+            events[..4],
+            [own("NoAcknowledge", 12), own("ErrorWarning", 1), own("NoAcknowledge", 4), own("ErrorPassive", 1)]
+        );
+        // It goes on for ever, but no further.
+        assert_eq!(events.len(), 5);
+        assert_eq!(events[4].0, "NoAcknowledge");
+        (0..QUEUE_LENGTH).for_each(|_| _ = bus.send(&frame("080#")));
+        assert!(matches!(bus.send(&frame("080#")), Err(BusError::QueueFull)));
+        // As soon as somebody is there, everything gets out.
+        bus.attach(tuned(Tuning::At(BIT_RATE), &[]));
+        seen(&mut bus, seconds(1));
+        assert_eq!(received(&bus, bus.stations::<Tuned>().count() - 1), QUEUE_LENGTH);
+    }
+}
+
+#[test]
+fn a_device_at_another_rate_is_deaf_and_takes_the_program_off_the_bus() {
+    let mut bus = bus([tuned(Tuning::At(125_000), &[])]);
+    bus.send(&frame("080#")).expect("room");
+    let events = seen(&mut bus, seconds(1));
+    assert_eq!(
+        events,
+        [
+            own("Protocol", 12),
+            own("ErrorWarning", 1),
+            own("Protocol", 4),
+            own("ErrorPassive", 1),
+            own("Protocol", 16),
+            own("BusOff", 1)
+        ]
+    );
+    assert_eq!(received(&bus, 0), 0);
+    // Off is off, whatever else is there, until the interface is set up anew.
+    bus.attach(tuned(Tuning::At(BIT_RATE), &[(2_000_000, "701#00")]));
+    assert_eq!(seen(&mut bus, seconds(3)), []);
+    bus.stations_mut::<Tuned>().skip(1).for_each(|station| station.tuning = Tuning::Off);
+    bus.set_bit_rate(125_000, Mode::Normal).expect("allowed");
+    bus.send(&frame("081#")).expect("room");
+    seen(&mut bus, seconds(4));
+    assert_eq!((received(&bus, 0), bus.bit_rate()), (1, Some(125_000)));
+    assert_eq!(bus.stations::<Tuned>().next().map(|station| station.told.clone()), Some(vec![250_000, 125_000]));
+}
+
+#[test]
+fn a_device_at_another_rate_is_mute_and_disturbs_the_others() {
+    let mut bus =
+        bus([tuned(Tuning::At(125_000), &[(0, "701#00")]), tuned(Tuning::At(BIT_RATE), &[(1_000_000, "702#00")])]);
+    let events = seen(&mut bus, us(900_000));
+    assert_eq!(events, [own("Protocol", 32)], "until the one that is alone with its rate is bus-off");
+    assert_eq!(received(&bus, 1), 0);
+    // What the other one sends does not arrive either.
+    assert_eq!(seen(&mut bus, seconds(2)), [own("Protocol", 32)]);
+    // Nobody disturbs the others for ever: who hears 128 errors is error-passive, and frames get through.
+    for round in 0..4 {
+        bus.set_bit_rate(BIT_RATE, Mode::Normal).expect("allowed");
+        bus.send(&frame("080#")).expect("room");
+        let until = bus.now().mono + Duration::from_secs(1);
+        let is_off = seen(&mut bus, until).contains(&own("BusOff", 1));
+        assert_eq!((is_off, received(&bus, 1)), (round < 3, usize::from(round == 3)), "round {round}");
+    }
+}
+
+#[test]
+fn those_of_one_rate_understand_each_other_and_a_listener_disturbs_nobody() {
+    let mut bus = bus([
+        tuned(Tuning::At(125_000), &[(0, "701#00"), (500_000, "702#00"), (1_500_000, "703#00")]),
+        tuned(Tuning::At(125_000), &[]),
+    ]);
+    bus.set_bit_rate(500_000, Mode::ListenOnly).expect("allowed");
+    assert!(matches!(bus.send(&frame("080#")), Err(BusError::ReceiveOnly(_))));
+    assert_eq!(seen(&mut bus, us(400_000)), [own("Protocol", 1)]);
+    assert_eq!(received(&bus, 1), 1);
+    bus.set_bit_rate(125_000, Mode::ListenOnly).expect("allowed");
+    assert_eq!(seen(&mut bus, seconds(1)), [own("702#00", 1)]);
+    // As a participant at the wrong rate it would.
+    bus.set_bit_rate(500_000, Mode::Normal).expect("allowed");
+    assert_eq!(seen(&mut bus, seconds(2)), [own("Protocol", 32)]);
+}
+
+#[test]
+fn of_a_single_sender_a_listener_hears_nothing_valid() {
+    let mut bus = bus([tuned(Tuning::At(125_000), &[(0, "701#00")])]);
+    bus.set_bit_rate(125_000, Mode::ListenOnly).expect("allowed");
+    let events = seen(&mut bus, us(100_000));
+    assert!(events.iter().all(|(text, _)| text != "701#00") && events[0].0 == "Protocol", "{events:?}");
+    // It still tries; somebody who acknowledges gets it.
+    bus.set_bit_rate(125_000, Mode::Normal).expect("allowed");
+    assert_eq!(seen(&mut bus, seconds(1)), [own("701#00", 1)]);
+}
+
+#[test]
+fn stations_that_follow_hear_everybody() {
+    let mut bus = bus([tuned(Tuning::Follows, &[(500_000, "701#00")]), tuned(Tuning::At(125_000), &[])]);
+    bus.set_bit_rate(125_000, Mode::Normal).expect("allowed");
+    bus.send(&frame("080#")).expect("room");
+    assert_eq!(seen(&mut bus, seconds(1)), [own("701#00", 1)]);
+    assert_eq!((received(&bus, 0), received(&bus, 1)), (1, 2));
+}
+
+#[test]
+fn who_begins_together_with_the_same_merges_and_with_another_collides() {
+    let mut bus = bus([
+        tuned(Tuning::Follows, &[(0, "7E4#44"), (1000, "585#01"), (500_000, "181#")]),
+        tuned(Tuning::Follows, &[(0, "7E4#44"), (1000, "585#02")]),
+    ]);
+    let events = seen(&mut bus, us(400_000));
+    let frames: Vec<&(String, u32)> = events.iter().filter(|(text, _)| text.contains('#')).collect();
+    assert_eq!(frames, [&own("7E4#44", 1), &own("585#01", 1), &own("585#02", 1)], "{events:?}");
+    assert_eq!(events[1], own("Protocol", 16), "as long as both are error-active");
+    let sent = bus.stations::<Tuned>().map(|station| station.script.sent.len());
+    assert_eq!(sent.collect::<Vec<_>>(), [2, 2]);
+}
+
+#[test]
+fn the_bit_rate_can_be_out_of_reach() {
+    let mut bus = MemoryBus::new(Clock::Virtual).with_retiming(false);
+    assert!(matches!(bus.can_set_bit_rate(), Err(BusError::Permission(_))));
+    assert!(matches!(bus.set_bit_rate(125_000, Mode::Normal), Err(BusError::Permission(_))));
+    assert_eq!(bus.bit_rate(), Some(BIT_RATE));
+    assert_eq!(Fault::NoAcknowledge.to_string(), "no acknowledge: nobody else is listening at this bit rate");
+}

@@ -1,0 +1,209 @@
+//! The wire: arbitration, acknowledge, errors, and who understands whom.
+
+use super::controller::{Controller, Level, Outcome, PASSIVE_PAUSE};
+use super::station::Tuning;
+use super::{MemoryBus, Place};
+use crate::bus::time::Mono;
+use crate::bus::{Event, Fault, Mode, Received};
+use crate::canopen::frame::Frame;
+use crate::canopen::wire_length::{bit_time, frame_bits, priority};
+
+/// Who is sending.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sender {
+    Program,
+    Station(usize),
+}
+
+/// What the wire is doing.
+pub(super) enum Wire {
+    /// Nothing until then (the pause after a frame); afterwards whoever wants may begin.
+    Free(Mono),
+    Busy(Transmission),
+}
+
+/// A frame on the wire, or several that collide.
+pub(super) struct Transmission {
+    /// Each with its frame; the frames are the same unless they collide.
+    pub(super) senders: Vec<(Sender, Frame)>,
+    pub(super) bit_rate: u32,
+    pub(super) complete: Mono,
+}
+
+impl Transmission {
+    /// Whether two senders send something different at the same time.
+    fn collides(&self) -> bool {
+        self.senders.windows(2).any(|pair| pair[0].1 != pair[1].1)
+    }
+
+    fn has(&self, sender: Sender) -> bool {
+        self.senders.iter().any(|(one, _)| *one == sender)
+    }
+}
+
+impl MemoryBus {
+    /// Everybody who wants to send, from when on, and what.
+    pub(super) fn contenders(&self) -> impl Iterator<Item = (Mono, Sender, Frame)> {
+        let ready = |controller: &Controller| controller.waits_until.unwrap_or(Mono::START);
+        let is_out = self.mode == Mode::ListenOnly || self.controller.level() == Level::Off;
+        let program = self.queue.front().filter(|_| !is_out);
+        let program = program.map(|frame| (ready(&self.controller), Sender::Program, *frame));
+        let stations = self.places.iter().enumerate().filter(|(_, place)| place.station.tuning() != Tuning::Off);
+        let stations = stations.filter_map(move |(index, place)| {
+            Some((ready(&place.controller), Sender::Station(index), *place.out.front()?))
+        });
+        program.into_iter().chain(stations)
+    }
+
+    /// The bit rate at which somebody sends.
+    fn rate_of(&self, sender: Sender) -> u32 {
+        match sender {
+            Sender::Program => self.bit_rate,
+            Sender::Station(index) => match self.places[index].station.tuning() {
+                Tuning::At(rate) => rate.max(1),
+                Tuning::Follows | Tuning::Off => self.heard_rate,
+            },
+        }
+    }
+
+    /// The winners of the arbitration begin to send: the lowest identifier among the heads of all queues, and
+    /// whoever begins with the same one at the same bit rate.
+    pub(super) fn begin(&mut self) {
+        let now = self.now;
+        let ready: Vec<(Sender, Frame)> =
+            self.contenders().filter(|(from, ..)| *from <= now).map(|(_, sender, frame)| (sender, frame)).collect();
+        let Some((first, frame)) = ready.iter().min_by_key(|(_, frame)| priority(frame)).copied() else { return };
+        let bit_rate = self.rate_of(first);
+        let (wanted, mut senders) = (priority(&frame), ready);
+        senders.retain(|(sender, frame)| priority(frame) == wanted && self.rate_of(*sender) == bit_rate);
+        for (sender, _) in &senders {
+            match sender {
+                Sender::Program => self.queue.pop_front(),
+                Sender::Station(index) => self.places[*index].out.pop(),
+            };
+        }
+        let bits = senders.iter().map(|(_, frame)| frame_bits(frame)).max().unwrap_or_default();
+        self.wire = Wire::Busy(Transmission { senders, bit_rate, complete: now + bit_time(bits, bit_rate) });
+    }
+
+    /// A frame is complete, or what was to be one.
+    pub(super) fn conclude(&mut self, transmission: &Transmission) {
+        let bit_rate = transmission.bit_rate;
+        let is_listening = |place: &Place| match place.station.tuning() {
+            Tuning::Follows => Some(true),
+            Tuning::At(rate) => Some(rate == bit_rate),
+            Tuning::Off => None,
+        };
+        // Of everybody who does not send: whether he listens at this bit rate, and who would destroy it.
+        let hearing: Vec<Option<bool>> = self
+            .places
+            .iter()
+            .enumerate()
+            .map(|(index, place)| is_listening(place).filter(|_| !transmission.has(Sender::Station(index))))
+            .collect();
+        let takes_part = self.mode == Mode::Normal && self.controller.level() < Level::Off;
+        let program = (!transmission.has(Sender::Program)).then_some(self.bit_rate == bit_rate);
+        let acknowledged = program == Some(true) && takes_part || hearing.contains(&Some(true));
+        let disturbed = transmission.collides()
+            || program == Some(false) && takes_part && self.controller.disturbs()
+            || self
+                .places
+                .iter()
+                .zip(&hearing)
+                .any(|(place, hears)| *hears == Some(false) && place.controller.disturbs());
+        let outcome = match (acknowledged, disturbed) {
+            (_, true) => Outcome::Disturbed,
+            (false, false) => Outcome::Unacknowledged,
+            (true, false) => Outcome::Delivered,
+        };
+        let before = self.controller.level();
+        match program {
+            Some(true) if outcome == Outcome::Delivered => self.controller.received(true),
+            Some(_) if before < Level::Off => self.program_error(Fault::Protocol, |one| one.received(false)),
+            None if outcome == Outcome::Unacknowledged => {
+                self.program_error(Fault::NoAcknowledge, |one| one.transmitted(outcome));
+            }
+            None if outcome == Outcome::Disturbed => {
+                self.program_error(Fault::Protocol, |one| one.transmitted(outcome));
+            }
+            Some(_) => {}
+            None => self.controller.transmitted(outcome),
+        }
+        let after = self.controller.level();
+        if after != before {
+            self.inbox.push_back(Event::Fault(after.fault(), self.stamp(self.now)));
+        }
+        for (place, hears) in self.places.iter_mut().zip(&hearing) {
+            if let Some(hears) = hears {
+                place.controller.received(*hears && outcome == Outcome::Delivered);
+            }
+        }
+        if outcome == Outcome::Delivered {
+            self.heard_rate = bit_rate;
+            self.deliver(transmission, &hearing);
+        } else {
+            self.take_back(transmission, outcome);
+        }
+    }
+
+    /// The program's controller reports an error and counts it.
+    fn program_error(&mut self, fault: Fault, count: impl FnOnce(&mut Controller)) {
+        self.inbox.push_back(Event::Fault(fault, self.stamp(self.now)));
+        count(&mut self.controller);
+    }
+
+    /// Everybody who listens gets the frame, and who sent it learns that it is out.
+    fn deliver(&mut self, transmission: &Transmission, hearing: &[Option<bool>]) {
+        let Some((_, frame)) = transmission.senders.first() else { return };
+        let is_heard = transmission.bit_rate == self.bit_rate && !transmission.has(Sender::Program);
+        if is_heard && self.filters.wants(frame) {
+            self.inbox.push_back(Event::Frame(Received { frame: *frame, at: self.stamp(self.now) }));
+        }
+        for (sender, _) in &transmission.senders {
+            let controller = match sender {
+                Sender::Program => &mut self.controller,
+                Sender::Station(index) => &mut self.places[*index].controller,
+            };
+            controller.waits_until = None;
+        }
+        for (index, (place, hears)) in self.places.iter_mut().zip(hearing).enumerate() {
+            if transmission.has(Sender::Station(index)) {
+                place.controller.transmitted(Outcome::Delivered);
+                place.station.sent(self.now, frame);
+            } else if *hears == Some(true) {
+                place.station.receive(self.now, frame, &mut place.out);
+            }
+        }
+    }
+
+    /// A frame that failed is sent again, by an error-passive sender after a pause. Not all pauses are alike, or
+    /// two that collide would collide for ever. A station that is bus-off forgets what it had to send.
+    fn take_back(&mut self, transmission: &Transmission, outcome: Outcome) {
+        for (sender, frame) in &transmission.senders {
+            match *sender {
+                Sender::Program => {
+                    self.queue.push_front(*frame);
+                    let is_passive = self.controller.level() >= Level::Passive;
+                    self.controller.waits_until = is_passive.then(|| self.now + PASSIVE_PAUSE);
+                }
+                Sender::Station(index) => {
+                    let place = &mut self.places[index];
+                    place.controller.transmitted(outcome);
+                    place.out.put_back(*frame);
+                    let turn = u32::try_from(index + 1).unwrap_or_default();
+                    match place.controller.level() {
+                        Level::Active | Level::Warning => place.controller.waits_until = None,
+                        Level::Passive => {
+                            let pause = PASSIVE_PAUSE + PASSIVE_PAUSE / 10 * turn;
+                            place.controller.waits_until = Some(self.now + pause);
+                        }
+                        Level::Off => {
+                            place.out.clear();
+                            place.controller.switch_off(self.now, transmission.bit_rate);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! The bytes of rtnetlink: a header, a fixed part, attributes. As in linux/netlink.h and linux/rtnetlink.h,
+//! in the byte order of the machine. Reading is total: what does not fit is not there.
+
+/// `NLMSG_ERROR`: an acknowledge (0) or an error.
+const ERROR: u16 = 2;
+/// `RTM_NEWLINK`: an interface as it is, or as it is to be.
+const NEW_LINK: u16 = 16;
+/// `RTM_GETLINK`.
+const GET_LINK: u16 = 18;
+/// `NLM_F_REQUEST`.
+const REQUEST: u16 = 1;
+/// `NLM_F_ACK`: an acknowledge is wanted.
+const ACK: u16 = 4;
+/// `NLM_F_CAPPED`: an error does not repeat the request beyond its header.
+const CAPPED: u16 = 0x100;
+/// `NLM_F_ACK_TLVS`: attributes follow an error.
+const EXPLAINED: u16 = 0x200;
+/// `NLMSGERR_ATTR_MSG`: the kernel's words.
+const WORDS: u16 = 1;
+/// `IFLA_IFNAME`.
+const NAME: u16 = 3;
+/// The flag bits of an attribute's type: nested, network byte order.
+const KIND: u16 = 0x3fff;
+/// The length of `nlmsghdr`, and by chance that of `ifinfomsg`.
+const HEADER: usize = 16;
+
+/// A request under construction.
+#[derive(Debug)]
+pub(super) struct Request(Vec<u8>);
+
+impl Request {
+    /// Asks for one interface by its name.
+    pub(super) fn get(name: &str) -> Request {
+        let mut request = Request::new(GET_LINK, REQUEST, 0, 0, 0);
+        request.attribute(NAME, &[name.as_bytes(), &[0]].concat());
+        request
+    }
+
+    /// Changes the interface with this index: of its flags those in `change`, and what attributes say.
+    pub(super) fn set(index: i32, flags: u32, change: u32) -> Request {
+        Request::new(NEW_LINK, REQUEST | ACK, index, flags, change)
+    }
+
+    fn new(kind: u16, how: u16, index: i32, flags: u32, change: u32) -> Request {
+        // Length, sequence number and port are filled in later, the latter by the kernel.
+        let mut bytes = vec![0; HEADER];
+        bytes[4..6].copy_from_slice(&kind.to_ne_bytes());
+        bytes[6..8].copy_from_slice(&how.to_ne_bytes());
+        // Address family and hardware type: any.
+        bytes.extend_from_slice(&[0; 4]);
+        bytes.extend_from_slice(&index.to_ne_bytes());
+        bytes.extend_from_slice(&flags.to_ne_bytes());
+        bytes.extend_from_slice(&change.to_ne_bytes());
+        Request(bytes)
+    }
+
+    /// Adds an attribute.
+    pub(super) fn attribute(&mut self, kind: u16, data: &[u8]) {
+        self.nest(kind, |request| request.0.extend_from_slice(data));
+    }
+
+    /// Adds an attribute that consists of attributes.
+    pub(super) fn nest(&mut self, kind: u16, fill: impl FnOnce(&mut Request)) {
+        let start = self.0.len();
+        self.0.extend_from_slice(&[0, 0]);
+        self.0.extend_from_slice(&kind.to_ne_bytes());
+        fill(self);
+        // Requests are built here and are short.
+        let length = u16::try_from(self.0.len() - start).unwrap_or(u16::MAX);
+        self.0[start..start + 2].copy_from_slice(&length.to_ne_bytes());
+        self.0.resize(self.0.len().next_multiple_of(4), 0);
+    }
+
+    /// The bytes to send.
+    pub(super) fn finish(mut self, sequence: u32) -> Vec<u8> {
+        let length = u32::try_from(self.0.len()).unwrap_or(u32::MAX);
+        self.0[..4].copy_from_slice(&length.to_ne_bytes());
+        self.0[8..12].copy_from_slice(&sequence.to_ne_bytes());
+        self.0
+    }
+}
+
+/// What the kernel answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reply<'a> {
+    /// Done.
+    Done,
+    /// Not done: the error number, and the kernel's words where it has any.
+    Refused(i32, Option<&'a str>),
+    /// An interface.
+    Link(Header, Attributes<'a>),
+}
+
+/// The fixed part of the description of an interface: `ifinfomsg`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Header {
+    /// `ARPHRD_…`: what kind of hardware it is.
+    pub(super) hardware: u16,
+    /// The number by which the kernel knows it.
+    pub(super) index: i32,
+    /// `IFF_…`.
+    pub(super) flags: u32,
+}
+
+/// The reply with this sequence number in what was received. Nothing where there is none.
+pub(super) fn reply(mut bytes: &[u8], sequence: u32) -> Option<Reply<'_>> {
+    while let Some(header) = bytes.first_chunk::<HEADER>() {
+        let length = usize::try_from(u32_at(header, 0)?).ok()?;
+        let body = bytes.get(HEADER..length)?;
+        let (kind, how) = (u16_at(header, 4)?, u16_at(header, 6)?);
+        if u32_at(header, 8)? == sequence {
+            match kind {
+                ERROR => return refusal(body, how),
+                NEW_LINK => {
+                    let index = i32::from_ne_bytes(*body.get(4..)?.first_chunk()?);
+                    let header = Header { hardware: u16_at(body, 2)?, index, flags: u32_at(body, 8)? };
+                    return Some(Reply::Link(header, Attributes(body.get(HEADER..)?)));
+                }
+                _ => {}
+            }
+        }
+        bytes = bytes.get(length.next_multiple_of(4)..).unwrap_or_default();
+    }
+    None
+}
+
+/// An error message: a negative error number, the header of the request or all of it, the kernel's words.
+fn refusal(body: &[u8], how: u16) -> Option<Reply<'_>> {
+    let code = i32::from_ne_bytes(*body.first_chunk()?);
+    if code == 0 {
+        return Some(Reply::Done);
+    }
+    let repeated = if how & CAPPED == 0 { usize::try_from(u32_at(body, 4)?).ok()?.next_multiple_of(4) } else { HEADER };
+    let attributes = body.get(repeated.saturating_add(4)..).filter(|_| how & EXPLAINED != 0);
+    let words = attributes.and_then(|attributes| Attributes(attributes).text(WORDS));
+    Some(Reply::Refused(code.saturating_neg(), words))
+}
+
+/// Attributes one after the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Attributes<'a>(pub(super) &'a [u8]);
+
+impl<'a> Attributes<'a> {
+    /// The data of the first attribute of this kind.
+    pub(super) fn get(self, kind: u16) -> Option<&'a [u8]> {
+        self.into_iter().find(|(found, _)| *found == kind).map(|(_, data)| data)
+    }
+
+    /// The attributes inside an attribute.
+    pub(super) fn nested(self, kind: u16) -> Option<Attributes<'a>> {
+        self.get(kind).map(Attributes)
+    }
+
+    /// An attribute that is a text, without the zero at its end.
+    pub(super) fn text(self, kind: u16) -> Option<&'a str> {
+        let data = self.get(kind)?;
+        let text = data.split(|&byte| byte == 0).next().unwrap_or(data);
+        std::str::from_utf8(text).ok()
+    }
+
+    /// The number at the beginning of an attribute.
+    pub(super) fn u32(self, kind: u16) -> Option<u32> {
+        u32_at(self.get(kind)?, 0)
+    }
+}
+
+impl<'a> Iterator for Attributes<'a> {
+    type Item = (u16, &'a [u8]);
+
+    fn next(&mut self) -> Option<(u16, &'a [u8])> {
+        let (length, kind) = (u16_at(self.0, 0)?, u16_at(self.0, 2)?);
+        let data = self.0.get(4..usize::from(length))?;
+        self.0 = self.0.get(usize::from(length).next_multiple_of(4)..).unwrap_or_default();
+        Some((kind & KIND, data))
+    }
+}
+
+/// The number at this place.
+pub(super) fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
+    Some(u32::from_ne_bytes(*bytes.get(at..)?.first_chunk()?))
+}
+
+/// The number at this place.
+pub(super) fn u16_at(bytes: &[u8], at: usize) -> Option<u16> {
+    Some(u16::from_ne_bytes(*bytes.get(at..)?.first_chunk()?))
+}

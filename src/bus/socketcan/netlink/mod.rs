@@ -1,0 +1,130 @@
+//! Asks the kernel about CAN interfaces and sets them: the little of rtnetlink that this takes.
+//!
+//! The setters of the `socketcan` crate lose the kernel's error number, and its words.
+
+mod link;
+mod message;
+#[cfg(test)]
+mod tests;
+
+use super::super::BusError;
+pub use link::{BitTiming, Link, State};
+use message::{Reply, Request};
+use socketcan::SocketOptions;
+use std::io::{self, Read};
+use std::os::fd::{AsRawFd, RawFd};
+use std::time::Duration;
+
+/// `SOL_NETLINK`, `NETLINK_CAP_ACK` and `NETLINK_EXT_ACK`: errors without the request, and with words.
+const LEVEL: i32 = 270;
+const CAPPED: i32 = 10;
+const EXPLAINED: i32 = 11;
+/// Larger than any description of an interface: the kernel's own limit for a message.
+const LARGEST: usize = 32 * 1024;
+/// The kernel answers at once; this only keeps a fault from hanging the program.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Why the kernel did not do it.
+#[derive(Debug)]
+pub(super) struct Refusal {
+    /// The system's error.
+    pub(super) error: io::Error,
+    /// The kernel's words, where it has any.
+    pub(super) words: Option<String>,
+}
+
+impl From<io::Error> for Refusal {
+    fn from(error: io::Error) -> Refusal {
+        Refusal { error, words: None }
+    }
+}
+
+impl Refusal {
+    /// The error number.
+    pub(super) fn code(&self) -> Option<i32> {
+        self.error.raw_os_error()
+    }
+
+    /// As an error of the bus: `doing` something to the interface `name`.
+    pub(super) fn into_error(self, doing: &str, name: &str) -> BusError {
+        match self.code() {
+            Some(libc::ENODEV | libc::ENXIO) => BusError::NoInterface(name.to_owned()),
+            Some(libc::EPERM | libc::EACCES) => BusError::Permission(doing.to_owned()),
+            _ => {
+                let what = self.words.map_or(doing.to_owned(), |words| format!("{doing} ({words})"));
+                BusError::Io { what, source: self.error }
+            }
+        }
+    }
+}
+
+/// A connection to the kernel.
+struct Kernel(socket2::Socket);
+
+impl AsRawFd for Kernel {
+    fn as_raw_fd(&self) -> RawFd {
+        self.0.as_raw_fd()
+    }
+}
+
+impl SocketOptions for Kernel {}
+
+impl Kernel {
+    fn open() -> io::Result<Kernel> {
+        let domain = socket2::Domain::from(libc::AF_NETLINK);
+        let protocol = socket2::Protocol::from(libc::NETLINK_ROUTE);
+        let kernel = Kernel(socket2::Socket::new(domain, socket2::Type::RAW, Some(protocol))?);
+        kernel.0.set_read_timeout(Some(PATIENCE))?;
+        // Kernels without these (before 4.12) tell less, in a form that is understood too.
+        let _ = kernel.set_socket_option_int(LEVEL, CAPPED, 1);
+        let _ = kernel.set_socket_option_int(LEVEL, EXPLAINED, 1);
+        Ok(kernel)
+    }
+
+    /// Sends a request and hands its answer to `take`.
+    fn ask<T>(&self, request: Request, take: impl FnOnce(Reply<'_>) -> Result<T, Refusal>) -> Result<T, Refusal> {
+        // One request a connection: any number tells its answer from nothing else.
+        const SEQUENCE: u32 = 1;
+        self.0.send(&request.finish(SEQUENCE))?;
+        let mut bytes = vec![0; LARGEST];
+        loop {
+            let length = match (&self.0).read(&mut bytes) {
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                length => length?,
+            };
+            match message::reply(&bytes[..length], SEQUENCE) {
+                Some(Reply::Refused(code, words)) => {
+                    let words = words.map(str::to_owned);
+                    return Err(Refusal { error: io::Error::from_raw_os_error(code), words });
+                }
+                Some(reply) => return take(reply),
+                None => {}
+            }
+        }
+    }
+}
+
+/// The interface of that name as it is now.
+pub(super) fn get(name: &str) -> Result<Link, Refusal> {
+    Kernel::open()?.ask(Request::get(name), |reply| match reply {
+        Reply::Link(header, attributes) => Ok(Link::read(header, attributes)),
+        _ => Err(io::Error::from(io::ErrorKind::InvalidData).into()),
+    })
+}
+
+/// Switches an interface on or off.
+pub(super) fn switch(link: &Link, up: bool) -> Result<(), Refusal> {
+    set(link.switch(up))
+}
+
+/// Sets the bits of an interface that is down, and whether it only listens.
+pub(super) fn configure(link: &Link, timing: BitTiming, listen_only: Option<bool>) -> Result<(), Refusal> {
+    set(link.configure(timing, listen_only))
+}
+
+fn set(request: Request) -> Result<(), Refusal> {
+    Kernel::open()?.ask(request, |reply| match reply {
+        Reply::Done => Ok(()),
+        _ => Err(io::Error::from(io::ErrorKind::InvalidData).into()),
+    })
+}

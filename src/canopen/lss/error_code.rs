@@ -1,0 +1,75 @@
+//! What a slave says to a configuration service (CiA 305, 7.4).
+
+use super::Service;
+use std::fmt;
+
+/// The two bytes of an acknowledge: 0 is success, FFh leaves it to the specific code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ErrorCode {
+    /// The error code, whose meaning depends on the service.
+    pub code: u8,
+    /// The manufacturer's own code; it counts where `code` is FFh.
+    pub specific: u8,
+}
+
+impl ErrorCode {
+    /// The manufacturer's own code counts.
+    pub const SPECIFIC: u8 = 0xff;
+
+    /// Whether the service was carried out.
+    pub fn is_success(self) -> bool {
+        self.code == 0
+    }
+
+    /// What CiA 305 says the code of this service means.
+    pub fn meaning(self, service: Service) -> Option<&'static str> {
+        Some(match (service, self.code) {
+            (_, 0) => "done",
+            (Service::ConfigureNodeId, 1) => "node-ID out of range",
+            (Service::ConfigureBitTiming, 1) => "bit rate not supported",
+            (Service::Store, 1) => "storing not supported",
+            (Service::Store, 2) => "the memory cannot be written",
+            (_, ErrorCode::SPECIFIC) => "an error of the manufacturer's own",
+            _ => return None,
+        })
+    }
+
+    /// The code in words: `error 1, node-ID out of range`, `error 255, an error of the manufacturer's own: 3`.
+    pub fn spoken(self, service: Service) -> impl fmt::Display {
+        Spoken { code: self, service }
+    }
+}
+
+struct Spoken {
+    code: ErrorCode,
+    service: Service,
+}
+
+impl fmt::Display for Spoken {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "error {}", self.code.code)?;
+        if let Some(meaning) = self.code.meaning(self.service) {
+            write!(f, ", {meaning}")?;
+        }
+        if self.code.code == ErrorCode::SPECIFIC { write!(f, ": {}", self.code.specific) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_code_means_something_else_to_each_service() {
+        for (code, specific, service, words) in [
+            (1, 0, Service::ConfigureNodeId, "error 1, node-ID out of range"),
+            (1, 0, Service::ConfigureBitTiming, "error 1, bit rate not supported"),
+            (1, 0, Service::Store, "error 1, storing not supported"),
+            (2, 0, Service::Store, "error 2, the memory cannot be written"),
+            (2, 0, Service::ConfigureNodeId, "error 2"),
+            (255, 3, Service::Store, "error 255, an error of the manufacturer's own: 3"),
+        ] {
+            assert_eq!(ErrorCode { code, specific }.spoken(service).to_string(), words);
+        }
+    }
+}

@@ -1,0 +1,368 @@
+//! Fastscan: the address of a slave without a node-ID, bit by bit (CiA 305, 7.5.3.5).
+//!
+//! A step asks whether there is a slave whose number has these upper bits; it is answered, or it is not. So an
+//! answer that comes too late says the wrong thing twice. Therefore what was found is asked for again after every
+//! eight bits, and once more to go on with the next number; so a late answer is not taken for a yes. Where such a
+//! check fails the eight bits are looked for again, with more patience, and then the whole number.
+//!
+//! Slaves are no choir: where two answer one after the other, the second answer must not be taken for one to
+//! the next step. Once more than one answer came to a step, every step waits for its time to be over.
+
+use super::{LssAddress, Part, Request};
+use crate::canopen::frame::Frame;
+
+/// How many checks of one number may fail.
+const TRIES: u8 = 6;
+
+/// How often somebody has to answer what nobody can answer: once may be a late answer to something else.
+const PROBES: u8 = 3;
+
+/// After how many bits is checked.
+const CHECK_EVERY: u8 = 8;
+
+/// How often everything begins anew because a slave that had been there did not go on.
+const RESTARTS: u8 = 3;
+
+/// A number that no step asks for: nobody who follows the protocol answers it.
+const NOBODY: u32 = u32::MAX;
+
+/// What is being waited for after a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wait {
+    /// Whether anybody is there: the longest wait for an answer, and the measure of how fast they are.
+    Everybody,
+    /// Silence, or an answer in the time it usually takes.
+    Bit,
+    /// An answer, in some more time than that.
+    Check,
+    /// An answer, which may take the longest wait: without it everything begins anew.
+    Advance,
+}
+
+/// The next thing to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// What is sent.
+    pub request: Request,
+    /// What is waited for.
+    pub wait: Wait,
+    /// Whether to wait for the time to be over even if an answer is there.
+    pub to_the_end: bool,
+    /// How often the usual time was found too short: 0, 1, 2 …
+    pub impatience: u8,
+}
+
+/// The end of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// The next step.
+    Continue,
+    /// The slave with this address is in configuration state.
+    Found(LssAddress),
+    /// There is no slave without a node-ID.
+    Nobody,
+    /// It does not work.
+    Failed(FastscanError),
+}
+
+/// Why no address was found although somebody answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FastscanError {
+    /// Answers come to what nobody can answer.
+    #[error("a device answers every fastscan frame, whatever is asked")]
+    Babbler,
+    /// The number does not come together.
+    #[error("the answers about the {} contradict each other", name(*.0))]
+    Unsettled(Part),
+}
+
+fn name(part: Part) -> &'static str {
+    match part {
+        Part::Vendor => "vendor-ID",
+        Part::Product => "product code",
+        Part::Revision => "revision number",
+        Part::Serial => "serial number",
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Everybody is asked, and everybody's scan begins anew.
+    Everybody,
+    /// Something is asked that nobody can answer: those who begin compare the vendor-ID.
+    Probe,
+    /// The bit, 31 to 0.
+    Bit(u8),
+    /// The number found down to this bit, without consequences.
+    Check(u8),
+    /// The number found; whoever fits compares the next part, after the last one it is in configuration state.
+    Advance,
+}
+
+/// A scan in progress.
+#[derive(Clone, Debug)]
+pub struct Fastscan {
+    phase: Phase,
+    /// How often everybody may still be asked.
+    retries: u32,
+    /// The numbers found.
+    known: [Option<u32>; 4],
+    part: Part,
+    number: u32,
+    tries: u8,
+    restarts: u8,
+    /// Several answers came to one step.
+    crowded: bool,
+    /// How often the usual time was too short.
+    impatience: u8,
+    /// Whether the probe has been silent.
+    probed: bool,
+    /// How often it has not.
+    babbled: u8,
+}
+
+impl Fastscan {
+    /// A scan in which everybody is asked again `retries` times.
+    pub fn new(retries: u32) -> Fastscan {
+        Fastscan {
+            phase: Phase::Everybody,
+            retries,
+            known: [None; 4],
+            part: Part::Vendor,
+            number: 0,
+            tries: 0,
+            restarts: 0,
+            crowded: false,
+            impatience: 0,
+            probed: false,
+            babbled: 0,
+        }
+    }
+
+    /// Whether a frame is an answer to a step.
+    pub fn is_answer(frame: &Frame) -> bool {
+        super::Answer::parse(frame, super::Service::Fastscan).is_some()
+    }
+
+    /// What to send and what to wait for.
+    pub fn step(&self) -> Step {
+        let ask = |number, bit_check, sub, next| Request::Fastscan { number, bit_check, sub, next };
+        let (request, wait) = match self.phase {
+            Phase::Everybody => (ask(0, Request::EVERYBODY, Part::Vendor, Part::Vendor), Wait::Everybody),
+            Phase::Probe => (ask(NOBODY, 0, Part::Product, Part::Product), Wait::Bit),
+            Phase::Bit(bit) => (ask(self.number, bit, self.part, self.part), Wait::Bit),
+            Phase::Check(bit) => (ask(self.number, bit, self.part, self.part), Wait::Check),
+            Phase::Advance => {
+                let next = Part::from_number(self.part.number() + 1).unwrap_or(Part::Vendor);
+                (ask(self.number, 0, self.part, next), Wait::Advance)
+            }
+        };
+        Step { request, wait, to_the_end: self.crowded, impatience: self.impatience }
+    }
+
+    /// The time of a step is over, or its answer is there: so many answers came.
+    pub fn on_end(&mut self, answers: usize) -> Progress {
+        self.crowded |= answers > 1;
+        let answered = answers > 0;
+        match self.phase {
+            Phase::Everybody if answered => {
+                if self.probed {
+                    self.look_at(Part::Vendor);
+                } else {
+                    self.phase = Phase::Probe;
+                }
+            }
+            Phase::Everybody if self.retries > 0 => self.retries -= 1,
+            Phase::Everybody if self.restarts > 0 => return self.unsettled(),
+            Phase::Everybody => return Progress::Nobody,
+            Phase::Probe if answered => {
+                self.babbled += 1;
+                if self.babbled >= PROBES {
+                    return Progress::Failed(FastscanError::Babbler);
+                }
+            }
+            Phase::Probe => {
+                self.probed = true;
+                self.look_at(Part::Vendor);
+            }
+            Phase::Bit(bit) => {
+                if !answered {
+                    self.number |= 1 << bit;
+                }
+                self.phase = if bit % CHECK_EVERY == 0 { Phase::Check(bit) } else { Phase::Bit(bit - 1) };
+            }
+            Phase::Check(bit) if answered => self.phase = bit.checked_sub(1).map_or(Phase::Advance, Phase::Bit),
+            Phase::Check(bit) => {
+                self.tries += 1;
+                if self.tries >= TRIES {
+                    return self.unsettled();
+                }
+                self.impatience += 1;
+                if self.tries % 2 == 1 {
+                    let (above, top) = (bit + CHECK_EVERY, bit + CHECK_EVERY - 1);
+                    self.number &= u32::MAX.checked_shl(above.into()).unwrap_or(0);
+                    self.phase = Phase::Bit(top);
+                } else {
+                    // The check before may have been passed by a late answer, or slaves answer at their leisure.
+                    self.crowded = true;
+                    self.search();
+                }
+            }
+            Phase::Advance if answered => {
+                self.impatience = 0;
+                self.known[usize::from(self.part.number())] = Some(self.number);
+                let Some(next) = Part::from_number(self.part.number() + 1) else {
+                    return Progress::Found(LssAddress::new(self.known.map(Option::unwrap_or_default)));
+                };
+                self.look_at(next);
+            }
+            Phase::Advance => {
+                // Whether it has gone on is not known: everything from the start, the numbers found at one go.
+                self.restarts += 1;
+                if self.restarts > RESTARTS {
+                    return self.unsettled();
+                }
+                if self.known[usize::from(self.part.number())].take().is_some() {
+                    self.known = [None; 4];
+                }
+                self.impatience = self.restarts;
+                self.crowded = true;
+                self.phase = Phase::Everybody;
+            }
+        }
+        Progress::Continue
+    }
+
+    fn look_at(&mut self, part: Part) {
+        self.part = part;
+        self.tries = 0;
+        match self.known[usize::from(part.number())] {
+            Some(number) => {
+                self.number = number;
+                self.phase = Phase::Advance;
+            }
+            None => self.search(),
+        }
+    }
+
+    fn search(&mut self) {
+        self.number = 0;
+        self.phase = Phase::Bit(31);
+    }
+
+    fn unsettled(&self) -> Progress {
+        Progress::Failed(FastscanError::Unsettled(self.part))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A slave as CiA 305 describes it: which part it compares next, and whether it has been found.
+    struct Slave {
+        address: LssAddress,
+        compares: Part,
+        found: bool,
+    }
+
+    impl Slave {
+        fn new(address: LssAddress) -> Slave {
+            Slave { address, compares: Part::Vendor, found: false }
+        }
+
+        fn hears(&mut self, request: Request) -> bool {
+            let Request::Fastscan { number, bit_check, sub, next } = request else { return false };
+            if bit_check == Request::EVERYBODY {
+                (self.compares, self.found) = (Part::Vendor, false);
+                return true;
+            }
+            let fits = (self.address.part(sub) ^ number).checked_shr(bit_check.into()) == Some(0);
+            if self.found || sub != self.compares || !fits {
+                return false;
+            }
+            if bit_check == 0 {
+                self.found = next < sub;
+                self.compares = next;
+            }
+            true
+        }
+    }
+
+    /// Plays a scan; `late` says of each step whether its answers come in the next one.
+    fn scan(slaves: &mut [Slave], late: &mut dyn FnMut(Step) -> bool) -> (Progress, usize) {
+        let (mut scan, mut steps, mut left_over) = (Fastscan::new(1), 0, 0);
+        loop {
+            let step = scan.step();
+            steps += 1;
+            let answers = slaves.iter_mut().filter_map(|slave| slave.hears(step.request).then_some(())).count();
+            let (now, later) = if late(step) { (0, answers) } else { (answers, 0) };
+            let progress = scan.on_end(now + std::mem::replace(&mut left_over, later));
+            if progress != Progress::Continue {
+                return (progress, steps);
+            }
+            assert!(steps < 10_000);
+        }
+    }
+
+    #[test]
+    fn nobody_and_one_who_answers_everything() {
+        assert_eq!(scan(&mut [], &mut |_| false), (Progress::Nobody, 2));
+        let mut babbled = Fastscan::new(1);
+        let mut ends = (0..1000).map(|_| babbled.on_end(1));
+        let end = ends.find(|progress| *progress != Progress::Continue);
+        assert_eq!(end, Some(Progress::Failed(FastscanError::Babbler)));
+    }
+
+    #[test]
+    fn one_who_falls_silent_in_the_middle() {
+        let address = LssAddress::new([0x362, 0x0044_3150, 0x0001_0000, 20002]);
+        for last in 2..150 {
+            let mut slave = Slave::new(address);
+            let (mut scan, mut step) = (Fastscan::new(1), 0);
+            let end = loop {
+                step += 1;
+                let answered = slave.hears(scan.step().request) && step <= last;
+                match scan.on_end(usize::from(answered)) {
+                    Progress::Continue => {}
+                    end => break end,
+                }
+            };
+            assert!(matches!(end, Progress::Failed(FastscanError::Unsettled(_))), "{last}: {end:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn one_is_found_in_150_steps(parts: [u32; 4]) {
+            let address = LssAddress::new(parts);
+            let found = scan(&mut [Slave::new(address)], &mut |_| false);
+            prop_assert_eq!(found, (Progress::Found(address), 150));
+        }
+
+        #[test]
+        fn one_of_several_is_found(parts in proptest::collection::vec([0u32..8, 0u32..8, 0u32..8, 0u32..99], 1..5)) {
+            let mut slaves: Vec<Slave> = parts.into_iter().map(|parts| Slave::new(LssAddress::new(parts))).collect();
+            let (end, _) = scan(&mut slaves, &mut |_| false);
+            let found: Vec<LssAddress> = slaves.iter().filter(|slave| slave.found).map(|slave| slave.address).collect();
+            prop_assert!(found.windows(2).all(|pair| pair[0] == pair[1]));
+            prop_assert_eq!(Some(end), found.first().map(|&address| Progress::Found(address)));
+        }
+
+        /// Answers that come a step too late make the scan longer or end it; they never make up an address.
+        #[test]
+        fn late_answers_make_up_nothing(parts: [u32; 4], late in proptest::collection::vec(0u8..40, 1..600)) {
+            let address = LssAddress::new(parts);
+            let mut slaves = [Slave::new(address)];
+            let mut late = late.into_iter().map(|one_in| one_in == 0);
+            // A check is waited for long enough.
+            let (end, _) = scan(&mut slaves, &mut |step| step.wait == Wait::Bit && late.next().unwrap_or(false));
+            match end {
+                Progress::Found(found) => prop_assert!(found == address && slaves[0].found),
+                // The answer to the probe's predecessor, or too many late ones.
+                end => prop_assert!(matches!(end, Progress::Failed(_)), "{end:?}"),
+            }
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! The info page as aligned text, for people and for paper.
+
+use super::table::{self, Align};
+use crate::measure::sample::Status;
+use crate::tasks::settings::errors::Errors;
+use crate::tasks::settings::info::{Channel, Info, Setting};
+use std::io::{self, Write};
+
+/// How wide the page is.
+const WIDTH: usize = 100;
+
+/// So many signals stand side by side; of more the values are gathered.
+const COLUMNS: usize = 3;
+
+/// Two columns below a heading.
+type Rows = Vec<Vec<String>>;
+
+fn section(out: &mut dyn Write, heading: &str, rows: &Rows) -> io::Result<()> {
+    if rows.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "\n{heading}")?;
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let mut lines = Vec::new();
+    table::write(&mut lines, &vec![Align::Left; columns], rows)?;
+    for line in String::from_utf8_lossy(&lines).lines() {
+        writeln!(out, "  {line}")?;
+    }
+    Ok(())
+}
+
+fn row(label: &str, text: impl Into<String>) -> Vec<String> {
+    vec![label.to_owned(), text.into()]
+}
+
+/// The page as text.
+pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
+    let instrument = &info.instrument;
+    let described = instrument.model.as_ref().map(|model| &model.description);
+    let title = described.map_or("not a device that is known", |description| description.title.as_str());
+    writeln!(out, "node {}: {title}", instrument.node)?;
+    section(out, "identity", &identity(info))?;
+    let mut rows: Rows = Vec::new();
+    rows.extend(info.bit_rate.map(|rate| row("bit rate", format!("{} kbit/s", f64::from(rate) / 1000.0))));
+    rows.push(row("monitoring", &info.monitoring));
+    rows.extend(info.communication.iter().map(|setting| row(&setting.name, &setting.text)));
+    section(out, "communication", &rows)?;
+    section(out, "errors", &info.errors.as_ref().map(errors).unwrap_or_default())?;
+    section(out, "signals", &info.channels.iter().map(signal).collect())?;
+    section(out, "settings of the signals", &settings(&info.channels))?;
+    section(out, "TPDOs", &tpdos(info))?;
+    let mut rows: Rows = Vec::new();
+    rows.extend(info.calibrated.as_ref().map(|date| row("calibrated", date)));
+    rows.extend(info.produced.as_ref().map(|date| row("produced", date)));
+    rows.extend(info.own.iter().map(|setting| row(&full_name(setting), &setting.text)));
+    section(out, "of the manufacturer", &rows)?;
+    section(out, "stored by 1010h", &store(info))
+}
+
+fn identity(info: &Info) -> Rows {
+    let identity = &info.instrument.identity;
+    let described = info.instrument.model.as_ref().map(|model| &model.description);
+    let mut rows: Rows = Vec::new();
+    rows.extend(identity.name.as_ref().map(|name| row("name", super::text::safe(name))));
+    rows.extend(described.map(|description| row("description", &description.name)));
+    rows.extend(
+        identity.device_type.map(|number| row("device type", format!("0x{number:08X} profile {}", number & 0xffff))),
+    );
+    let vendor = described.map_or("", |description| description.vendor.as_str());
+    rows.extend(identity.vendor.map(|number| row("vendor", format!("0x{number:08X} {vendor}").trim_end())));
+    rows.extend(identity.product.map(|number| row("product", format!("0x{number:08X}"))));
+    rows.extend(
+        identity.revision.map(|number| row("revision", format!("0x{number:08X} {}.{}", number >> 16, number & 0xffff))),
+    );
+    rows.extend(identity.serial.map(|number| row("serial", number.to_string())));
+    rows.extend(info.hardware.as_ref().map(|version| row("hardware", super::text::safe(version))));
+    rows.extend(info.software.as_ref().map(|version| row("software", super::text::safe(version))));
+    rows
+}
+
+/// Register and history in two columns.
+pub fn errors(errors: &Errors) -> Vec<Vec<String>> {
+    let mut rows: Rows = Vec::new();
+    rows.extend(errors.register.map(|bits| row("register", format!("0x{bits:02X} {}", errors.register_text))));
+    rows.push(match errors.count {
+        None => row("history", "none is kept"),
+        Some(0) => row("history", "empty"),
+        Some(1) => row("history", "1 error"),
+        Some(count) => row("history", format!("{count} errors, newest first")),
+    });
+    for error in &errors.history {
+        let detail = if error.detail.is_empty() { String::new() } else { format!(" ({})", error.detail) };
+        rows.push(row("", format!("0x{:04X} {}{detail}", error.code, error.text)));
+    }
+    rows
+}
+
+fn signal(channel: &Channel) -> Vec<String> {
+    let unit = channel.signal.unit.map(|unit| unit.to_string()).unwrap_or_default();
+    let sample = channel.sample.as_ref();
+    let number = sample.and_then(|sample| sample.value);
+    let value = number.map_or_else(|| "-".to_owned(), |number| format!("{number} {unit}").trim_end().to_owned());
+    let status = sample.and_then(|sample| sample.status).map_or("(tells no status)", Status::as_str);
+    let range = channel.range.map(|(start, end)| format!("range {} to {end}", start.number)).unwrap_or_default();
+    vec![channel.signal.name.clone(), value, status.to_owned(), range]
+}
+
+/// Side by side where there are few signals; gathered by value where there are many.
+fn settings(channels: &[Channel]) -> Rows {
+    let mut names: Vec<&str> = Vec::new();
+    for setting in channels.iter().flat_map(|channel| &channel.settings) {
+        if !names.contains(&setting.name.as_str()) {
+            names.push(&setting.name);
+        }
+    }
+    let of = |channel: &Channel, name: &str| {
+        channel.settings.iter().find(|setting| setting.name == name).map(|setting| setting.text.clone())
+    };
+    if channels.len() <= COLUMNS {
+        let cells = |name: &&str| {
+            let texts = channels.iter().map(|channel| of(channel, name).unwrap_or_else(|| "-".to_owned()));
+            std::iter::once((*name).to_owned()).chain(texts).collect()
+        };
+        let head = std::iter::once(String::new()).chain(channels.iter().map(|channel| channel.signal.name.clone()));
+        let rows: Rows = names.iter().map(cells).collect();
+        let head: Vec<String> = head.collect();
+        return if channels.len() > 1 && !rows.is_empty() { std::iter::once(head).chain(rows).collect() } else { rows };
+    }
+    let gathered = |name: &&str| {
+        let mut groups: Vec<(String, Vec<&str>)> = Vec::new();
+        for channel in channels {
+            let text = of(channel, name).unwrap_or_else(|| "-".to_owned());
+            match groups.iter_mut().find(|(known, _)| *known == text) {
+                Some((_, members)) => members.push(&channel.signal.name),
+                None => groups.push((text, vec![&channel.signal.name])),
+            }
+        }
+        let text = match groups.as_slice() {
+            [(text, _)] => text.clone(),
+            several => {
+                let each: Vec<String> =
+                    several.iter().map(|(text, members)| format!("{text} ({})", members.join(" "))).collect();
+                each.join(", ")
+            }
+        };
+        row(name, text)
+    };
+    names.iter().map(gathered).collect()
+}
+
+fn tpdos(info: &Info) -> Rows {
+    let instrument = &info.instrument;
+    let mut rows: Rows = Vec::new();
+    for (tpdo, inhibit) in instrument.tpdos.iter().zip(&info.inhibit_100us) {
+        let id = tpdo.cob_id.can_id().number();
+        let valid = if tpdo.cob_id.is_valid() { "" } else { " off" };
+        let mut terms = vec![tpdo.transmission.map(|kind| kind.to_string()).unwrap_or_default()];
+        terms.extend(tpdo.event_timer_ms.filter(|&timer| timer > 0).map(|timer| format!("timer {timer} ms")));
+        let inhibit = inhibit.filter(|&inhibit| inhibit > 0);
+        terms.extend(inhibit.map(|inhibit| format!("inhibit {}.{} ms", inhibit / 10, inhibit % 10)));
+        let mapping = tpdo.mapping.iter().map(|entry| mapped(info, entry.object.to_string(), entry.bits));
+        let mapping: Vec<String> = mapping.collect();
+        let carried = if mapping.is_empty() { "nothing mapped".to_owned() } else { mapping.join(", ") };
+        rows.push(vec![tpdo.number.to_string(), format!("0x{id:X}{valid}"), terms.join(", "), carried]);
+    }
+    rows
+}
+
+/// A mapped object by the name of its signal.
+fn mapped(info: &Info, object: String, bits: u8) -> String {
+    name_of(info, &object).map_or_else(|| format!("{object}/{bits}"), |name| format!("{name} {object}/{bits}"))
+}
+
+pub(super) fn name_of(info: &Info, object: &str) -> Option<String> {
+    info.instrument.signals.iter().find_map(|signal| {
+        let mut values = info.instrument.tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object);
+        let is_value = values.any(|entry| entry.to_string() == object && signal.is_value(entry));
+        let is_status = signal.status.is_some_and(|status| status.to_string() == object);
+        match (is_value, is_status) {
+            (true, _) => Some(signal.name.clone()),
+            (false, true) => Some(format!("{}.status", signal.name)),
+            (false, false) => None,
+        }
+    })
+}
+
+fn store(info: &Info) -> Rows {
+    let store = &info.store;
+    let mut rows: Rows = Vec::new();
+    for &(sub, capability) in &store.groups {
+        let group = match sub {
+            1 => "all",
+            2 => "communication",
+            3 => "application",
+            _ => "of the manufacturer",
+        };
+        let how = match capability & 0b11 {
+            0b01 => "on command",
+            0b10 => "by itself",
+            0b11 => "on command and by itself",
+            _ => "not",
+        };
+        rows.push(row(&format!("group {sub}"), format!("{group}: {how}")));
+    }
+    if store.kept.is_empty() && store.lost.is_empty() {
+        if !rows.is_empty() {
+            rows.push(row("kept", "not known"));
+        }
+        return rows;
+    }
+    for (label, names) in [("kept", &store.kept), ("not kept", &store.lost)] {
+        for (at, names) in wrapped(names).into_iter().enumerate() {
+            rows.push(row(if at == 0 { label } else { "" }, names));
+        }
+    }
+    rows
+}
+
+/// Names with commas, in lines that fit the page.
+fn wrapped(names: &[String]) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for name in names {
+        match lines.last_mut() {
+            Some(last) if last.len() + name.len() + 2 + 16 <= WIDTH => {
+                last.push_str(", ");
+                last.push_str(name);
+            }
+            _ => {
+                if let Some(last) = lines.last_mut() {
+                    last.push(',');
+                }
+                lines.push(name.clone());
+            }
+        }
+    }
+    lines
+}
+
+/// The name with the sub-index where it is not 0.
+fn full_name(setting: &Setting) -> String {
+    if setting.object.sub == 0 { setting.name.clone() } else { format!("{}:{}", setting.name, setting.object.sub) }
+}

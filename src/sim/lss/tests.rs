@@ -1,0 +1,213 @@
+use super::*;
+use crate::device::catalog;
+use crate::sim::objects::Objects;
+use crate::sim::settings::{Pair, Rate};
+
+const IDENTITY: Identity = [0x362, 0x443150, 0x10000, 20002];
+
+struct Bed {
+    slave: Slave,
+    settings: Settings,
+    identity: Identity,
+}
+
+impl Bed {
+    fn new(kind: &str, node: Option<u8>, knows: SimLss) -> Bed {
+        let model = catalog::by_name(kind).expect("built in");
+        let node = node.map(|node| NodeId::new(node).expect("a node-ID"));
+        let objects = Objects::new(&model, NodeId::MIN);
+        let settings = Settings::new(&model.description, &objects, Pair { node, rate: Rate::At(250_000) });
+        Bed { slave: Slave::new(knows, BTreeMap::new(), false), settings, identity: IDENTITY }
+    }
+
+    fn ask(&mut self, request: &str) -> Reply {
+        let frame: crate::canopen::frame::Frame = format!("7E5#{request}").parse().expect("a frame");
+        let mut bytes = [0; 8];
+        bytes.iter_mut().zip(frame.data()).for_each(|(to, from)| *to = *from);
+        self.slave.request(bytes, self.identity, &mut self.settings)
+    }
+
+    /// Requests and the answers to them, both without the zeros at the end; `-` is silence.
+    fn play(&mut self, lines: &[(&str, &str)]) {
+        for (request, expected) in lines {
+            let reply = self.ask(request);
+            let bytes = reply.answer.map(|answer| answer.map(|byte| format!("{byte:02X}")).concat());
+            let expected = (*expected != "-").then(|| format!("{expected:0<16}"));
+            assert_eq!(bytes, expected, "after {request}");
+        }
+    }
+}
+
+fn all() -> SimLss {
+    SimLss::default()
+}
+
+#[test]
+fn nothing_is_configured_or_told_in_waiting_state() {
+    let mut bed = Bed::new("mh4", Some(5), all());
+    for request in ["1107", "130004", "15E803", "17", "5A", "5B", "5C", "5D", "5E", "4C", "5100000000800000", "0402"] {
+        assert_eq!(bed.ask(request), Reply::default(), "{request}");
+    }
+    assert_eq!(bed.settings.pending, bed.settings.persistent);
+}
+
+#[test]
+fn every_service_of_the_configuration_state() {
+    let mut bed = Bed::new("mh4", Some(5), all());
+    bed.play(&[
+        ("0401", "-"),
+        ("5A", "5A62030000"),
+        ("5B", "5B50314400"),
+        ("5C", "5C00000100"),
+        ("5D", "5D224E0000"),
+        ("5E", "5E05"),
+        ("1100", "1101"),
+        ("1180", "1101"),
+        ("117F", "11"),
+        ("5E", "5E05"),
+        ("130005", "1301"),
+        ("130104", "1301"),
+        ("130004", "13"),
+        ("5100000000800000", "-"),
+        ("4C", "-"),
+    ]);
+    assert_eq!(bed.settings.persistent.node, NodeId::new(5).ok(), "not stored yet");
+    bed.play(&[("17", "17")]);
+    assert_eq!(bed.settings.persistent, Pair { node: NodeId::new(127).ok(), rate: Rate::At(125_000) });
+    assert_eq!(bed.ask("15E803").then, Then::Activate(Duration::from_secs(1)));
+    bed.play(&[("11FF", "11"), ("0400", "-"), ("5A", "-")]);
+    assert_eq!(bed.settings.pending.node, None);
+}
+
+#[test]
+fn the_devices_own_table_of_bit_rates_counts() {
+    let mut bed = Bed::new("dps", Some(5), all());
+    bed.play(&[("0401", "-"), ("130005", "13"), ("130001", "1301"), ("130009", "1301")]);
+    assert_eq!(bed.settings.pending.rate, Rate::At(100_000));
+    let mut bed = Bed::new("mh4", Some(5), all());
+    bed.play(&[("0401", "-"), ("130009", "13")]);
+    assert_eq!(bed.settings.pending.rate, Rate::Auto);
+    // Where no table is known: that of CiA 305.
+    let mut bed = Bed::new("d20", Some(5), all());
+    bed.play(&[("0401", "-"), ("130008", "13"), ("130005", "1301"), ("130009", "1301")]);
+    assert_eq!(bed.settings.pending.rate, Rate::At(10_000));
+}
+
+#[test]
+fn only_the_whole_address_in_its_order_selects() {
+    let address = ["4062030000", "4150314400", "4200000100", "43224E0000"];
+    let mut bed = Bed::new("mh4", Some(5), all());
+    bed.play(&[(address[0], "-"), (address[1], "-"), (address[2], "-"), (address[3], "44"), ("5E", "5E05")]);
+    // In configuration state it takes no address; another's does not put it back.
+    bed.play(&[(address[0], "-"), (address[1], "-"), (address[2], "-"), (address[3], "-"), ("5E", "5E05")]);
+    for (part, wrong) in [(0, "4061030000"), (1, "4150314401"), (2, "4201000100"), (3, "43234E0000")] {
+        bed.play(&[("0400", "-")]);
+        for (index, right) in address.iter().enumerate() {
+            bed.play(&[(if index == part { wrong } else { right }, "-")]);
+        }
+    }
+    // It may begin anew at any time.
+    bed.play(&[(address[0], "-"), (address[1], "-"), (address[0], "-"), (address[1], "-")]);
+    bed.play(&[(address[2], "-"), (address[3], "44"), ("0400", "-")]);
+    // A part missing, twice, or something between.
+    for order in [&[0, 1, 3][..], &[0, 1, 1, 2, 3], &[1, 2, 3], &[0, 2, 1, 3]] {
+        order.iter().for_each(|&part| bed.play(&[(address[part], "-")]));
+    }
+    bed.play(&[(address[0], "-"), (address[1], "-"), ("0400", "-"), (address[2], "-"), (address[3], "-")]);
+    assert!(!bed.slave.is_configuring());
+}
+
+#[test]
+fn identification_by_range() {
+    let mut bed = Bed::new("mh4", Some(5), all());
+    let ask = |bed: &mut Bed, low: u32, high: u32, last: &str| {
+        let text = |service: u8, number: u32| {
+            format!("{service:02X}{}", number.to_le_bytes().map(|b| format!("{b:02X}")).concat())
+        };
+        for (service, number) in [(0x46, 0x362), (0x47, 0x443150), (0x48, 0), (0x49, u32::MAX), (0x4a, low)] {
+            bed.play(&[(&text(service, number), "-")]);
+        }
+        bed.play(&[(&text(0x4b, high), last)]);
+    };
+    ask(&mut bed, 20002, 20002, "4F");
+    ask(&mut bed, 0, u32::MAX, "4F");
+    ask(&mut bed, 20003, u32::MAX, "-");
+    ask(&mut bed, 0, 20001, "-");
+    // In configuration state too.
+    bed.play(&[("0401", "-")]);
+    ask(&mut bed, 0, 20002, "4F");
+}
+
+/// The search as CiA 305 has it: the upper bits of each part, then the whole part with the one to go on with.
+fn fastscan(bed: &mut Bed) -> Identity {
+    let mut found = [0; 4];
+    bed.play(&[("5100000000800000", "4F")]);
+    for part in 0..4u8 {
+        let mut number = 0u32;
+        let request = |number: u32, check: u8, next: u8| {
+            let [a, b, c, d] = number.to_le_bytes();
+            [0x51, a, b, c, d, check, part, next].map(|byte| format!("{byte:02X}")).concat()
+        };
+        for bit in (0..32u8).rev() {
+            if bed.ask(&request(number, bit, part)).answer.is_none() {
+                number |= 1 << bit;
+            }
+        }
+        bed.play(&[(&request(number, 0, (part + 1) % 4), "4F")]);
+        found[usize::from(part)] = number;
+    }
+    found
+}
+
+#[test]
+fn fastscan_finds_the_unconfigured() {
+    for identity in [IDENTITY, [0, 0, 0, 0], [u32::MAX; 4], [1, 0x8000_0000, 0x7fff_ffff, 0xaaaa_5555]] {
+        let mut bed = Bed { identity, ..Bed::new("mh4", None, all()) };
+        bed.play(&[("4C", "50")]);
+        assert_eq!(fastscan(&mut bed), identity);
+        assert!(bed.slave.is_configuring());
+        // Found, it is silent, and takes a node-ID when it is sent back to waiting.
+        bed.play(&[("5100000000800000", "-"), ("4C", "50"), ("5E", "5EFF"), ("110C", "11"), ("4C", "-")]);
+        assert_eq!(bed.ask("0400").then, Then::Boot);
+        bed.play(&[("5100000000800000", "-")]);
+    }
+}
+
+#[test]
+fn fastscan_leaves_whoever_does_not_fit() {
+    let mut bed = Bed::new("mh4", None, all());
+    // The second part before the first; a part and a bit that do not exist.
+    bed.play(&[
+        ("5100000000800000", "4F"),
+        ("5150314400000102", "-"),
+        ("5162030000000401", "-"),
+        ("5162030000200001", "-"),
+    ]);
+    bed.play(&[("5163030000000001", "-"), ("5162030000000001", "4F"), ("5150314400000102", "4F")]);
+    bed.play(&[("5100000100000203", "4F"), ("51234E0000000300", "-"), ("51224E0000000300", "4F")]);
+    assert!(bed.slave.is_configuring());
+}
+
+#[test]
+fn one_that_answers_fastscan_for_ever() {
+    let mut bed = Bed::new("mh4", None, all());
+    bed.slave = Slave::new(all(), BTreeMap::new(), true);
+    fastscan(&mut bed);
+    bed.play(&[("5163030000000001", "4F"), ("0400", "-")]);
+}
+
+#[test]
+fn what_a_slave_does_not_know_it_does_not_answer() {
+    let model = catalog::by_name("dps").expect("built in");
+    let mut bed = Bed::new("dps", Some(127), model.description.sim.lss.clone());
+    bed.play(&[("0401", "-"), ("5A", "-"), ("5E", "-"), ("46", "-"), ("4C", "-"), ("117E", "11"), ("17", "17")]);
+}
+
+#[test]
+fn services_can_be_refused() {
+    let mut bed = Bed::new("mh4", Some(5), all());
+    bed.slave = Slave::new(all(), BTreeMap::from([(0x11, 0xff), (0x17, 1)]), false);
+    bed.play(&[("0401", "-"), ("1107", "11FF"), ("130004", "13"), ("17", "1701")]);
+    assert_eq!(bed.settings.pending.node, NodeId::new(5).ok());
+    assert_eq!(bed.settings.persistent.rate, Rate::At(250_000));
+}

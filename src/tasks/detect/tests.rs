@@ -1,0 +1,234 @@
+//! On a wire that knows bit rates: at another one nothing but errors is heard.
+
+use super::*;
+use crate::bus::{Mono, Received, Stamp, TimestampSource, Wall};
+use crate::canopen::frame::Frame;
+use std::collections::VecDeque;
+
+const EACH: Duration = Duration::from_millis(1500);
+
+/// An interface, and one device with a heartbeat of once a second.
+struct Wire {
+    now: Mono,
+    /// At which rate the device runs.
+    device: u32,
+    /// Whether it sends a heartbeat.
+    heartbeat: bool,
+    /// Whether it answers SDO.
+    answers: bool,
+    /// Whether a third one is there that acknowledges.
+    company: bool,
+    /// A rate that the interface cannot do.
+    impossible: Option<u32>,
+    /// Whether it has a listen-only mode.
+    listens: bool,
+    /// What it can be set at all.
+    refusal: Option<fn() -> BusError>,
+    interrupt: Option<Mono>,
+    set: Option<(u32, Mode)>,
+    waiting: VecDeque<Event>,
+    sent: Vec<(u32, Frame)>,
+    log: Vec<String>,
+}
+
+impl Wire {
+    fn at(device: u32) -> Wire {
+        Wire {
+            now: Mono::START,
+            device,
+            heartbeat: true,
+            answers: true,
+            company: true,
+            impossible: None,
+            listens: true,
+            refusal: None,
+            interrupt: None,
+            set: None,
+            waiting: VecDeque::new(),
+            sent: Vec::new(),
+            log: Vec::new(),
+        }
+    }
+
+    fn stamp(&self) -> Stamp {
+        Stamp { mono: self.now, wall: Wall::at(self.now.since_start()) }
+    }
+
+    fn matches(&self) -> bool {
+        self.set.is_some_and(|(rate, _)| rate == self.device)
+    }
+}
+
+impl Bus for Wire {
+    fn name(&self) -> &str {
+        "can9"
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        Some(self.set.map_or(500_000, |(rate, _)| rate))
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        TimestampSource::Simulated
+    }
+
+    fn now(&self) -> Stamp {
+        self.stamp()
+    }
+
+    fn listen(&mut self, _: &Filters) -> Result<(), BusError> {
+        Ok(())
+    }
+
+    fn can_set_bit_rate(&self) -> Result<(), BusError> {
+        self.refusal.map_or(Ok(()), |refusal| Err(refusal()))
+    }
+
+    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
+        if self.impossible == Some(bit_rate) {
+            return Err(BusError::BitRate { name: "can9".into(), bit_rate, why: "no".into() });
+        }
+        if mode == Mode::ListenOnly && !self.listens {
+            return Err(BusError::Unsupported("can9 cannot only listen".into()));
+        }
+        self.set = Some((bit_rate, mode));
+        self.waiting.clear();
+        self.log.push(format!("{bit_rate} {mode:?}"));
+        Ok(())
+    }
+
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        self.set = None;
+        self.log.push("back".into());
+        Ok(())
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        assert_eq!(self.set.map(|(_, mode)| mode), Some(Mode::Normal), "{frame} although it was to listen only");
+        if !self.matches() {
+            return Err(BusError::QueueFull);
+        }
+        self.sent.push((self.device, *frame));
+        let answer = "585#4300100094010200".parse().unwrap();
+        if self.answers && frame.to_string().starts_with("605#") {
+            self.waiting.push_back(Event::Frame(Received { frame: answer, at: self.stamp() }));
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        if let Some(event) = self.waiting.pop_front() {
+            return Ok(event);
+        }
+        let second = Duration::from_secs(1);
+        let next = Mono::at(second * u32::try_from(self.now.since_start().as_secs() + 1).unwrap());
+        if let Some(moment) = self.interrupt.filter(|moment| *moment <= deadline.min(next)) {
+            self.interrupt = None;
+            self.now = self.now.max(moment);
+            return Ok(Event::Interrupted);
+        }
+        if next > deadline || !self.heartbeat {
+            self.now = self.now.max(deadline);
+            return Ok(Event::Timeout);
+        }
+        self.now = next;
+        // Without anybody who acknowledges, a frame ends in an error for all.
+        let normal = self.set.is_some_and(|(_, mode)| mode == Mode::Normal);
+        if self.matches() && (self.company || normal) {
+            return Ok(Event::Frame(Received { frame: "705#7F".parse().unwrap(), at: self.stamp() }));
+        }
+        Ok(Event::Fault(Fault::Protocol, self.stamp()))
+    }
+}
+
+fn run(wire: &mut Wire, ask: bool) -> Result<Detection, Failure> {
+    detect(wire, ask, EACH, &mut |_| ())
+}
+
+#[test]
+fn the_rate_is_heard_and_the_interface_put_back() {
+    for rate in RATES {
+        let mut wire = Wire::at(rate);
+        let found = run(&mut wire, false).unwrap();
+        assert_eq!(found.found, Some((rate, By::Frames)));
+        assert!(found.tried.iter().all(|tried| tried.how == How::Listening));
+        assert_eq!(wire.log.first().map(String::as_str), Some("500000 ListenOnly"), "its own rate comes first");
+        assert_eq!(wire.log.last().map(String::as_str), Some("back"));
+        assert!(wire.sent.is_empty());
+    }
+}
+
+#[test]
+fn nothing_is_guessed() {
+    // At no usual rate; silent; alone, so that nobody acknowledges.
+    let mut strange = Wire::at(83_333);
+    let mut silent = Wire { heartbeat: false, ..Wire::at(125_000) };
+    let mut alone = Wire { company: false, ..Wire::at(125_000) };
+    for (wire, errors) in [(&mut strange, true), (&mut silent, false), (&mut alone, true)] {
+        let found = run(wire, false).unwrap();
+        assert_eq!((found.found, found.tried.len()), (None, RATES.len()));
+        assert_eq!(found.tried.iter().any(|tried| tried.errors > 0), errors);
+        assert_eq!(wire.log.last().map(String::as_str), Some("back"));
+    }
+}
+
+#[test]
+fn one_device_alone_is_asked_after_listening() {
+    let mut wire = Wire { company: false, heartbeat: false, ..Wire::at(125_000) };
+    let found = run(&mut wire, true).unwrap();
+    assert_eq!(found.found, Some((125_000, By::Frames)));
+    let how: Vec<How> = found.tried.iter().map(|tried| tried.how).collect();
+    assert_eq!(how[..RATES.len()], [How::Listening; RATES.len()]);
+    assert!(how[RATES.len()..].iter().all(|&how| how == How::Asking));
+    assert!(wire.sent.iter().all(|(_, frame)| frame.to_string().ends_with("#4000100000000000")));
+    assert_eq!(wire.log.last().map(String::as_str), Some("back"));
+}
+
+#[test]
+fn a_device_that_only_acknowledges() {
+    let mut wire = Wire { company: false, heartbeat: false, answers: false, ..Wire::at(100_000) };
+    assert_eq!(run(&mut wire, true).unwrap().found, Some((100_000, By::Acknowledge)));
+}
+
+#[test]
+fn who_can_be_heard_is_not_asked() {
+    let mut wire = Wire::at(10_000);
+    assert_eq!(run(&mut wire, true).unwrap().found, Some((10_000, By::Frames)));
+    assert!(wire.sent.is_empty());
+}
+
+#[test]
+fn rates_and_modes_that_the_interface_has_not() {
+    let mut wire = Wire { impossible: Some(500_000), ..Wire::at(100_000) };
+    let found = run(&mut wire, false).unwrap();
+    assert_eq!(found.found, Some((100_000, By::Frames)));
+    assert_eq!(found.tried[0].impossible.as_deref(), Some("no"));
+
+    let mut deaf = Wire { listens: false, ..Wire::at(100_000) };
+    let failure = run(&mut deaf, false).unwrap_err();
+    assert_eq!((failure.kind, failure.message.as_str()), (Kind::Bus, "can9 cannot only listen"));
+    assert_eq!(deaf.log, ["back"]);
+    assert_eq!(run(&mut deaf, true).unwrap().found, Some((100_000, By::Frames)));
+}
+
+#[test]
+fn without_the_right_nothing_is_touched() {
+    let refusal: fn() -> BusError = || BusError::Permission("set the bit rate of can9".into());
+    let mut wire = Wire { refusal: Some(refusal), ..Wire::at(100_000) };
+    let failure = run(&mut wire, true).unwrap_err();
+    assert_eq!(failure.message, "no permission to set the bit rate of can9");
+    assert_eq!(failure.hint.as_deref(), Some("by hand: sudo cangauge bus detect can9"));
+    assert!(wire.log.is_empty());
+}
+
+#[test]
+fn interrupted_at_any_moment_it_is_put_back() {
+    // Listening takes 13.5 s, asking as long again.
+    for millis in (0..27_000).step_by(1900) {
+        let mut wire = Wire { heartbeat: false, answers: false, ..Wire::at(83_333) };
+        wire.interrupt = Some(Mono::at(Duration::from_millis(millis)));
+        assert_eq!(run(&mut wire, true).unwrap_err().kind, Kind::Interrupted, "{millis} ms");
+        assert_eq!(wire.log.last().map(String::as_str), Some("back"));
+        assert_eq!(wire.log.iter().filter(|line| *line == "back").count(), 1);
+    }
+}

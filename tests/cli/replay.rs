@@ -1,0 +1,80 @@
+//! A recording played again.
+
+use super::{Bench, Done};
+use std::fs;
+
+/// Runs a command on a recording: `replay(&bench, "t.log", "log 1")`.
+fn replay(bench: &Bench, file: &str, line: &str) -> Done {
+    let bus = format!("replay:{file}");
+    let words: Vec<&str> = ["--bus", &bus].into_iter().chain(line.split_whitespace()).collect();
+    bench.finish(&mut bench.command(&words))
+}
+
+/// Keeps what the last command sent and received.
+fn keep(bench: &Bench) {
+    fs::rename(bench.path("trace"), bench.path("t.log")).expect("the trace");
+}
+
+#[test]
+fn gives_the_rows_of_the_live_log() {
+    let bench = Bench::of("mh4@1,d20@2,mc1609@3,dps@127");
+    let live = bench.run("log 1-3,127 --sync 20ms --count 200").exit(0).stdout;
+    keep(&bench);
+    assert_eq!(live.lines().count(), 201);
+    let replayed = replay(&bench, "t.log", "log 1-3,127 --count 200").exit(0).stdout;
+    assert_eq!(replayed, live);
+    // The end of the recording is the end of the log.
+    let all = replay(&bench, "t.log", "log all").exit(0);
+    assert_eq!(all.stdout, live);
+    assert!(all.stderr.contains("200 rows in"), "{}", all.stderr);
+    assert!(all.stderr.contains("recorded timestamps"), "{}", all.stderr);
+}
+
+#[test]
+fn a_recording_without_its_beginning_needs_a_description() {
+    let bench = Bench::of("mh4@1");
+    bench.run("log 1 --sync 20ms --count 20").exit(0);
+    keep(&bench);
+    let text = bench.text("t.log");
+    let tail: Vec<&str> = text.lines().filter(|line| line.contains(" 181#")).collect();
+    fs::write(bench.path("tail.log"), tail.join("\n") + "\n").expect("written");
+    replay(&bench, "tail.log", "log 1").exit(2);
+    let done = replay(&bench, "tail.log", "log 1 --device mh4").exit(0);
+    assert_eq!(done.stdout.lines().count(), 21, "{}", done.stdout);
+}
+
+#[test]
+fn nothing_can_be_sent_into_it() {
+    let bench = Bench::of("mh4@1");
+    fs::write(bench.path("t.log"), "(1700000000.000000) can0 701#00\n").expect("written");
+    let done = replay(&bench, "t.log", "read 1").exit(5);
+    assert_eq!(
+        done.stderr,
+        "cangauge: the recording t.log is receive only\n\
+         hint: what listens only can do it: log, scan --passive, nmt watch\n"
+    );
+    replay(&bench, "t.log", "log 1 --sync 10ms").refuses("a recording (replay:) receives only: --sync and --poll send");
+    replay(&bench, "t.log", "log 1 --poll 10ms").refuses("a recording (replay:) receives only: --sync and --poll send");
+}
+
+#[test]
+fn what_is_no_log_is_named_with_its_line() {
+    let bench = Bench::of("mh4@1");
+    fs::write(bench.path("t.log"), "(1.0) can0 701#00\nnonsense\n").expect("written");
+    let done = replay(&bench, "t.log", "log 1").exit(8);
+    assert!(done.stderr.starts_with("cangauge: replay t.log:2: no line of a candump log"), "{}", done.stderr);
+    replay(&bench, "nowhere.log", "log 1").exit(8);
+    replay(&bench, "", "log 1").exit(2);
+}
+
+#[test]
+fn scan_and_watch_listen_to_the_whole_of_it() {
+    let bench = Bench::of("mh4@1");
+    let log = "(1700000000.000000) can0 701#00\n(1700003600.000000) can0 705#05\n";
+    fs::write(bench.path("t.log"), log).expect("written");
+    let done = replay(&bench, "t.log", "scan --passive --format json").exit(0);
+    let nodes: Vec<_> = done.json().iter().map(|line| line["node"].clone()).collect();
+    assert_eq!(nodes, [1, 5]);
+    let done = replay(&bench, "t.log", "nmt watch").exit(0);
+    assert_eq!(done.stdout.lines().count(), 2, "{}", done.stdout);
+}

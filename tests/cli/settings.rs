@@ -1,0 +1,244 @@
+//! `cangauge unit`, `filter`, `limits`, `minmax`, `errors`.
+
+use super::Bench;
+use serde_json::json;
+use std::fs;
+use std::path::Path;
+
+/// Devices whose quantities stand still: a DPS at 50 psi, an MH-4 at 1.25 bar and 25.5 degC, an MC1609.
+fn still() -> Bench {
+    Bench::described(&format!(
+        "[[device]]\nkind = \"mh4\"\nnode = 5\n{}{}[[device]]\nkind = \"dps\"\nnode = 127\n{}\
+         [[device]]\nkind = \"mc1609\"\nnode = 3\n[[device]]\nkind = \"d20\"\nnode = 2\n{}",
+        channel(1, 1.25),
+        channel(2, 25.5),
+        channel(1, 50.0),
+        channel(1, 4.0)
+    ))
+}
+
+fn channel(number: u8, base: f64) -> String {
+    format!("[[device.channel]]\nchannel = {number}\nbase = {base:?}\namplitude = 0.0\nnoise = 0.0\n")
+}
+
+const STORE: &str = "kept after power off only when it is stored (1010h)\n";
+
+#[test]
+fn the_unit_of_one_signal_is_bare() {
+    let bench = still();
+    bench.run("unit 127").prints("psi\n");
+    bench.run("unit 5 temperature").prints("degC\n");
+    bench.run("unit 5").prints("pressure     bar   (takes bar, psi, MPa)\ntemperature  degC  (takes degC, degF, K)\n");
+    let done = bench.run("unit 5 pressure -f json").exit(0);
+    assert_eq!(
+        done.json(),
+        [json!({"node": 5, "signal": "pressure", "unit": "bar", "code": "0x004E0000",
+            "takes": ["bar", "psi", "MPa"], "fixed": false})]
+    );
+    bench.run("unit 127 -f csv").prints("node,signal,unit,code\n127,pressure,psi,0x00AB0000\n");
+}
+
+/// DPS manual, table 19: from psi to bar; the pressure is 50.000 psi, then 3.447 bar (3.448 in print).
+#[test]
+fn table_19_and_what_the_new_unit_rescales() {
+    let done = still().run("unit 127 bar").exit(0);
+    assert_eq!(
+        done.stdout,
+        "pressure           psi          ->  bar\n\
+         pressure-span      100.000 psi  ->  6.895 bar\n\
+         ai-input-offset:1  0.000 psi    ->  0.000 bar\n\
+         ai-input-pv:1      50.000 psi   ->  3.447 bar\n\
+         ai-span-start:1    0.000 psi    ->  0.000 bar\n\
+         ai-span-end:1      100.000 psi  ->  6.895 bar\n"
+    );
+    assert_eq!(done.stderr, format!("node 127: {STORE}"));
+    let writes: Vec<&str> = done.frames_of("67F").into_iter().filter(|frame| frame.starts_with("22")).collect();
+    assert_eq!(writes, ["2231610100004E00"], "one write, as printed");
+    let answers = done.frames_of("5FF");
+    assert!(answers.contains(&"4230610150C30000"), "50.000 psi: {answers:?}");
+    // What is read after the write is read after it.
+    let at = answers.iter().position(|frame| *frame == "6031610100000000").expect("acknowledged");
+    assert_eq!(answers[at + 1], "4231610100004E00", "read back first");
+    assert!(answers[at + 1..].contains(&"42306101770D0000"), "{answers:?}");
+}
+
+/// The same with answers as the table prints them: reads answered with 60h.
+#[test]
+fn table_19_with_its_60h() {
+    let devices = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/device/devices/dps.toml");
+    let text = fs::read_to_string(devices).expect("the description");
+    let text = text.replacen("name = \"dps\"", "name = \"dps60\"\nquirks = [\"upload-answered60\"]", 1);
+    let bench = Bench::described(&format!("[[device]]\nkind = \"dps60.toml\"\nnode = 127\n{}", channel(1, 50.0)));
+    fs::write(bench.path("dps60.toml"), text).expect("written");
+    let done = bench.run("unit 127 bar --device dps60.toml -f json").exit(0);
+    let change = &done.json()[0];
+    assert_eq!((&change["before"], &change["unit"]), (&json!("psi"), &json!("bar")));
+    let pressure = change["rescaled"].as_array().expect("a list").iter().find(|item| item["object"] == "0x6130:1");
+    let pressure = pressure.expect("the process value");
+    assert_eq!((&pressure["before"], &pressure["after"]), (&json!(50.0), &json!(3.447)));
+    let answers = done.frames_of("5FF");
+    for printed in ["603161010000AB00", "6030610150C30000", "6031610100000000", "6031610100004E00"] {
+        assert!(answers.contains(&printed), "{printed}");
+    }
+    // Without the quirk such an answer is no value.
+    bench.run("unit 127 bar").exit(6);
+}
+
+#[test]
+fn units_that_a_device_does_not_take_are_refused_with_those_that_it_takes() {
+    let bench = still();
+    let written = |done: &super::Done, id: &str| done.frames_of(id).iter().any(|frame| frame.starts_with('2'));
+    let done = bench.run("unit 5 pressure kPa").exit(2);
+    assert_eq!(done.stderr, "cangauge: node 5: pressure takes bar, psi, MPa, not kPa\n");
+    assert!(!written(&done, "605"));
+    let done = bench.run("unit 5 degF").exit(0);
+    assert!(done.stdout.starts_with("temperature "), "the only signal that is a temperature: {}", done.stdout);
+    // Table 20 of the DPS manual prints the codes in the order of the bytes on the bus.
+    let done = bench.run("unit 127 0x0000AB00").exit(2);
+    assert_eq!(
+        done.stderr,
+        "cangauge: node 127: pressure takes psi, bar, kPa, not 0x0000AB00\n\
+         hint: 0x0000AB00 is psi in the order of the bytes on the bus: 0x00AB0000\n"
+    );
+    bench.run("unit 3 ch4 K").fails(2, "cangauge: node 3: ch4 is in degC, and this device cannot change it\n");
+    bench.run("unit 5 pressure furlong").exit(2);
+    bench.run("unit 5 pressure bar psi").exit(2);
+    let done = bench.run("unit 127 psi").exit(0);
+    assert_eq!(done.stderr, "node 127: pressure was in psi already\n");
+    assert!(!written(&done, "67F"));
+    // By its raw code, and by an EDS that knows no choice: the device decides.
+    bench.run("unit 5 pressure 0x00AB0000").exit(0);
+}
+
+#[test]
+fn filters() {
+    let bench = still();
+    bench.run("filter 5").prints("pressure  none (0)  constant 1\n");
+    bench.run("filter 5 temperature").fails(6, "cangauge: node 5: temperature has no filter (61A0h, 61A1h)\n");
+    let done = bench.run("filter 5 --type moving --constant 8 -f json").exit(0);
+    assert_eq!(
+        done.json(),
+        [json!({"node": 5, "signal": "pressure", "code": 1, "type": "moving average", "constant": 8})]
+    );
+    // A damping is written, and shown by the constant that comes of it.
+    let done = bench.run("filter 5 --type moving --damping 100ms -f json").exit(0);
+    let filter = &done.json()[0];
+    assert_eq!((&filter["constant"], &filter["damping_shown"]), (&json!(156), &json!(true)));
+    assert!(done.frames_of("605").contains(&"2B23200164000000"), "{:?}", done.frames_of("605"));
+    let done = bench.run("filter 5 --damping 100ms").exit(2);
+    assert_eq!(
+        done.stderr,
+        "cangauge: node 5: pressure: a damping sets the moving average (none)\nhint: add --type moving\n"
+    );
+    // A damping that makes what stood there before cannot be told from none.
+    let done = bench.run("filter 5 --type moving --damping 1ms").exit(0);
+    assert!(done.stderr.starts_with("warning: node 5: the damping was acknowledged; the filter constant reads 1"));
+    // 0 is none of the filter types of the MC1609, whatever one of its tables says.
+    let done = bench.run("filter 3 ch1 --type none").exit(2);
+    assert_eq!(
+        done.stderr.lines().next(),
+        Some(
+            "cangauge: node 3: ch1 has no filter type \"none\", but repeating average (0), moving average (1), \
+             repeating average (2)"
+        )
+    );
+    bench.run("filter 3 ch1").prints("ch1  repeating average (0)  constant 0\n");
+    bench.run("filter 3 ch1 --type repeating").prints("ch1  repeating average (2)  constant 0\n");
+    bench.run("filter 3 --type moving").exit(2);
+    bench.run("filter 127").fails(6, "cangauge: node 127: it has no filter (61A0h, 61A1h)\n");
+}
+
+#[test]
+fn limits() {
+    let bench = still();
+    bench.run("limits 5 pressure").prints(
+        "delta       0 bar   (0x6133:1)\nlower       0 bar   (0x6134:1)\n\
+         upper       10 bar  (0x6135:1)\nhysteresis  0 bar   (0x6136:1)\n",
+    );
+    let done = bench.run("limits 5 temperature").exit(0);
+    assert_eq!(
+        done.stderr,
+        "warning: node 5: TPDO2 goes out by event, without a timer, and delta is 0: it may never be sent\n"
+    );
+    let done = bench.run("limits 5 temperature --delta 0.5 --lower -20 --upper 80 --hysteresis 1 -f json").exit(0);
+    assert_eq!(
+        done.json(),
+        [json!({"node": 5, "signal": "temperature", "delta": 0.5, "lower": -20.0, "upper": 80.0, "hysteresis": 1.0,
+            "unit": "degC", "silent": []})]
+    );
+    assert_eq!(done.stderr, format!("node 5: {STORE}"));
+    bench
+        .run("limits 5 pressure --lower 11")
+        .fails(2, "cangauge: node 5: pressure: the lower limit 11 is above the upper one, 10\n");
+    bench.run("limits 5 pressure --delta -1").refuses("delta cannot be less than 0: -1");
+    bench.run("limits 5 pressure --delta x").refuses("\"x\" is not a number (0.5, -20)");
+    bench.run("limits 5 pressure --delta inf").exit(2);
+    // What rises begins with the upper one.
+    let done = bench.run("limits 5 pressure --lower 12 --upper 14").exit(0);
+    let writes: Vec<String> = done
+        .frames_of("605")
+        .iter()
+        .filter(|frame| frame.starts_with("23"))
+        .map(|frame| frame[2..8].to_owned())
+        .collect();
+    assert_eq!(writes, ["356101", "346101"]);
+    bench
+        .run("limits 127 pressure")
+        .fails(6, "cangauge: node 127: pressure has no delta and no limits (0x6133:1 to 0x6136:1)\n");
+    bench.run("limits 5").exit(2);
+}
+
+#[test]
+fn minimum_and_maximum() {
+    // Pressure that moves, so that there is something to reset.
+    let bench = Bench::of("mh4@5");
+    let done = bench.run("minmax 5 -f json").exit(0);
+    let rows = done.json();
+    assert_eq!((rows[0]["signal"].as_str(), rows[1]["signal"].as_str()), (Some("pressure"), Some("temperature")));
+    assert!(rows[0]["min"].as_f64() <= rows[0]["max"].as_f64());
+    let done = bench.run("minmax 5 --reset -f json").exit(0);
+    assert_eq!(done.frames_of("605").iter().filter(|frame| frame.starts_with("232220")).count(), 2, "once a channel");
+    assert!(done.json()[0]["before"]["min"].is_number());
+    let still = still();
+    still
+        .run("minmax 5")
+        .prints("pressure     min 1.25 bar   max 1.25 bar\ntemperature  min 25.5 degC  max 25.5 degC\n");
+    still.run("minmax 2").prints("pressure  min 4.000 bar  max 4.000 bar\n");
+    still
+        .run("minmax 2 --reset")
+        .fails(6, "cangauge: node 2: no object of this device is known to reset minimum and maximum of pressure\n");
+    still
+        .run("minmax 127")
+        .fails(6, "cangauge: node 127: no object of this device is known to keep minimum and maximum\n");
+}
+
+#[test]
+fn errors_in_the_words_of_the_device() {
+    let overload = "[[device.overload]]\nchannel = 1\nfrom = \"0s\"\ndirection = \"high\"\n";
+    let bench = Bench::described(&format!(
+        "[[device]]\nkind = \"mh4\"\nnode = 5\n{overload}[[device]]\nkind = \"dps\"\nnode = 127\n{overload}\
+         [[device]]\nkind = \"d20\"\nnode = 2\n"
+    ));
+    bench.run("errors 5").prints(
+        "register  0x81 generic, manufacturer\n\
+         history   1 error\n\
+         \u{20}         0xF001 user input overload: pressure outside the range by more than 3.125 % (channel 1, status 0x03)\n",
+    );
+    let done = bench.run("errors 5 -f json").exit(0);
+    let object = &done.json()[0];
+    assert_eq!((&object["register"], &object["count"]), (&json!("0x81"), &json!(1)));
+    assert_eq!(object["history"][0]["raw"], "0x0103F001", "byte 4 before byte 3");
+    let done = bench.run("errors 5 --clear").exit(0);
+    assert_eq!(done.stdout, "register  0x81 generic, manufacturer\nhistory   empty\n");
+    assert_eq!(
+        done.stderr,
+        "node 5: 1 error deleted from the history\nnode 5: an error is still pending: generic, manufacturer\n"
+    );
+    assert!(done.frames_of("605").contains(&"2F03100000000000"));
+    // The DPS tells how many, and keeps none of them to be read.
+    bench.run("errors 127").prints("register  0x05 generic, voltage\nhistory   empty\n");
+    bench.run("errors 2").prints("register  0x00 no error\nhistory   none is kept\n");
+    bench.run("errors 2 --clear").fails(6, "cangauge: node 2: it keeps no error history (1003h)\n");
+    let done = bench.run("errors 9").exit(3);
+    assert!(done.stdout.is_empty());
+}

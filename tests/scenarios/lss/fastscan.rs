@@ -1,0 +1,202 @@
+//! Fastscan against slaves that are slow, many, forgetful or talkative.
+
+use super::slave::Slave;
+use super::{address, bus_of, configuring, ms};
+use cangauge::bus::memory::MemoryBus;
+use cangauge::bus::{Bus, Event, Mono};
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::lss::{FastscanError, LssAddress, Service};
+use cangauge::master::{LssError, Master, Timing};
+use std::time::Duration;
+
+const DPS: [u32; 4] = [0x362, 0x0044_3150, 0x0001_0000, 20002];
+
+/// Runs a scan and, where somebody is found, says who is in configuration state then.
+fn scan(bus: &mut MemoryBus) -> (Result<Option<LssAddress>, LssError>, Vec<[u32; 4]>) {
+    let mut master = Master::new(bus, Timing::default());
+    let mut lss = master.lss();
+    let found = lss.fastscan();
+    let is_configuring = lss.is_configuring();
+    // Kept from tidying up, to look at how it is.
+    std::mem::forget(lss);
+    let configuring = configuring(bus);
+    assert!(is_configuring || configuring.is_empty());
+    (found, configuring)
+}
+
+#[test]
+fn whoever_is_alone_is_found_within_a_second() {
+    for identity in [DPS, [0; 4], [u32::MAX; 4], [0x1234_5678, 0x9abc_def0, 1, 0x8000_0000]] {
+        for latency in [0, 100, 1000, 1500] {
+            let mut bus = bus_of([Slave::new(identity, 0xff).slow(&[latency])]);
+            let (found, configuring) = scan(&mut bus);
+            assert_eq!(found.unwrap(), Some(address(identity)));
+            assert_eq!(configuring, [identity]);
+            assert!(bus.mono() < Mono::at(Duration::from_secs(1)), "{identity:?} {latency}: {:?}", bus.mono());
+        }
+    }
+}
+
+#[test]
+fn nobody_without_a_node_id() {
+    let mut bus = bus_of([Slave::new(DPS, 5)]);
+    let (found, configuring) = scan(&mut bus);
+    assert_eq!((found.unwrap(), configuring.len()), (None, 0));
+}
+
+#[test]
+fn slow_devices_are_found_in_their_own_time() {
+    for latencies in [&[20_000][..], &[100_000], &[100, 100, 9000], &[100, 20_000, 100], &[40_000, 100, 100, 100]] {
+        let mut bus = bus_of([Slave::new(DPS, 0xff).slow(latencies)]);
+        let (found, configuring) = scan(&mut bus);
+        assert_eq!(found.unwrap(), Some(address(DPS)), "{latencies:?}");
+        assert_eq!(configuring, [DPS]);
+    }
+}
+
+#[test]
+fn three_are_found_one_after_the_other() {
+    let identities = [DPS, [0x362, 0x0044_3150, 0x0001_0000, 20003], [0x47, 1, 0x0001_0007, 99]];
+    for latencies in [[300, 300, 300], [200, 900, 1600], [100, 3000, 200], [5000, 100, 100]] {
+        let slaves = identities.iter().zip(latencies).map(|(&it, latency)| Slave::new(it, 0xff).slow(&[latency]));
+        let mut bus = bus_of(slaves);
+        let mut master = Master::new(&mut bus, Timing::default());
+        let mut lss = master.lss();
+        let mut found = Vec::new();
+        for node in 10.. {
+            let Some(address) = lss.fastscan().unwrap() else { break };
+            lss.configure_node_id(NodeId::new(node).ok()).unwrap();
+            lss.leave().unwrap();
+            found.push(address.parts());
+        }
+        drop(lss);
+        drop(master);
+        let nodes: Vec<u8> = found
+            .iter()
+            .map(|identity| bus.stations::<Slave>().find(|slave| slave.identity == *identity).unwrap().node)
+            .collect();
+        assert_eq!(nodes, [10, 11, 12], "{latencies:?}");
+        assert!(bus.stations::<Slave>().all(|slave| slave.told == 5), "each is told once, and asked for its address");
+    }
+}
+
+#[test]
+fn a_device_that_answers_everything_is_no_address() {
+    let mut babbler = Slave::new(DPS, 0xff);
+    babbler.babbles = Some(false);
+    let mut bus = bus_of([babbler]);
+    let (found, configuring) = scan(&mut bus);
+    assert!(matches!(found, Err(LssError::Fastscan(FastscanError::Babbler))), "{found:?}");
+    assert_eq!(configuring.len(), 0);
+}
+
+#[test]
+fn one_that_answers_everything_in_configuration_state_is_taken_out_of_it() {
+    let mut left_behind = Slave::new(DPS, 5);
+    left_behind.babbles = Some(true);
+    left_behind.is_configuring = true;
+    let other = [0x47, 1, 0x0001_0007, 99];
+    let mut bus = bus_of([left_behind, Slave::new(other, 0xff)]);
+    let (found, configuring) = scan(&mut bus);
+    assert_eq!((found.unwrap(), configuring), (Some(address(other)), vec![other]));
+}
+
+#[test]
+fn two_with_one_address_are_no_device() {
+    let mut bus = bus_of([Slave::new(DPS, 0xff).slow(&[200]), Slave::new(DPS, 0xff).slow(&[800])]);
+    let (found, _) = scan(&mut bus);
+    assert!(matches!(found, Err(LssError::Several { service: Service::Inquire(_), .. })), "{found:?}");
+}
+
+#[test]
+fn without_inquiry_the_address_itself_confirms() {
+    let mut bus = bus_of([Slave::new(DPS, 0xff).without(0x5a..=0x5e)]);
+    let (found, configuring) = scan(&mut bus);
+    assert_eq!((found.unwrap(), configuring), (Some(address(DPS)), vec![DPS]));
+    let mut mistaken = Slave::new(DPS, 0xff);
+    mistaken.says.insert(0x5d, vec![0x5d, 1, 2, 3, 4, 0, 0, 0]);
+    let (found, _) = scan(&mut bus_of([mistaken]));
+    assert!(matches!(found, Err(LssError::Mistaken { .. })), "{found:?}");
+}
+
+/// Whatever gets lost: who is found is there, and alone in configuration state.
+#[test]
+fn lost_answers_make_up_nobody() {
+    let (mut found, mut given_up) = (0, 0);
+    for first in 0..150 {
+        for more in [None, Some(first + 1), Some(first + 40)] {
+            let mut forgetful = Slave::new(DPS, 0xff);
+            forgetful.loses = more.into_iter().chain([first]).collect();
+            let (end, configuring) = scan(&mut bus_of([forgetful]));
+            match end {
+                Ok(Some(address)) => {
+                    assert_eq!((address.parts(), configuring), (DPS, vec![DPS]));
+                    found += 1;
+                }
+                // It was asked twice whether it is there.
+                Ok(None) => assert_eq!((first, more), (0, Some(1))),
+                Err(_) => given_up += 1,
+            }
+        }
+    }
+    assert!(given_up * 10 < found, "{found} found, {given_up} given up");
+}
+
+/// Answers that come when they like, of one to three slaves: whoever is found is there, and alone in configuration
+/// state.
+#[test]
+fn answers_at_leisure_make_up_nobody() {
+    let (mut found, mut given_up) = (0, 0);
+    let mut random = 1u64;
+    let mut next = |below: u64| {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 33) % below
+    };
+    for run in 0..240u32 {
+        let identities = [DPS, [0x362, 0x0044_3150, 0x0001_0000, run], [0x47, 1, 0x0001_0007, 99]];
+        let slaves = &identities[..1 + run as usize % 3];
+        let slaves: Vec<Slave> = slaves
+            .iter()
+            .map(|&identity| {
+                // Mostly at once; now and then the host has something else to do.
+                let latencies: Vec<u64> =
+                    (0..97).map(|_| if next(30) == 0 { next(40_000) } else { next(1500) }).collect();
+                Slave::new(identity, 0xff).slow(&latencies)
+            })
+            .collect();
+        let (end, configuring) = scan(&mut bus_of(slaves));
+        match end {
+            Ok(Some(address)) => {
+                assert_eq!(configuring, [address.parts()], "{run}");
+                found += 1;
+            }
+            Ok(None) => panic!("{run}: somebody is there"),
+            Err(LssError::Fastscan(FastscanError::Babbler)) => panic!("{run}: nobody talks too much"),
+            Err(_) => given_up += 1,
+        }
+    }
+    assert!(given_up * 10 < found, "{found} found, {given_up} given up");
+}
+
+/// Ctrl-C at any moment leaves nobody in configuration state.
+#[test]
+fn nobody_is_left_in_configuration_state() {
+    let mut interrupted = 0;
+    for moment in (0..400).step_by(3) {
+        let mut bus = bus_of([Slave::new(DPS, 0xff)]);
+        bus.interrupt_at(ms(moment));
+        let mut master = Master::new(&mut bus, Timing::default());
+        let mut lss = master.lss();
+        match lss.fastscan() {
+            Ok(Some(_)) => {}
+            Err(LssError::Master(cangauge::master::Error::Interrupted)) => interrupted += 1,
+            other => panic!("{other:?}"),
+        }
+        drop(lss);
+        drop(master);
+        let until = bus.mono() + Duration::from_millis(10);
+        while bus.receive(until).unwrap() != Event::Timeout {}
+        assert_eq!(configuring(&bus).len(), 0, "{moment}");
+    }
+    assert!(interrupted > 50, "{interrupted}");
+}

@@ -1,0 +1,336 @@
+//! The services one by one: who answers, how often, in time or not, and who is touched.
+
+use super::slave::Slave;
+use super::{address, bus_of, configuring, ms};
+use cangauge::bus::faults::{FaultPlan, Faulty};
+use cangauge::bus::memory::{MemoryBus, Outbox, Station};
+use cangauge::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp, TimestampSource};
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::{CanId, NodeId};
+use cangauge::canopen::lss::{ErrorCode, LssRange, Mode, Part, Service, Violation};
+use cangauge::master::lss::{Gathered, Others};
+use cangauge::master::{Error, Lss, LssError, Master, Timing};
+use cangauge::tasks::failure::{Failure, Kind};
+use std::time::Duration;
+
+const ONE: [u32; 4] = [0x362, 0x0044_3150, 0x0001_0000, 20002];
+const OTHER: [u32; 4] = [0x362, 0x0044_3150, 0x0001_0000, 20003];
+
+fn node(number: u8) -> NodeId {
+    NodeId::new(number).unwrap()
+}
+
+/// What comes of some services, and who is in configuration state when all is over.
+fn run<T>(bus: &mut MemoryBus, services: impl FnOnce(&mut Lss) -> Result<T, LssError>) -> Result<T, LssError> {
+    let mut master = Master::new(bus, Timing::default());
+    let mut lss = master.lss();
+    let result = services(&mut lss);
+    drop(lss);
+    drop(master);
+    let until = bus.mono() + Duration::from_millis(10);
+    while bus.receive(until).unwrap() != Event::Timeout {}
+    assert_eq!(configuring(bus).len(), 0, "left in configuration state");
+    result
+}
+
+/// A node-ID for the slave with an address, as a task would do it.
+fn assign(lss: &mut Lss, identity: [u32; 4], to: NodeId) -> Result<(), LssError> {
+    lss.switch_global(Mode::Waiting)?;
+    lss.switch_selective(&address(identity))?;
+    lss.configure_node_id(Some(to))?;
+    lss.store()
+}
+
+#[test]
+fn only_the_slave_that_was_addressed_is_told_anything() {
+    for order in [[ONE, OTHER], [OTHER, ONE]] {
+        let mut bus = bus_of(order.map(|identity| Slave::new(identity, 5)));
+        // Somebody has left everybody in configuration state.
+        bus.stations_mut::<Slave>().for_each(|slave| slave.is_configuring = true);
+        run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();
+        for slave in bus.stations::<Slave>() {
+            let expected = if slave.identity == ONE { (12, Some(12), 2) } else { (5, None, 0) };
+            assert_eq!((slave.node, slave.stored, slave.told), expected);
+        }
+    }
+}
+
+#[test]
+fn an_address_is_repeated_from_its_first_part() {
+    let mut slave = Slave::new(ONE, 5);
+    slave.loses = [0].into();
+    let mut bus = bus_of([slave, Slave::new(OTHER, 6)]);
+    run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();
+    assert_eq!(bus.stations::<Slave>().map(|slave| slave.node).collect::<Vec<_>>(), [12, 6]);
+    let mut bus = bus_of([Slave::new(OTHER, 6)]);
+    let error = run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap_err();
+    assert_eq!(error.to_string(), "LSS switch state selective: no answer within 500 ms");
+    assert_eq!(bus.stations::<Slave>().map(|slave| slave.told).sum::<usize>(), 0);
+}
+
+#[test]
+fn a_store_may_take_its_time_and_is_asked_for_once() {
+    let mut bus = bus_of([Slave::new(ONE, 5).slow(&[300, 300, 2_900_000])]);
+    run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();
+    let mut slave = Slave::new(ONE, 5);
+    slave.says.insert(0x17, vec![]);
+    let mut bus = bus_of([slave]);
+    let error = run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap_err();
+    assert_eq!(error.to_string(), "LSS store configuration: no answer within 3 s");
+    assert_eq!(bus.stations::<Slave>().map(|slave| slave.told).sum::<usize>(), 2);
+}
+
+#[test]
+fn what_the_slave_says_is_what_it_said() {
+    for (said, expected, kind) in [
+        (&[0x17, 0, 0, 0, 0, 0, 0, 0][..], "", None),
+        (&[0x17, 0], "", None),
+        (
+            &[0x17, 1, 0, 0, 0, 0, 0, 0],
+            "LSS store configuration: refused by the device (error 1, storing not supported)",
+            Some(Kind::Refused),
+        ),
+        (
+            &[0x17, 0xff, 7, 0, 0, 0, 0, 0],
+            "LSS store configuration: refused by the device (error 255, an error of the manufacturer's own: 7)",
+            Some(Kind::Refused),
+        ),
+        (&[0x17], "LSS store configuration: frame too short: 7E4#17", Some(Kind::Unexpected)),
+        // The answer to something else is none.
+        (&[0x11, 0, 0, 0, 0, 0, 0, 0], "LSS store configuration: no answer within 3 s", Some(Kind::NoAnswer)),
+        (&[0x44, 0, 0, 0, 0, 0, 0, 0], "LSS store configuration: no answer within 3 s", Some(Kind::NoAnswer)),
+    ] {
+        let mut slave = Slave::new(ONE, 5);
+        slave.says.insert(0x17, said.to_vec());
+        let result = run(&mut bus_of([slave]), |lss| assign(lss, ONE, node(12)));
+        assert_eq!(result.as_ref().err().map(ToString::to_string).unwrap_or_default(), expected);
+        assert_eq!(result.err().map(|error| Failure::from(error).kind), kind, "{said:X?}");
+    }
+    let code = ErrorCode { code: 1, specific: 0 };
+    let mut slave = Slave::new(ONE, 5);
+    slave.says.insert(0x13, vec![0x13, 1, 0, 0, 0, 0, 0, 0]);
+    let refused = run(&mut bus_of([slave]), |lss| {
+        lss.switch_global(Mode::Configuration)?;
+        lss.configure_bit_timing(0, 5)
+    });
+    let service = Service::ConfigureBitTiming;
+    assert!(matches!(refused, Err(LssError::Refused { service: s, code: c }) if (s, c) == (service, code)));
+}
+
+#[test]
+fn several_in_configuration_state_are_told_from_one() {
+    let all = |bus: &mut MemoryBus| {
+        run(bus, |lss| {
+            lss.switch_global(Mode::Configuration)?;
+            Ok((lss.inquire(Part::Serial)?, lss.inquire(Part::Vendor)?, lss.inquire_node_id()?))
+        })
+    };
+    let (serial, vendor, id) = all(&mut bus_of([Slave::new(ONE, 5)])).unwrap();
+    assert_eq!((serial.is_one(), vendor.is_one(), id.is_one()), (true, true, true));
+    assert_eq!((serial.answers, vendor.answers, id.answers), (vec![20002], vec![0x362], vec![Some(node(5))]));
+    // However late the second one is.
+    for latency in [2000, 20_000, 400_000] {
+        let (serial, vendor, id) =
+            all(&mut bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 5).slow(&[latency])])).unwrap();
+        assert_eq!(serial.answers, [20002, 20003]);
+        assert_eq!((serial.is_one(), vendor.is_one(), id.is_one()), (false, false, false), "{latency}");
+        assert_eq!((vendor.answers, id.answers), (vec![0x362], vec![Some(node(5))]));
+    }
+    // Answers at the very same time are one frame if they are the same, else an error frame and then two.
+    let (serial, vendor, _) = all(&mut bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 5)])).unwrap();
+    assert_eq!((serial.is_one(), vendor.is_one()), (false, true));
+    // What is meant for one was taken by two: no success.
+    let mut bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 5).slow(&[2000])]);
+    let both = run(&mut bus, |lss| {
+        lss.switch_global(Mode::Configuration)?;
+        lss.configure_node_id(Some(node(12)))
+    });
+    assert!(matches!(both, Err(LssError::Several { service: Service::ConfigureNodeId, .. })));
+}
+
+#[test]
+fn others_of_the_kind() {
+    let others = |more: Vec<Slave>| {
+        let slaves = [Slave::new(ONE, 5)].into_iter().chain(more);
+        run(&mut bus_of(slaves), |lss| lss.others(&address(ONE))).unwrap()
+    };
+    let range = |text: &str| Others::Within(text.parse::<LssRange>().unwrap());
+    assert_eq!(others(vec![]), Others::None);
+    assert_eq!(others(vec![Slave::new([1, 2, 3, 4], 5)]), Others::None);
+    assert_eq!(others(vec![Slave::new(OTHER, 5)]), range("0x362:0x443150:0-0xFFFFFFFF:20003-0xFFFFFFFF"));
+    let older = [ONE[0], ONE[1], 1, 7];
+    assert_eq!(others(vec![Slave::new(older, 5)]), range("0x362:0x443150:0-0xFFFFFFFF:0-20001"));
+    let newer = [ONE[0], ONE[1], 0x0001_0001, ONE[3]];
+    assert_eq!(others(vec![Slave::new(newer, 5)]), range("0x362:0x443150:0x10001-0xFFFFFFFF:20002"));
+    // The very same twice, if not at the very same time.
+    assert_eq!(others(vec![Slave::new(ONE, 5).slow(&[900])]), range("0x362:0x443150:0x10000:20002"));
+    let mut bus = bus_of([Slave::new(ONE, 5).without(0x46..=0x4b)]);
+    assert_eq!(run(&mut bus, |lss| lss.others(&address(ONE))).unwrap(), Others::Unproven);
+}
+
+#[test]
+fn who_has_no_node_id() {
+    for (id, expected) in [(5, false), (0xff, true)] {
+        let mut bus = bus_of([Slave::new(ONE, id)]);
+        assert_eq!(run(&mut bus, |lss| lss.identify_unconfigured()).unwrap(), expected);
+    }
+}
+
+#[test]
+fn an_interruption_ends_in_waiting_state_and_changes_nothing_more() {
+    let mut interrupted = 0;
+    for moment in 0..60 {
+        let mut bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 6)]);
+        bus.interrupt_at(ms(moment));
+        match run(&mut bus, |lss| assign(lss, ONE, node(12))) {
+            Ok(()) => {}
+            Err(LssError::Master(Error::Interrupted)) => interrupted += 1,
+            Err(other) => panic!("{other}"),
+        }
+        let other = bus.stations::<Slave>().find(|slave| slave.identity == OTHER).unwrap();
+        assert_eq!((other.node, other.stored, other.told), (6, None, 0));
+    }
+    assert!(interrupted > 20, "{interrupted}");
+}
+
+/// Another LSS master that sends to everybody, once.
+struct Rival(Option<Mono>);
+
+impl Station for Rival {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
+
+    fn wake(&mut self, _: Mono, out: &mut Outbox) {
+        self.0 = None;
+        out.send("7E5#0401000000000000".parse().unwrap());
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.0
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn another_master_ends_the_work() {
+    let mut bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 6)]);
+    bus.attach(Rival(Some(ms(9))));
+    let error = run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap_err();
+    assert_eq!(error.to_string(), "another LSS master sends at the same time: 7E5#0401000000000000");
+    assert_eq!(bus.stations::<Slave>().filter(|slave| slave.node == 12).count(), 0);
+    // Before the work began it was none of our business.
+    let mut bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 6)]);
+    bus.attach(Rival(Some(ms(9))));
+    while bus.receive(ms(10)).unwrap() != Event::Timeout {}
+    run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();
+}
+
+/// A wire that does something to the slaves' answers, or has one on it before anything is asked.
+struct Odd {
+    bus: MemoryBus,
+    /// Two answers at a time are an error frame.
+    collides: bool,
+    /// What was received before.
+    stale: Option<Frame>,
+}
+
+impl Bus for Odd {
+    fn name(&self) -> &str {
+        self.bus.name()
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        self.bus.bit_rate()
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        self.bus.timestamps()
+    }
+
+    fn now(&self) -> Stamp {
+        self.bus.now()
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        self.bus.listen(filters)
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.bus.send(frame)
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        if let Some(frame) = self.stale.take() {
+            return Ok(Event::Frame(Received { frame, at: self.now() }));
+        }
+        match self.bus.receive(deadline)? {
+            Event::Frame(received) if self.collides && received.frame.id() == CanId::LSS_SLAVE => {
+                Ok(Event::Fault(Fault::Protocol, received.at))
+            }
+            event => Ok(event),
+        }
+    }
+}
+
+#[test]
+fn answers_that_destroy_each_other_are_no_silence() {
+    let bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 6)]);
+    let mut bus = Odd { bus, collides: true, stale: None };
+    let mut master = Master::new(&mut bus, Timing::default());
+    let mut lss = master.lss();
+    lss.switch_global(Mode::Configuration).unwrap();
+    let serial = lss.inquire(Part::Serial).unwrap();
+    assert!(matches!(&serial, Gathered { answers, faults, .. } if answers.is_empty() && faults[0] == Fault::Protocol));
+    assert!(!serial.is_one());
+}
+
+#[test]
+fn what_was_answered_before_the_question_is_no_answer() {
+    let stale = "7E4#1700000000000000".parse().ok();
+    let mut bus = Odd { bus: bus_of([]), collides: false, stale };
+    let mut master = Master::new(&mut bus, Timing::default());
+    assert!(matches!(master.lss().store(), Err(LssError::NoAnswer { service: Service::Store, .. })));
+}
+
+/// What could not be sent before Ctrl-C is not sent after it.
+#[test]
+fn what_waited_to_be_sent_is_given_up() {
+    let mut slave = Slave::new(ONE, 5);
+    slave.is_configuring = true;
+    let mut bus = bus_of([slave]);
+    bus.interrupt_at(ms(3));
+    let plan = FaultPlan { queue_full: (0..20).collect(), ..FaultPlan::default() };
+    let mut bus = Faulty::new(bus, plan);
+    let mut master = Master::new(&mut bus, Timing::default());
+    assert!(matches!(master.lss().store(), Err(LssError::Master(Error::Interrupted))));
+    master.lss().switch_global(Mode::Waiting).unwrap();
+    drop(master);
+    let slave = bus.inner().stations::<Slave>().next().unwrap();
+    assert_eq!((slave.is_configuring, slave.told), (false, 0));
+}
+
+/// However often the queue is full: an answer that comes at once is heard.
+#[test]
+fn an_answer_is_heard_however_the_request_went_out() {
+    for full in 0..12 {
+        let mut slave = Slave::new(ONE, 5).slow(&[0]);
+        slave.is_configuring = true;
+        let bus = bus_of([slave]).with_bit_rate(1_000_000);
+        let plan = FaultPlan { queue_full: (0..full).collect(), ..FaultPlan::default() };
+        let mut bus = Faulty::new(bus, plan);
+        Master::new(&mut bus, Timing::default()).lss().store().unwrap();
+    }
+}
+
+#[test]
+fn half_a_number_is_no_number() {
+    let mut slave = Slave::new(ONE, 5);
+    slave.says.insert(0x5d, vec![0x5d, 0x22, 0x4e]);
+    let result = run(&mut bus_of([slave]), |lss| {
+        lss.switch_global(Mode::Configuration)?;
+        lss.inquire(Part::Serial)
+    });
+    assert!(matches!(result, Err(LssError::Violation { violation: Violation::Short, .. })));
+}

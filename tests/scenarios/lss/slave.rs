@@ -1,0 +1,180 @@
+//! An LSS slave that a test can make slow, forgetful, talkative or plain wrong.
+
+use cangauge::bus::Mono;
+use cangauge::bus::memory::{Outbox, Station};
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::CanId;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+pub(super) struct Slave {
+    pub(super) identity: [u32; 4],
+    /// FFh: none.
+    pub(super) node: u8,
+    pub(super) stored: Option<u8>,
+    pub(super) is_configuring: bool,
+    /// Between request and answer, one after the other, again and again.
+    pub(super) latencies: Vec<Duration>,
+    /// Services that it does not know.
+    pub(super) unknown: BTreeSet<u8>,
+    /// What it says to a service instead of what it should; empty: nothing.
+    pub(super) says: BTreeMap<u8, Vec<u8>>,
+    /// Whether it answers every fastscan frame, whatever is asked, in this state of being configured.
+    pub(super) babbles: Option<bool>,
+    /// Which of its answers never reach the wire, counted from 0.
+    pub(super) loses: BTreeSet<usize>,
+    /// How often it was told to do something that is for one slave only.
+    pub(super) told: usize,
+    selected: usize,
+    identified: usize,
+    compares: u8,
+    answers: usize,
+    waiting: VecDeque<(Mono, Frame)>,
+}
+
+impl Slave {
+    pub(super) fn new(identity: [u32; 4], node: u8) -> Slave {
+        Slave {
+            identity,
+            node,
+            stored: None,
+            is_configuring: false,
+            latencies: vec![Duration::from_micros(300)],
+            unknown: BTreeSet::new(),
+            says: BTreeMap::new(),
+            babbles: None,
+            loses: BTreeSet::new(),
+            told: 0,
+            selected: 0,
+            identified: 0,
+            compares: 0,
+            answers: 0,
+            waiting: VecDeque::new(),
+        }
+    }
+
+    /// The same with these latencies in microseconds.
+    pub(super) fn slow(mut self, latencies: &[u64]) -> Slave {
+        self.latencies = latencies.iter().map(|&latency| Duration::from_micros(latency)).collect();
+        self
+    }
+
+    /// What it does not know; the DPS manual names 04h, 40h to 44h, 11h, 13h, 15h and 17h only.
+    pub(super) fn without(mut self, services: impl IntoIterator<Item = u8>) -> Slave {
+        self.unknown.extend(services);
+        self
+    }
+
+    fn fastscan(&mut self, number: u32, [bit_check, sub, next]: [u8; 3]) -> bool {
+        if self.babbles == Some(self.is_configuring) {
+            return true;
+        }
+        if self.node != 0xff || self.is_configuring {
+            return false;
+        }
+        if bit_check == 0x80 {
+            self.compares = 0;
+            return true;
+        }
+        let fits = (self.identity[usize::from(sub)] ^ number) >> bit_check == 0;
+        if sub != self.compares || !fits {
+            return false;
+        }
+        if bit_check == 0 {
+            self.is_configuring = next < sub;
+            self.compares = next;
+        }
+        true
+    }
+
+    fn answer(&mut self, data: [u8; 8]) -> Option<Vec<u8>> {
+        let [service, first, a, b, c, tail @ ..] = data;
+        let number = u32::from_le_bytes([first, a, b, c]);
+        if self.unknown.contains(&service) {
+            return None;
+        }
+        let for_one = matches!(service, 0x11 | 0x13 | 0x15 | 0x17 | 0x5a..=0x5e);
+        if for_one && !self.is_configuring {
+            return None;
+        }
+        if for_one {
+            self.told += 1;
+            if let Some(said) = self.says.get(&service) {
+                return Some(said.clone()).filter(|said| !said.is_empty());
+            }
+        }
+        match service {
+            0x04 => {
+                self.is_configuring = first == 1;
+                None
+            }
+            0x40..=0x43 => {
+                let part = usize::from(service - 0x40);
+                let fits = self.identity[part] == number && (part == 0 || self.selected == part);
+                self.selected = if fits { part + 1 } else { 0 };
+                let is_meant = self.selected == 4 && !self.is_configuring;
+                self.is_configuring |= is_meant;
+                is_meant.then(|| vec![0x44])
+            }
+            0x46..=0x4b => {
+                let limit = usize::from(service - 0x46);
+                let fits = match limit {
+                    0 | 1 => self.identity[limit] == number,
+                    2 => self.identity[2] >= number,
+                    3 => self.identity[2] <= number,
+                    4 => self.identity[3] >= number,
+                    _ => self.identity[3] <= number,
+                };
+                self.identified = if fits && (limit == 0 || self.identified == limit) { limit + 1 } else { 0 };
+                (self.identified == 6).then(|| vec![0x4f])
+            }
+            0x4c => (self.node == 0xff).then(|| vec![0x50]),
+            0x51 => self.fastscan(number, tail).then(|| vec![0x4f]),
+            0x11 => {
+                self.node = first;
+                Some(vec![service, 0, 0])
+            }
+            0x17 => {
+                self.stored = Some(self.node);
+                Some(vec![service, 0, 0])
+            }
+            0x13 => Some(vec![service, 0, 0]),
+            0x5a..=0x5d => {
+                let number = self.identity[usize::from(service - 0x5a)].to_le_bytes();
+                Some([&[service], &number[..]].concat())
+            }
+            0x5e => Some(vec![service, self.node]),
+            _ => None,
+        }
+    }
+}
+
+impl Station for Slave {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, now: Mono, frame: &Frame, _: &mut Outbox) {
+        let (true, Some(data)) = (frame.id() == CanId::LSS_MASTER, frame.all_eight()) else { return };
+        let Some(mut answer) = self.answer(data) else { return };
+        if !self.says.contains_key(&data[0]) {
+            answer.resize(8, 0);
+        }
+        let latency = self.latencies[self.answers % self.latencies.len()];
+        let at = self.waiting.back().map_or(now + latency, |(last, _)| (now + latency).max(*last));
+        if !self.loses.contains(&self.answers) {
+            self.waiting.push_back((at, Frame::new(CanId::LSS_SLAVE, &answer).unwrap()));
+        }
+        self.answers += 1;
+    }
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        while self.waiting.front().is_some_and(|(at, _)| *at <= now) {
+            out.send(self.waiting.pop_front().unwrap().1);
+        }
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.waiting.front().map(|(at, _)| *at)
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}

@@ -1,0 +1,247 @@
+//! Interfaces with bit rates: two controllers on one wire, which QEMU emulates and `tests/socketcan/qemu` provides.
+//! Frames pass there whatever the rates are.
+
+use crate::program::{cangauge, command, setting, shown, without_the_right};
+use crate::{assert_nothing_more, frame, next, next_frame, run};
+use cangauge::bus::socketcan::SocketCan;
+use cangauge::bus::{Bus, BusError, Mode};
+use serde_json::{Value, json};
+use std::process::Stdio;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// can0, down and with a rate of 125k, and can1, up, for one test at a time.
+fn controllers() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    ip("can0 down");
+    ip("can0 type can bitrate 125000 listen-only off restart-ms 100");
+    ip("can1 down");
+    ip("can1 up type can bitrate 125000 listen-only off");
+    alone
+}
+
+fn ip(line: &str) {
+    let words: Vec<&str> = ["link", "set"].into_iter().chain(line.split_whitespace()).collect();
+    run("ip", &words);
+}
+
+/// The bit rate of an interface that is up, by `ip`.
+fn rate_of(name: &str) -> Value {
+    let (up, timing, _) = setting(name);
+    assert!(up, "{name}");
+    timing["bitrate"].clone()
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn up_at_a_rate_and_down() {
+    let _alone = controllers();
+    let before = setting("can0");
+    cangauge("bus up can0 250k").is(0, "", "can0 is up at 250000 bit/s; it was down at 125000 bit/s\n");
+    assert_eq!((rate_of("can0"), setting("can0").2), (json!(250_000), before.2.clone()), "and nothing else");
+
+    let mut bus = SocketCan::open("can0").unwrap();
+    cangauge("bus up can0 250k").is(0, "", "can0 is up at 250000 bit/s already: nothing was changed\n");
+    cangauge("bus up can0").is(0, "", "can0 is up at 250000 bit/s already: nothing was changed\n");
+    assert_nothing_more(&mut bus);
+    cangauge("bus up can0 500k").is(0, "", "can0 is up at 500000 bit/s; it was up at 250000 bit/s\n");
+    assert_eq!(rate_of("can0"), 500_000);
+
+    let listens = "can0 is up at 500000 bit/s, listen-only; it was up at 500000 bit/s\n";
+    cangauge("bus up can0 500k --listen-only").is(0, "", listens);
+    assert_eq!(setting("can0").2[0], json!(["LISTEN-ONLY"]));
+    let back = "can0 is up at 500000 bit/s; it was up at 500000 bit/s, listen-only\n";
+    cangauge("bus up can0 500000").is(0, "", back);
+    assert_eq!(setting("can0").2, before.2);
+
+    cangauge("bus down can0").is(0, "", "can0 is down at 500000 bit/s; it was up at 500000 bit/s\n");
+    assert!(!setting("can0").0);
+    cangauge("bus up can0").is(0, "", "can0 is up at 500000 bit/s; it was down at 500000 bit/s\n");
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn the_list_tells_what_the_driver_tells() {
+    let _alone = controllers();
+    let text = cangauge("bus list").stdout;
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
+    assert_eq!(rows[1], ["can0", "down", "125000", "stopped", "normal", "0", "0", "kvaser_pci"]);
+    assert_eq!(rows[2], ["can1", "up", "125000", "error-active", "normal", "0", "0", "kvaser_pci"]);
+    let done = cangauge("bus up can0 1M --format json");
+    let object: Value = serde_json::from_str(&done.stdout).unwrap();
+    assert_eq!(
+        object,
+        json!({"interface": "can0", "up": true, "driver": "kvaser_pci", "kind": "can", "bit_rate": 1_000_000,
+            "sample_point": 0.75, "state": "error-active", "listen_only": false, "restart_ms": 100, "tx_errors": 0,
+            "rx_errors": 0, "bit_rates": null})
+    );
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn without_the_right_the_lines_to_type_are_told() {
+    let _alone = controllers();
+    let before = setting("can0");
+    let by_hand = "hint: by hand: sudo ip link set can0 down; sudo ip link set can0 type can bitrate 250000; \
+                   sudo ip link set can0 up\n";
+    let done = without_the_right("bus up can0 250k");
+    assert_eq!((done.code, done.stdout.as_str()), (Some(5), ""));
+    assert!(done.stderr.starts_with("cangauge: no permission to set the bit rate of can0"), "{}", done.stderr);
+    assert!(done.stderr.ends_with(by_hand), "{}", done.stderr);
+    let done = without_the_right("bus detect can0");
+    let refused = "cangauge: no permission to set the bit rate of can0\nhint: by hand: sudo cangauge bus detect can0\n";
+    done.is(5, "", refused);
+    assert_eq!(setting("can0"), before);
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn an_open_bus_goes_to_another_rate_and_back() {
+    let _alone = controllers();
+    ip("can0 up");
+    let before = setting("can0");
+    let (mut bus, mut other) = (SocketCan::open("can0").unwrap(), SocketCan::open("can1").unwrap());
+    assert_eq!(bus.bit_rate(), Some(125_000));
+    bus.can_set_bit_rate().unwrap();
+    other.send(&frame("181#01")).unwrap();
+    thread::sleep(Duration::from_millis(100));
+    bus.set_bit_rate(250_000, Mode::Normal).unwrap();
+    assert_eq!((rate_of("can0"), bus.bit_rate()), (json!(250_000), Some(250_000)));
+    assert_eq!(setting("can0").2, before.2, "and nothing else");
+    // That it was down for a moment is no news, and what was heard before is no frame of the new rate.
+    assert_nothing_more(&mut bus);
+    other.send(&frame("182#02")).unwrap();
+    assert_eq!(next_frame(&mut bus), "182#02");
+    bus.send(&frame("183#03")).unwrap();
+    assert_eq!(next_frame(&mut other), "183#03");
+
+    bus.set_bit_rate(500_000, Mode::ListenOnly).unwrap();
+    assert_eq!((rate_of("can0"), setting("can0").2[0].clone()), (json!(500_000), json!(["LISTEN-ONLY"])));
+    other.send(&frame("184#04")).unwrap();
+    assert_eq!(next_frame(&mut bus), "184#04");
+
+    bus.put_back_bit_rate().unwrap();
+    assert_eq!((setting("can0"), bus.bit_rate()), (before.clone(), Some(125_000)));
+    bus.put_back_bit_rate().unwrap();
+    other.send(&frame("185#05")).unwrap();
+    assert_eq!(next_frame(&mut bus), "185#05");
+    assert_eq!(setting("can0"), before);
+    // What others do to the interface is news as before.
+    ip("can0 down");
+    assert_eq!(next(&mut bus), cangauge::bus::Event::Link(false));
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn a_rate_that_the_controller_cannot_do_leaves_it_as_it_was() {
+    let _alone = controllers();
+    ip("can0 up");
+    let before = setting("can0");
+    let (mut bus, mut other) = (SocketCan::open("can0").unwrap(), SocketCan::open("can1").unwrap());
+    for rate in [0, 3_000_000, u32::MAX] {
+        let error = bus.set_bit_rate(rate, Mode::ListenOnly).unwrap_err();
+        assert!(matches!(error, BusError::BitRate { bit_rate, .. } if bit_rate == rate), "{error:?}");
+        assert_eq!((setting("can0"), bus.bit_rate()), (before.clone(), Some(125_000)));
+    }
+    assert_nothing_more(&mut bus);
+    other.send(&frame("181#01")).unwrap();
+    assert_eq!(next_frame(&mut bus), "181#01");
+    let done = cangauge("bus up can0 1k");
+    assert_eq!((done.code, done.stdout.as_str()), (Some(5), ""));
+    assert!(done.stderr.starts_with("cangauge: can0 cannot do 1000 bit/s: "), "{}", done.stderr);
+    assert_eq!(setting("can0"), before);
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn bits_put_together_by_hand_come_back_as_they_were() {
+    let _alone = controllers();
+    ip("can0 type can tq 500 prop-seg 5 phase-seg1 5 phase-seg2 5 sjw 2");
+    for direction in ["down", "up"] {
+        ip(&format!("can0 {direction}"));
+        let before = setting("can0");
+        assert_eq!((before.0, &before.1["bitrate"], &before.1["sjw"]), (direction == "up", &json!(125_000), &json!(2)));
+        let mut bus = SocketCan::open_even_down("can0").unwrap();
+        bus.set_bit_rate(1_000_000, Mode::ListenOnly).unwrap();
+        assert_eq!(rate_of("can0"), 1_000_000);
+        bus.put_back_bit_rate().unwrap();
+        assert_eq!(setting("can0"), before);
+    }
+}
+
+/// Sends frames from can1 while `work` is done, and looks at can0 in between.
+fn with_traffic<T>(work: impl FnOnce() -> T) -> (T, Vec<Value>) {
+    let over = AtomicBool::new(false);
+    let mut other = SocketCan::open("can1").unwrap();
+    thread::scope(|scope| {
+        let traffic = scope.spawn(|| {
+            let mut seen = Vec::new();
+            while !over.load(Ordering::Relaxed) {
+                // Where nobody takes it the queue may fill.
+                let _ = other.send(&frame("705#05"));
+                seen.push(shown("can0")["linkinfo"]["info_data"]["ctrlmode"].clone());
+            }
+            seen
+        });
+        let result = work();
+        over.store(true, Ordering::Relaxed);
+        (result, traffic.join().unwrap())
+    })
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn a_running_bus_is_listened_to() {
+    let _alone = controllers();
+    for direction in ["down", "up"] {
+        ip(&format!("can0 {direction}"));
+        let before = setting("can0");
+        let (done, seen) = with_traffic(|| cangauge("bus detect can0 --for 10s"));
+        assert_eq!((done.code, done.stdout.as_str()), (Some(0), "125000\n"), "{}", done.stderr);
+        assert!(done.stderr.starts_with("125000 bit/s: 3 valid frames, 0 errors\n"), "{}", done.stderr);
+        assert!(seen.contains(&json!(["LISTEN-ONLY"])), "it only listens: {seen:?}");
+        assert_eq!(setting("can0"), before);
+    }
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn a_silent_bus_tells_nothing() {
+    let _alone = controllers();
+    let before = setting("can0");
+    let done = cangauge("bus detect can0 --for 50ms --format json -q");
+    assert_eq!(done.code, Some(3), "{}", done.stderr);
+    let found: Value = serde_json::from_str(&done.stdout).unwrap();
+    let tried: Vec<&Value> = found["tried"].as_array().unwrap().iter().map(|tried| &tried["bit_rate"]).collect();
+    assert_eq!(
+        tried,
+        [125_000, 250_000, 500_000, 1_000_000, 100_000, 50_000, 20_000, 10_000, 800_000]
+            .map(|rate| json!(rate))
+            .each_ref()
+    );
+    assert_eq!(found["bit_rate"], Value::Null);
+    assert_eq!(setting("can0"), before);
+    // The other controller acknowledges at every rate here, so that an acknowledge proves nothing.
+    let done = cangauge("bus detect can0 --active --for 50ms -q");
+    assert_eq!((done.code, done.stdout.as_str()), (Some(3), ""), "{}", done.stderr);
+    assert_eq!(setting("can0"), before);
+}
+
+#[test]
+#[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
+fn interrupted_it_is_put_back() {
+    let _alone = controllers();
+    let before = setting("can0");
+    let child = command("bus detect can0 --for 60s").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let patience = Instant::now() + Duration::from_secs(60);
+    while setting("can0").2[0] != json!(["LISTEN-ONLY"]) || !setting("can0").0 {
+        assert!(Instant::now() < patience, "it does not begin");
+    }
+    run("kill", &["-INT", &child.id().to_string()]);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    assert_eq!(setting("can0"), before);
+}
