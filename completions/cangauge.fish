@@ -48,6 +48,12 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "read" -d 'Read me
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "nmt" -d 'Send NMT commands and tell states'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sdo" -d 'Read and write objects of the object dictionary'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "info" -d 'Tell everything about one device on one page'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "unit" -d 'Tell or set the physical unit of a signal (6131h)'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "filter" -d 'Tell or set the filter of a signal: type (61A0h) and constant (61A1h)'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "limits" -d 'Tell or set what makes a TPDO of a signal go out by itself: delta, limits, hysteresis (x133h to x136h)'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "minmax" -d 'Tell the lowest and highest value that the device has measured, or reset them'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "errors" -d 'Tell the errors of a device: register (1001h) and history (1003h) in words, or clear the history'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "bus" -d 'List CAN interfaces, switch them on and off, find the bit rate of a bus'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "completions" -d 'Print the completions for a shell'
@@ -400,6 +406,131 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Lea
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite files that exist'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l type -d 'What the filter does' -r -f -a "none\t''
+moving\t''
+repeating\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l constant -d 'How many steps it takes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l damping -d 'Within which time the value follows a step; the device works out the constant' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l delta -d 'A change of at least this sends; 0 is off' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l lower -d 'Below it, it sends' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l upper -d 'Above it, it sends' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l hysteresis -d 'How far back behind a limit before it counts again' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l reset -d 'Begin anew; printed is what was there before'
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l device -d 'Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in TOML; NODE=NAME for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l eds -d 'Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s f -l format -d 'Form of the output: for people, one object a line, or comma-separated; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l trace -d 'Write every frame sent and received to FILE, as candump -L does; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l progress -d 'Show live values and progress on stderr; auto: on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s q -l quiet -d 'Say less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s v -l verbose -d 'Say more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l clear -d 'Delete the history; an error that is pending stays in the register'
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
@@ -546,12 +677,18 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s q -l q
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "nmt" -d 'Send NMT commands and tell states'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "bus" -d 'List CAN interfaces, switch them on and off, find the bit rate of a bus'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "completions" -d 'Print the completions for a shell'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log bus sim completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "nmt" -d 'Send NMT commands and tell states'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "info" -d 'Tell everything about one device on one page'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "unit" -d 'Tell or set the physical unit of a signal (6131h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "filter" -d 'Tell or set the filter of a signal: type (61A0h) and constant (61A1h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "limits" -d 'Tell or set what makes a TPDO of a signal go out by itself: delta, limits, hysteresis (x133h to x136h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "minmax" -d 'Tell the lowest and highest value that the device has measured, or reset them'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "errors" -d 'Tell the errors of a device: register (1001h) and history (1003h) in words, or clear the history'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "bus" -d 'List CAN interfaces, switch them on and off, find the bit rate of a bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "completions" -d 'Print the completions for a shell'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log info unit filter limits minmax errors bus sim completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'

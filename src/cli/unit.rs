@@ -24,7 +24,7 @@ use std::io::{self, Write};
 pub(crate) struct Unit {
     /// Which node: 5, 0x7f
     node: NodeId,
-    /// pressure, temperature, ch1 to ch16; and the unit to set: bar, psi, MPa, kPa, mbar, °C or degC, K,
+    /// pressure, temperature, ch1 to ch16; and the unit to set: bar, psi, MPa, kPa, mbar, degC, K,
     /// or its raw code 0x004E0000
     #[arg(value_names = ["SIGNAL", "UNIT"], num_args = 0..=2)]
     words: Vec<String>,

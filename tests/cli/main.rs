@@ -4,6 +4,7 @@
 mod args;
 mod bus;
 mod examples;
+mod info;
 mod log;
 mod log_end;
 mod log_file;
