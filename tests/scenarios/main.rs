@@ -8,6 +8,7 @@ mod lss;
 mod scan;
 mod second_master;
 mod second_sync;
+mod settings;
 mod stalled;
 
 use cangauge::bus::Stamp;
