@@ -107,7 +107,7 @@ impl Desk<'_> {
     fn clear_the_way(&mut self, object: ObjectId) {
         let communication = (0x1800..0x1a00).contains(&object.index);
         // The inhibit time too is only written while the PDO is off.
-        if !is_mapping(object) && !(communication && object.sub == 3) {
+        if !(is_mapping(object) || communication && object.sub == 3) {
             return;
         }
         if self.model.description.pdo.remap == Remap::Invalidate {

@@ -56,6 +56,26 @@ impl CobId {
         self.0 & CobId::NO_RTR == 0
     }
 
+    /// The same PDO switched off (bit 31 set), every other bit kept.
+    pub fn switched_off(self) -> CobId {
+        CobId(self.0 | CobId::INVALID)
+    }
+
+    /// The same PDO switched on (bit 31 clear), every other bit kept.
+    pub fn switched_on(self) -> CobId {
+        CobId(self.0 & !CobId::INVALID)
+    }
+
+    /// The same flags with another 11-bit identifier; `None` if `id` is more than 7FFh.
+    pub fn with_standard(self, id: u32) -> Option<CobId> {
+        (id <= 0x7ff).then_some(CobId(self.0 & (CobId::INVALID | CobId::NO_RTR) | id))
+    }
+
+    /// The word with bit 30 left out of account: a device may decide for itself about remote requests.
+    pub fn without_rtr(self) -> u32 {
+        self.0 & !CobId::NO_RTR
+    }
+
     /// The identifier on the wire: bits 0 to 10, or with bit 29 set, bits 0 to 28.
     pub fn can_id(self) -> CanId {
         if self.0 & CobId::EXTENDED == 0 {
@@ -197,6 +217,11 @@ mod tests {
         assert!(mh4.is_valid() && !mh4.allows_rtr());
         assert_eq!(mh4.can_id(), CanId::Standard(0x181));
         assert!(!CobId(0xc000_0181).is_valid());
+        assert_eq!(mh4.switched_off(), CobId(0xc000_0181));
+        assert_eq!(mh4.switched_off().switched_on(), mh4);
+        assert_eq!(mh4.with_standard(0x1a5), Some(CobId(0x4000_01a5)));
+        assert_eq!(CobId(0xe012_3456).with_standard(0x1a5), Some(CobId(0xc000_01a5)));
+        assert_eq!((mh4.with_standard(0x800), mh4.without_rtr()), (None, 0x181));
         assert_eq!(CobId(0x2012_3456).can_id(), CanId::Extended(0x0012_3456));
     }
 

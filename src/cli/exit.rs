@@ -3,6 +3,7 @@
 use super::Cli;
 use crate::bus::BusError;
 use crate::master::{Error, SdoError};
+use crate::measure::expression::ExpressionError;
 use crate::output::console::Console;
 use crate::tasks::{Failure, Kind};
 use anstream::ColorChoice;
@@ -66,7 +67,11 @@ pub fn usage(error: &clap::Error, words: impl Iterator<Item = OsString>) -> u8 {
         (None, None) => help_for(&words),
     };
     let message = wrong_value(error).unwrap_or_else(|| one_line(first));
-    let failure = Failure::new(Kind::Usage, message).hint(hint);
+    let mut failure = Failure::new(Kind::Usage, message);
+    if let Some(error) = std::error::Error::source(error).and_then(|error| error.downcast_ref::<ExpressionError>()) {
+        failure = error.clone().into();
+    }
+    failure.hint.get_or_insert(hint);
     let console =
         Console { quiet: false, verbose: 0, json: wants_json(&words), color: ColorChoice::Auto, progress: None };
     console.fail(&failure, code(Kind::Usage));

@@ -1,18 +1,22 @@
 //! `cangauge log`.
 
 use super::args::{BusSpec, Duration, Nodes, SignalArg};
-use super::exit::stdout;
+use super::exit::{Several, stdout};
 use super::file::OutFile;
-use super::{Format, Global, When, open};
+use super::{Format, Global, When, check, open};
 use crate::bus::Stamp;
 use crate::bus::time::spoken;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
+use crate::measure::decode::Wanted;
+use crate::measure::expression::Expression;
+use crate::measure::expression::verdict::Verdict;
 use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
 use crate::output::progress::Progress;
 use crate::output::rows::{Form, Rows, Target};
 use crate::output::summary;
+use crate::tasks::check::{Expecting, all_met};
 use crate::tasks::log::{Mode, Note, Observer, Outcome, Plan, log};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
@@ -66,6 +70,9 @@ pub(crate) struct Log {
     /// Write the summary as JSON to a file; - for stdout
     #[arg(long, value_name = "FILE")]
     summary: Option<PathBuf>,
+    /// Exit with 1 at the end unless this held: 'pressure in 9..11 bar', see cangauge check --help
+    #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
+    expect: Vec<Expression>,
 }
 
 fn positive(text: &str) -> Result<u64, String> {
@@ -78,25 +85,46 @@ fn positive(text: &str) -> Result<u64, String> {
 /// The shortest interval of SYNC.
 const SHORTEST_SYNC: std::time::Duration = std::time::Duration::from_millis(1);
 
-fn sync_period(text: &str) -> Result<Duration, String> {
+pub(super) fn sync_period(text: &str) -> Result<Duration, String> {
     let period: Duration = text.parse()?;
     if period.0 < SHORTEST_SYNC { Err(format!("\"{text}\" is too short for SYNC (1ms or more)")) } else { Ok(period) }
 }
 
+/// Who only plays a recording cannot send at an interval.
+pub(super) fn refuse_to_send(global: &Global, interval: Option<Duration>) -> Result<(), Failure> {
+    if matches!(global.bus, Some(BusSpec::Replay(_))) && interval.is_some() {
+        return Err(Failure::new(Kind::Usage, "a recording (replay:) receives only: --sync and --poll send"));
+    }
+    Ok(())
+}
+
 impl Log {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        if matches!(global.bus, Some(BusSpec::Replay(_))) && (self.sync.is_some() || self.poll.is_some()) {
-            let message = "a recording (replay:) receives only: --sync and --poll send";
-            return Err(Failure::new(Kind::Usage, message).into());
-        }
+        refuse_to_send(global, self.sync.or(self.poll))?;
+        self.refuse_at_once()?;
         let create = |path: &Path| OutFile::create(path, self.force);
         let file = self.output.as_deref().map(create).transpose()?;
         let summary = self.summary.as_deref().filter(|path| *path != Path::new("-")).map(create).transpose()?;
-        let outcome = self.record(global, file.as_ref())?;
-        self.finish(&outcome, summary)
+        let (outcome, verdicts) = self.record(global, file.as_ref())?;
+        check::say(&global.console(), &verdicts);
+        self.finish(&outcome, &verdicts, summary)
     }
 
-    fn record(&self, global: &Global, file: Option<&OutFile>) -> anyhow::Result<Outcome> {
+    /// What is expected has to be recorded.
+    fn refuse_at_once(&self) -> Result<(), Failure> {
+        let wanted: Vec<&Wanted> = self.signals.iter().map(|signal| &signal.0).collect();
+        for expression in &self.expect {
+            if let Nodes::These(nodes) = &self.nodes {
+                expression.names_only(nodes)?;
+            }
+            if !wanted.is_empty() {
+                expression.needs_only(&wanted)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn record(&self, global: &Global, file: Option<&OutFile>) -> anyhow::Result<(Outcome, Vec<Verdict>)> {
         // Rows and live lines on one terminal would tear each other.
         let torn = global.progress == When::Auto && file.is_none() && io::stdout().is_terminal();
         let show = global.shows_progress() && !torn;
@@ -104,7 +132,7 @@ impl Log {
         let progress = Progress::new(show, duration, self.count);
         let console = Console { progress: Some(progress.multi()), ..global.console() };
         let form = if global.format == Format::Json { Form::Json } else { Form::Csv };
-        let (outcome, screen) = global.with_master(|master| {
+        let (outcome, verdicts, screen) = global.with_master(|master| {
             let nodes = match (&self.nodes, self.passive || !master.bus().is_live()) {
                 (Nodes::All, true) => NodeId::all().collect(),
                 _ => open::nodes(master, global, &self.nodes)?,
@@ -124,13 +152,18 @@ impl Log {
                 None => Target::Stream(Box::new(io::stdout())),
             };
             let mut screen = Screen { rows: Rows::new(target, form), progress, console, error: None, begun: None };
-            let outcome = log(master, &plan, &mut screen);
+            let mut expecting = Expecting::new(&self.expect, &plan.nodes, true, &mut screen);
+            let outcome = log(master, &plan, &mut expecting);
+            let verdicts = match &outcome {
+                Ok(outcome) => expecting.verdicts(outcome),
+                Err(_) => Ok(Vec::new()),
+            };
             let interrupted = match &outcome {
                 Ok(outcome) => outcome.interrupted,
                 Err(failure) => failure.kind == Kind::Interrupted,
             };
             screen.progress.finish(interrupted);
-            Ok((outcome, screen))
+            Ok((outcome, verdicts, screen))
         })?;
         let Screen { mut rows, console, error, .. } = screen;
         let flushed = rows.flush();
@@ -149,7 +182,7 @@ impl Log {
             return Err(failure.into());
         }
         summary::lines(&outcome).iter().for_each(|line| console.note(line));
-        Ok(outcome)
+        Ok((outcome, verdicts?))
     }
 
     /// A recording (`replay:`) can only be listened to.
@@ -162,7 +195,7 @@ impl Log {
         }
     }
 
-    fn finish(&self, outcome: &Outcome, file: Option<OutFile>) -> anyhow::Result<()> {
+    fn finish(&self, outcome: &Outcome, verdicts: &[Verdict], file: Option<OutFile>) -> anyhow::Result<()> {
         if self.summary.is_some() {
             let mut text = Vec::new();
             summary::json(&mut text, outcome)?;
@@ -171,16 +204,22 @@ impl Log {
                 None => io::stdout().lock().write_all(&text).map_err(stdout)?,
             }
         }
-        match outcome.lost.as_slice() {
-            [] => Ok(()),
-            lost => {
-                let names: Vec<String> = lost.iter().map(|node| node.to_string()).collect();
-                let kind = if self.all_lost(outcome) { Kind::NoAnswer } else { Kind::Partial };
-                let word = if lost.len() == 1 { "node" } else { "nodes" };
-                let message = format!("{word} {} lost: silent at the end", names.join(", "));
-                Err(Failure { node: lost.first().copied(), ..Failure::new(kind, message) }.into())
-            }
-        }
+        // What was expected and is not so comes first: it gives the exit code.
+        let (unmet, lost) = (all_met(verdicts, &[]).err(), self.lost(outcome));
+        let failures = match unmet {
+            Some(unmet) if unmet.kind == Kind::CheckFailed => [Some(unmet), lost],
+            unmet => [lost, unmet],
+        };
+        let failures: Vec<Failure> = failures.into_iter().flatten().collect();
+        if failures.is_empty() { Ok(()) } else { Err(Several(failures).into()) }
+    }
+
+    fn lost(&self, outcome: &Outcome) -> Option<Failure> {
+        let names: Vec<String> = outcome.lost.iter().map(|node| node.to_string()).collect();
+        let kind = if self.all_lost(outcome) { Kind::NoAnswer } else { Kind::Partial };
+        let word = if names.len() == 1 { "node" } else { "nodes" };
+        let message = format!("{word} {} lost: silent at the end", names.join(", "));
+        outcome.lost.first().map(|first| Failure { node: Some(*first), ..Failure::new(kind, message) })
     }
 
     fn all_lost(&self, outcome: &Outcome) -> bool {
@@ -220,27 +259,7 @@ impl Observer for Screen {
     }
 
     fn note(&mut self, note: &Note, _at: Stamp) {
-        match note {
-            Note::Remark(text) => self.console.warn(text),
-            Note::Emergency(node, emergency, meaning) => {
-                self.console.warn(&format!("node {node}: {}", emergency_text(emergency, meaning)));
-            }
-            Note::Share(period, share) => self.console.note(&format!(
-                "SYNC every {} and the answers take about {:.1} % of the bus",
-                spoken(*period),
-                share * 100.0
-            )),
-            Note::Restarted(node) => self.console.warn(&format!("node {node} restarted")),
-            Note::Silent(node, since) => self.console.warn(&format!("node {node}: silent for {}", spoken(*since))),
-            Note::Back(node) => self.console.note(&format!("node {node} is back")),
-            Note::WrongLength(node) => self
-                .console
-                .warn(&format!("node {node}: a TPDO has not the length of its mapping: no row is made of it")),
-            Note::Fault(fault) => self.console.detail(&fault.to_string()),
-            Note::Dropped(count) => self.console.warn(&format!("the kernel dropped {count} frames")),
-            Note::Link(true) => self.console.note("the interface is up again"),
-            Note::Link(false) => self.console.warn("the interface went down; waiting for it"),
-        }
+        tell(&self.console, note);
     }
 
     fn tick(&mut self, at: Stamp, rows: u64) -> ControlFlow<()> {
@@ -248,6 +267,31 @@ impl Observer for Screen {
         self.progress.tick(at.mono.since(begun), rows);
         let result = self.rows.flush_if_due(at);
         self.or_break(result)
+    }
+}
+
+/// Says what happens while it is recorded.
+pub(super) fn tell(console: &Console, note: &Note) {
+    match note {
+        Note::Remark(text) => console.warn(text),
+        Note::Emergency(node, emergency, meaning) => {
+            console.warn(&format!("node {node}: {}", emergency_text(emergency, meaning)));
+        }
+        Note::Share(period, share) => console.note(&format!(
+            "SYNC every {} and the answers take about {:.1} % of the bus",
+            spoken(*period),
+            share * 100.0
+        )),
+        Note::Restarted(node) => console.warn(&format!("node {node} restarted")),
+        Note::Silent(node, since) => console.warn(&format!("node {node}: silent for {}", spoken(*since))),
+        Note::Back(node) => console.note(&format!("node {node} is back")),
+        Note::WrongLength(node) => {
+            console.warn(&format!("node {node}: a TPDO has not the length of its mapping: no row is made of it"))
+        }
+        Note::Fault(fault) => console.detail(&fault.to_string()),
+        Note::Dropped(count) => console.warn(&format!("the kernel dropped {count} frames")),
+        Note::Link(true) => console.note("the interface is up again"),
+        Note::Link(false) => console.warn("the interface went down; waiting for it"),
     }
 }
 

@@ -2,8 +2,11 @@
 //! it gets.
 
 pub mod args;
+mod autozero;
 mod bus;
+mod check;
 mod completions;
+mod each;
 mod errors;
 pub mod exit;
 mod file;
@@ -11,14 +14,17 @@ mod filter;
 mod info;
 mod limits;
 mod log;
+mod lss;
 mod minmax;
 mod nmt;
 mod open;
 pub mod parse;
+mod pdo;
 mod read;
 mod scan;
 mod sdo;
 mod sim;
+mod store;
 mod unit;
 
 use crate::master::{Master, Timing};
@@ -40,6 +46,7 @@ Examples, on the simulated bus; leave `-b sim` out where one CAN interface is up
   cangauge -b sim unit 127 bar                           its unit, and what that rescales
   cangauge -b sim sdo read 1 0x1018:1                    one object, bare
   cangauge -b sim nmt reset 1                            restart it, wait for the boot-up
+  cangauge -b sim lss set-id 127 12                      give it a node-ID, and see it come back
 
 Exit codes:
   0  done                                    5  the bus fails: interface missing, down, bus-off
@@ -64,7 +71,7 @@ pub struct Cli {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
-    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a
+    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a
     /// candump -L log; receives only). Not given: the only CAN interface that is up
     #[arg(short, long, global = true, env = "CANGAUGE_BUS", value_name = "BUS")]
     pub(crate) bus: Option<BusSpec>,
@@ -142,6 +149,10 @@ pub(crate) enum Command {
     Sdo(sdo::Sdo),
     /// Record measurements as CSV or JSON Lines
     Log(log::Log),
+    /// Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data
+    Check(check::Check),
+    /// Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device's own)
+    Lss(lss::LssCommand),
     /// Tell everything about one device on one page
     Info(info::Info),
     /// Tell or set the physical unit of a signal (6131h)
@@ -156,6 +167,14 @@ pub(crate) enum Command {
     Errors(errors::Errors),
     /// List CAN interfaces, switch them on and off, find the bit rate of a bus
     Bus(bus::BusCommand),
+    /// Show, change and watch what the nodes' transmit PDOs carry
+    Pdo(pdo::Pdo),
+    /// Make the present reading of a channel zero (6125h), with checks before and after
+    Autozero(autozero::Autozero),
+    /// Let devices keep their settings beyond power off (1010h)
+    Store(store::Store),
+    /// Give devices their settings as delivered (1011h); node-ID and bit rate stay
+    Restore(store::Restore),
     /// Simulate devices on a bus until Ctrl-C
     Sim(sim::Sim),
     /// Print the completions for a shell
@@ -220,6 +239,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Nmt(command) => command.run(&cli.global),
         Command::Sdo(command) => command.run(&cli.global),
         Command::Log(command) => command.run(&cli.global),
+        Command::Check(command) => command.run(&cli.global),
+        Command::Lss(command) => command.run(&cli.global),
         Command::Info(command) => command.run(&cli.global),
         Command::Unit(command) => command.run(&cli.global),
         Command::Filter(command) => command.run(&cli.global),
@@ -227,6 +248,10 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Minmax(command) => command.run(&cli.global),
         Command::Errors(command) => command.run(&cli.global),
         Command::Bus(command) => command.run(&cli.global),
+        Command::Pdo(command) => command.run(&cli.global),
+        Command::Autozero(command) => command.run(&cli.global),
+        Command::Store(command) => command.run(&cli.global),
+        Command::Restore(command) => command.run(&cli.global),
         Command::Sim(command) => command.run(&cli.global),
         Command::Completions(command) => command.run(),
     }

@@ -15,7 +15,7 @@ use clap::Args;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b vcan0 sim mh4@5 dps@127\n  cangauge -b vcan0 sim bench.toml")]
 pub(crate) struct Sim {
-    /// mh4@5 d20@2 dps@127 mc1609@3, or a bench description in TOML
+    /// mh4@5 d20@2 dps@127 mc1609@3, mh4@unconfigured for one without a node-ID, or a bench description in TOML
     #[arg(required = true, value_name = "DEVICE@NODE|FILE.toml")]
     devices: Vec<String>,
 }

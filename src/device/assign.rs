@@ -39,6 +39,24 @@ pub struct AssignEntry {
     pub doubt: String,
 }
 
+impl AssignEntry {
+    /// LSS as the standard has it, for devices of which nothing else is known.
+    pub fn lss() -> AssignEntry {
+        AssignEntry {
+            way: AssignWay::Lss,
+            state: None,
+            retry_stopped: false,
+            node_id: None,
+            bit_rate: None,
+            store: None,
+            applies: Applies::default(),
+            unverified: false,
+            page: String::new(),
+            doubt: String::new(),
+        }
+    }
+}
+
 /// By which means a device takes its node-ID and bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -155,6 +173,15 @@ impl RateTable {
         let mut rates: Vec<u32> = self.rates.values().copied().collect();
         rates.sort_unstable_by(|a, b| b.cmp(a));
         rates
+    }
+}
+
+/// A bit rate as people write it: `250k`, `1M`.
+pub fn spoken_rate(bit_rate: u32) -> String {
+    match bit_rate {
+        mega if mega > 0 && mega.is_multiple_of(1_000_000) => format!("{}M", mega / 1_000_000),
+        kilo if kilo > 0 && kilo.is_multiple_of(1_000) => format!("{}k", kilo / 1_000),
+        other => other.to_string(),
     }
 }
 

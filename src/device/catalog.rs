@@ -126,6 +126,16 @@ pub fn by_name(name: &str) -> Option<Arc<Model>> {
     built_in().iter().find(|model| model.description.name == name).cloned()
 }
 
+/// The built-in description of a device of which only vendor-ID and product code are known: one that asks for both.
+pub fn by_identity(vendor: u32, product: u32) -> Option<Arc<Model>> {
+    let wanted = (Some(vendor), Some(product));
+    let fits = |model: &&Arc<Model>| {
+        let identify = &model.description.identify;
+        (identify.vendor_id, identify.product_code) == wanted
+    };
+    built_in().iter().find(fits).cloned()
+}
+
 /// What has still to be read to tell which description a device's answers fit: empty when one fits,
 /// and when none can. Read these, put the bytes into [`Traits::answers`], then [`recognise`].
 pub fn to_ask(traits: &Traits) -> Vec<ObjectId> {

@@ -48,6 +48,9 @@ pub struct Description {
     pub assign: Vec<AssignEntry>,
     /// Which object decides who starts it after power on.
     pub startup: Option<Startup>,
+    /// How its channels are set to zero; none that are not named.
+    #[serde(default)]
+    pub autozero: Vec<Autozero>,
     /// What it measures.
     #[serde(default, rename = "signal")]
     pub signals: Vec<SignalEntry>,
@@ -100,6 +103,51 @@ impl ErrorHistory {
             ErrorHistory::CodeHigh => (u16::from_le_bytes([c, d]), None),
         }
     }
+}
+
+/// How a channel is set to zero.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Autozero {
+    /// CiA 404 channel.
+    pub channel: u8,
+    /// Where the signature is written.
+    pub object: ObjectId,
+    /// The bytes of the signature in the order in which they go over the wire; "zero" by CiA 404.
+    #[serde(default = "zero")]
+    pub signature: String,
+    /// Where the offset then stands, in the unit of the process value.
+    pub offset: Option<ObjectId>,
+    /// What tells whether the sensor measures against vacuum, where a zero is no vented line.
+    pub absolute: Option<Absolute>,
+    /// The measuring range as it was built, where the device has it beside its span, which can be set.
+    pub range: Option<Range>,
+}
+
+/// What tells that a sensor measures absolute pressure.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Absolute {
+    /// The kind of the sensor.
+    pub object: ObjectId,
+    /// Its number for absolute pressure.
+    pub value: u32,
+}
+
+/// Where a measuring range stands.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// Its start.
+    pub start: ObjectId,
+    /// Its end.
+    pub end: ObjectId,
+    /// The unit of both.
+    pub unit: ObjectId,
+}
+
+fn zero() -> String {
+    "zero".to_owned()
 }
 
 /// What a device answers that tells its kind; everything given must agree. Where nothing is given nothing is
@@ -175,6 +223,8 @@ pub struct PdoStyle {
     /// What has to be done before the mapping can be changed.
     #[serde(default)]
     pub remap: Remap,
+    /// The transmission type by which the event timer sends, 254 or 255; 254 where the description does not say.
+    pub timer: Option<u8>,
 }
 
 /// What has to be done before a mapping can be changed.

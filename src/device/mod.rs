@@ -5,6 +5,7 @@ pub mod catalog;
 pub mod description;
 pub mod dictionary;
 pub mod eds;
+pub mod nearest;
 pub mod quirk;
 pub mod sensor;
 pub mod standard;

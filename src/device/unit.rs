@@ -160,12 +160,24 @@ impl Unit {
     /// `value` of this unit in another one; `None` when they do not measure the same quantity or one of
     /// them is not known. A temperature converts as a temperature, not as a difference of two.
     pub fn convert(self, value: f64, to: Unit) -> Option<f64> {
+        self.convert_with_zeros(value, to, 1.0)
+    }
+
+    /// The same for a value that holds the zero of its scale `zeros` times: once for a temperature, not at all
+    /// for a difference of two.
+    pub fn convert_with_zeros(self, value: f64, to: Unit, zeros: f64) -> Option<f64> {
         if self == to {
             return Some(value);
         }
         let (from_quantity, from_factor, from_offset) = self.scale()?;
         let (to_quantity, to_factor, to_offset) = to.scale()?;
-        (from_quantity == to_quantity).then(|| (value * from_factor + from_offset - to_offset) / to_factor)
+        (from_quantity == to_quantity).then(|| (value * from_factor + (from_offset - to_offset) * zeros) / to_factor)
+    }
+
+    /// Whether zero of this unit is zero of the other one, as it is not for degC and K.
+    pub fn has_zero_of(self, other: Unit) -> bool {
+        let zero = |unit: Unit| unit.scale().map(|(_, _, offset)| offset);
+        self == other || zero(self) == zero(other)
     }
 }
 

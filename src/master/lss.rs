@@ -351,11 +351,19 @@ impl<'bus> Lss<'_, 'bus> {
         loop {
             let step = match self.master.send_what_waits() {
                 Ok(None) => return Ok(self.master.seen),
-                Ok(Some(retry_at)) => self.next(retry_at).map(|_| ()),
+                Ok(Some(retry_at)) => self.next(retry_at),
                 Err(error) => Err(error.into()),
             };
-            // Given up, it must not go out later.
-            step.inspect_err(|_| self.master.outgoing.take_back(&frame))?;
+            match step {
+                // It has gone out while waiting, and this may be the answer.
+                Ok(Some(received)) if !self.master.is_sending() => self.master.put_back = Some(received),
+                Ok(_) => {}
+                Err(error) => {
+                    // Given up, it must not go out later.
+                    self.master.outgoing.take_back(&frame);
+                    return Err(error);
+                }
+            }
         }
     }
 

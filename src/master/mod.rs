@@ -102,6 +102,18 @@ impl<'bus> Master<'bus> {
         Master { bus, timing, sdo: SdoClient::default(), outgoing, put_back: None, seen: Mono::START }
     }
 
+    /// Takes this side of the bus to another bit rate in bit/s. Transfers under way end, and what waits to be sent is
+    /// lost.
+    ///
+    /// # Errors
+    /// What the interface says; it may then be down.
+    pub fn set_bit_rate(&mut self, bit_rate: u32) -> Result<(), BusError> {
+        self.sdo.cancel(&mut Vec::new());
+        self.outgoing = Outgoing::new();
+        self.put_back = None;
+        self.bus.set_bit_rate(bit_rate, crate::bus::Mode::Normal)
+    }
+
     /// The bus.
     pub fn bus(&self) -> &dyn Bus {
         &*self.bus

@@ -3,6 +3,7 @@
 //! Nothing here reads a clock: every sample has the stamp of the frame it came with.
 
 pub mod decode;
+pub mod expression;
 pub mod instrument;
 pub mod sample;
 pub mod statistics;

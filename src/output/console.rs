@@ -66,6 +66,12 @@ impl Console {
             return;
         }
         self.line(AnsiColor::Red.on_default().bold(), "cangauge: ", &failure.message);
+        if let Some(place) = &failure.place {
+            // What is not shown as it is takes more room.
+            let before = text::safe(&place.before).chars().count();
+            self.line(Style::new(), "  ", &place.text);
+            self.line(AnsiColor::Red.on_default().bold(), &format!("  {}^", " ".repeat(before)), "");
+        }
         if let Some(hint) = &failure.hint {
             self.line(AnsiColor::Cyan.on_default(), "hint: ", hint);
         }

@@ -2,8 +2,11 @@
 
 use crate::canopen::id::NodeId;
 use crate::measure::sample::{Number, Sample, Source, Status};
+use crate::tasks::autozero::Zeroed;
+use crate::tasks::failure::Place;
 use crate::tasks::nmt::Report;
 use crate::tasks::scan::Found;
+use crate::tasks::store::Done;
 use crate::tasks::{Failure, Kind};
 use serde::Serialize;
 use std::io::{self, Write};
@@ -43,6 +46,8 @@ pub fn failure(out: &mut dyn Write, failure: &Failure, exit: u8) -> io::Result<(
         object: Option<String>,
         abort: Option<String>,
         hint: Option<&'a str>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        column: Option<usize>,
     }
     let inner = Inner {
         kind: kind_name(failure.kind),
@@ -52,6 +57,7 @@ pub fn failure(out: &mut dyn Write, failure: &Failure, exit: u8) -> io::Result<(
         object: failure.object.map(|object| object.to_string()),
         abort: failure.abort.map(|abort| format!("0x{:08X}", abort.0)),
         hint: failure.hint.as_deref(),
+        column: failure.place.as_ref().map(Place::column),
     };
     line(out, &Error { error: inner })
 }
@@ -108,6 +114,56 @@ pub fn startup(out: &mut dyn Write, node: NodeId, starts: &str, raw: u64) -> io:
         raw: u64,
     }
     line(out, &Startup { node: node.get(), startup: starts, raw })
+}
+
+/// A zero that was set.
+pub fn zeroed(out: &mut dyn Write, node: NodeId, zeroed: &Zeroed) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Row<'a> {
+        node: u8,
+        channel: u8,
+        unit: Option<&'a str>,
+        before: Option<f64>,
+        after: Option<f64>,
+        offset_before: JsonNumber,
+        offset: JsonNumber,
+        stored: bool,
+    }
+    // Two digits more than those that tell something: a mean has as many as it likes.
+    let round = |mean: f64| format!("{mean:.*}", zeroed.decimals + 2).parse().unwrap_or(mean);
+    let row = Row {
+        node: node.get(),
+        channel: zeroed.channel,
+        unit: Some(zeroed.unit.as_str()).filter(|unit| !unit.is_empty()),
+        before: zeroed.before.map(round),
+        after: zeroed.after.map(round),
+        offset_before: JsonNumber(zeroed.offset_before),
+        offset: JsonNumber(zeroed.offset),
+        stored: zeroed.stored,
+    };
+    line(out, &row)
+}
+
+/// What a device stored.
+pub fn stored(out: &mut dyn Write, node: NodeId, done: &Done) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Stored<'a> {
+        node: u8,
+        stored: String,
+        verified: &'a str,
+    }
+    line(out, &Stored { node: node.get(), stored: done.groups(), verified: done.verified.as_str() })
+}
+
+/// What a device restored.
+pub fn restored(out: &mut dyn Write, node: NodeId, done: &Done) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct Restored<'a> {
+        node: u8,
+        restored: String,
+        verified: &'a str,
+    }
+    line(out, &Restored { node: node.get(), restored: done.groups(), verified: done.verified.as_str() })
 }
 
 /// Something that `nmt watch` saw.

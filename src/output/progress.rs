@@ -9,7 +9,7 @@ use std::io::{self, Write};
 use std::time::Duration;
 
 /// How often lines are redrawn, a second.
-const RATE: u8 = 10;
+pub(super) const RATE: u8 = 10;
 
 /// Live lines on stderr.
 #[derive(Debug)]
@@ -151,12 +151,14 @@ impl Transfer {
     }
 }
 
-fn bar(multi: &MultiProgress, length: u64) -> ProgressBar {
+/// A bar of this length.
+pub(super) fn bar(multi: &MultiProgress, length: u64) -> ProgressBar {
     let bar = multi.add(ProgressBar::new(length));
     bar.set_style(style("[{bar:27}] {msg}").progress_chars("=> "));
     bar
 }
 
-fn style(template: &str) -> ProgressStyle {
+/// How a line looks.
+pub(super) fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }

@@ -58,6 +58,11 @@ impl Tried {
     fn is_it(&self) -> bool {
         self.frames > self.errors
     }
+
+    /// Whether listening on would tell nothing new.
+    fn is_decided(&self) -> bool {
+        self.frames >= ENOUGH && self.is_it() || self.frames == 0 && self.errors >= HOPELESS
+    }
 }
 
 /// What tells the bit rate.
@@ -164,7 +169,7 @@ fn listen(bus: &mut dyn Bus, bit_rate: u32, each: Duration) -> Result<Tried, Err
         return Ok(tried);
     }
     let until = bus.mono() + each;
-    while !(tried.frames >= ENOUGH && tried.is_it()) && !(tried.frames == 0 && tried.errors >= HOPELESS) {
+    while !tried.is_decided() {
         match bus.receive(until)? {
             Event::Frame(_) => tried.frames += 1,
             Event::Fault(fault, _) => tried.errors += u32::from(is_error(fault)),

@@ -6,6 +6,7 @@ use crate::canopen::lss::Service;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::master::{Error, LssError, SdoError, SdoFailure};
+use crate::measure::expression::ExpressionError;
 use std::fmt;
 
 /// The kinds of failure that scripts tell apart.
@@ -46,17 +47,45 @@ pub struct Failure {
     pub abort: Option<AbortCode>,
     /// What to type next.
     pub hint: Option<String>,
+    /// The place in what was typed.
+    pub place: Option<Place>,
+}
+
+/// A character of something that was typed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// What was typed.
+    pub text: String,
+    /// The characters before it.
+    pub before: String,
+}
+
+impl Place {
+    /// The character, counted from 1.
+    pub fn column(&self) -> usize {
+        self.before.chars().count() + 1
+    }
 }
 
 impl Failure {
     /// A failure that concerns no node in particular.
     pub fn new(kind: Kind, message: impl Into<String>) -> Failure {
-        Failure { kind, message: message.into(), node: None, object: None, abort: None, hint: None }
+        Failure { kind, message: message.into(), node: None, object: None, abort: None, hint: None, place: None }
     }
 
     /// A failure of one node.
     pub fn of_node(kind: Kind, node: NodeId, message: impl fmt::Display) -> Failure {
         Failure { node: Some(node), ..Failure::new(kind, format!("node {node}: {message}")) }
+    }
+
+    /// The same, with what is known of `node` all the same: what was changed before, or may have been.
+    pub fn knowing(mut self, node: NodeId, known: impl fmt::Display) -> Failure {
+        self.message = match self.node {
+            Some(_) => format!("{}; {known}", self.message),
+            None => format!("node {node}: {}; {known}", self.message),
+        };
+        self.node = Some(node);
+        self
     }
 
     /// The same with a hint.
@@ -96,6 +125,13 @@ impl From<SdoError> for Failure {
         };
         let object = Some(error.object);
         Failure { object, abort, hint, ..Failure::of_node(kind, error.node, &error) }
+    }
+}
+
+impl From<ExpressionError> for Failure {
+    fn from(error: ExpressionError) -> Failure {
+        let place = Place { before: error.before().to_owned(), text: error.text };
+        Failure { hint: error.hint, place: Some(place), ..Failure::new(Kind::Usage, error.message) }
     }
 }
 

@@ -15,6 +15,8 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
 use crate::master::{Error, Master};
 use crate::measure::decode::Wanted;
+use crate::measure::expression::judge::Jury;
+use crate::measure::instrument::Instrument;
 use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
 use crate::measure::survey::{Overrides, instruments};
@@ -86,11 +88,22 @@ pub enum Note {
 
 /// Takes what is recorded. Breaking ends the recording; the reason is the observer's own.
 pub trait Observer {
+    /// These nodes will be recorded; nothing has been switched yet. Who only listens knows of none.
+    ///
+    /// # Errors
+    /// Why nothing is to be recorded.
+    fn begin(&mut self, _instruments: &[Instrument]) -> Result<(), Failure> {
+        Ok(())
+    }
+
     /// Samples that came together, in the order of their bytes; at most as many as may be counted.
     fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()>;
 
     /// Something happened.
     fn note(&mut self, note: &Note, at: Stamp);
+
+    /// How things stand with what is expected of the measurements, as often as time passes.
+    fn standing(&mut self, _jury: &Jury, _at: Stamp) {}
 
     /// Time passes: called at least ten times a second while nothing comes.
     fn tick(&mut self, at: Stamp, rows: u64) -> ControlFlow<()>;
@@ -143,6 +156,7 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     }
     master.listen_to(&plan.nodes)?;
     let instruments = instruments(master, &plan.nodes, &plan.overrides)?;
+    observer.begin(&instruments)?;
     check_wanted(&instruments, plan)?;
     let mut recording = Recording::new(&instruments, plan, master.bus().timestamps());
     let mut states = States::default();

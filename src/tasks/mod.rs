@@ -1,13 +1,21 @@
 //! The procedures that users think in. They return reports and print nothing.
 
+pub mod autozero;
+pub mod check;
 pub mod detect;
 pub mod failure;
 pub mod host;
+mod kept;
 pub mod log;
+pub mod lss;
 pub mod nmt;
+pub mod pdo;
 pub mod read;
+pub mod restore;
 pub mod scan;
 pub mod sdo;
 pub mod settings;
+mod signature;
+pub mod store;
 
 pub use failure::{Failure, Kind};

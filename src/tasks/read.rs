@@ -165,7 +165,10 @@ pub fn read(
 }
 
 /// Every node's instrument; where one of them does not answer, each is asked for itself.
-fn surveyed(
+///
+/// # Errors
+/// What stops everything.
+pub(super) fn surveyed(
     master: &mut Master<'_>,
     nodes: &[NodeId],
     overrides: &Overrides,

@@ -7,6 +7,7 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::catalog::Model;
 use crate::device::description::SizeIndication;
 use crate::device::dictionary::Entry;
+use crate::device::nearest::distance;
 use crate::device::standard;
 use crate::master::transfer::{BlockMode, Moved, read_object};
 use crate::master::{Error, Master, Request, SdoError, SdoFailure};
@@ -120,32 +121,20 @@ impl Knowledge {
             None => standard::names().collect(),
         };
         let what = model.as_ref().map_or_else(|| "the standard".to_owned(), |model| model.description.title.clone());
-        let mut near: Vec<(usize, String)> = known
-            .into_iter()
-            .map(|known| (distance(name, &known), known))
-            .filter(|(distance, _)| *distance <= name.len() / 2)
-            .collect();
-        near.sort();
-        let near: Vec<String> = near.into_iter().take(3).map(|(_, name)| name).collect();
+        let near = nearest(name, known.into_iter());
         let failure = Failure::of_node(Kind::Usage, self.node, format!("{what} has no object \"{name}\""));
         Err(if near.is_empty() { failure } else { failure.hint(format!("nearest: {}", near.join(", "))) })
     }
 }
 
-/// How many letters have to be changed, added or left out to get from one word to the other.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (at, letter) in a.chars().enumerate() {
-        let mut corner = at;
-        row[0] = at + 1;
-        for (column, other) in b.iter().enumerate() {
-            let kept = corner + usize::from(letter != *other);
-            corner = row[column + 1];
-            row[column + 1] = kept.min(corner + 1).min(row[column] + 1);
-        }
-    }
-    row.last().copied().unwrap_or(0)
+/// The known names that are nearest to a word, at most three.
+pub(super) fn nearest(word: &str, known: impl Iterator<Item = String>) -> Vec<String> {
+    let mut near: Vec<(usize, String)> = known
+        .map(|known| (distance(word, &known), known))
+        .filter(|(distance, _)| *distance <= word.len() / 2)
+        .collect();
+    near.sort();
+    near.into_iter().take(3).map(|(_, name)| name).collect()
 }
 
 /// Reads an object.

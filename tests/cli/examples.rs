@@ -31,12 +31,27 @@ fn examples() -> BTreeSet<String> {
     examples.map(|line| line.split("  ").next().unwrap_or_default().trim_end_matches(" &").to_owned()).collect()
 }
 
+/// The words of a line as a shell makes them of it, as far as examples need it: blanks, and single quotes.
+fn words(line: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    for (at, part) in line.split('\'').enumerate() {
+        let mut pieces = if at % 2 == 1 { vec![part] } else { part.split(' ').collect() }.into_iter();
+        if let Some(last) = words.last_mut() {
+            last.push_str(pieces.next().unwrap_or_default());
+        }
+        words.extend(pieces.map(str::to_owned));
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
 #[test]
 fn every_example_is_understood() {
     let examples = examples();
     assert!(examples.len() >= 15, "{examples:?}");
     for example in examples {
-        let words = example.split(" > ").next().unwrap_or_default().split_whitespace();
+        let words =
+            words(if example.contains('\'') { &example } else { example.split(" > ").next().unwrap_or_default() });
         if let Err(error) = Cli::try_parse_from(words) {
             panic!("{example}: {error}");
         }
@@ -52,7 +67,8 @@ fn every_example_on_the_simulated_bus_works() {
     }
     let run = |example: &str| {
         let bench = Bench::real("mh4@1");
-        let words: Vec<&str> = example.split_whitespace().skip(1).collect();
+        let words = words(example);
+        let words: Vec<&str> = words.iter().skip(1).map(String::as_str).collect();
         let done = bench.finish(&mut bench.command(&words)).exit(0);
         assert!(!done.stdout.is_empty() || !bench.files().is_empty() || example.contains(" sdo write "), "{example}");
     };

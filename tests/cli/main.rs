@@ -2,19 +2,24 @@
 //! frames. Benches go by the virtual clock, so that waiting takes no time.
 
 mod args;
+mod autozero;
 mod bus;
+mod check;
 mod examples;
 mod info;
 mod log;
 mod log_end;
 mod log_file;
+mod lss;
 mod nmt;
 mod output;
+mod pdo;
 mod read;
 mod replay;
 mod scan;
 mod sdo;
 mod settings;
+mod store;
 
 use std::fs;
 use std::io::{self, Read};

@@ -147,7 +147,8 @@ class Device:
             self.configured = True
             # Reading subscribes to the COB-ID, which is a device's own here.
             tpdo.read()
-            self.node.network.unsubscribe(tpdo.cob_id)
+            if tpdo.enabled:
+                self.node.network.unsubscribe(tpdo.cob_id)
         return tpdo
 
     def transmit(self, tpdo):

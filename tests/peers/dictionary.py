@@ -54,6 +54,13 @@ def communication(number):
     yield array(f"TPDO {number} mapping", 0x1A00 + number - 1, od.UNSIGNED32)
 
 
+def mapping(number):
+    """The mapping parameters with every sub-index named, as an EDS file has them: what python-canopen writes to an
+    array ends at its present number of entries, which is 0 meanwhile."""
+    entries = [(sub, od.UNSIGNED32 if sub else od.UNSIGNED8, None, "rw") for sub in range(9)]
+    return record(f"TPDO {number} mapping", 0x1A00 + number - 1, entries)
+
+
 def remote_device(types):
     """What a master knows beforehand of any measuring device with up to four TPDOs. `types` names the
     CiA 404 objects to which this device gives a type of its own."""

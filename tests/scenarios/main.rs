@@ -1,14 +1,19 @@
 //! Commands and recordings under bad conditions, on the virtual clock.
 
 mod answers;
+mod assign;
+mod bit_rates;
 mod detect;
 mod full_queue;
 mod garbage;
 mod lss;
+mod pdo_map;
+mod pdo_map_devices;
 mod scan;
 mod second_master;
 mod second_sync;
 mod settings;
+mod signatures;
 mod stalled;
 
 use cangauge::bus::Stamp;

@@ -1,12 +1,10 @@
-//! Fastscan of simulated devices in another process: how long it takes, and that it finds who is there.
+//! Fastscan of simulated devices in another process finds who is there.
 
 use crate::Can;
-use cangauge::bus::Bus;
 use cangauge::canopen::id::NodeId;
 use cangauge::master::{Master, Timing};
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
 
 /// `cangauge sim` with these devices, until it is dropped.
 struct Simulation(Child);
@@ -33,18 +31,17 @@ impl Drop for Simulation {
     }
 }
 
-/// Finds whoever has no node-ID and gives them some, from 20 on. Serial numbers in the order in which they were
-/// found, and how long each scan took.
-fn scan(can: &Can) -> Vec<(u32, Duration)> {
+/// Finds whoever has no node-ID and gives them some, from 20 on. The serial numbers in the order in which they
+/// were found.
+fn scan(can: &Can) -> Vec<u32> {
     let mut bus = can.open();
     let mut found = Vec::new();
     for node in 20.. {
-        let begin = bus.mono();
         let mut master = Master::new(&mut bus, Timing::default());
         let mut lss = master.lss();
         lss.listen().unwrap();
         let Some(address) = lss.fastscan().unwrap() else { return found };
-        found.push((address.serial, lss.master().now().since(begin)));
+        found.push(address.serial);
         lss.configure_node_id(NodeId::new(node).ok()).unwrap();
         lss.leave().unwrap();
     }
@@ -53,19 +50,14 @@ fn scan(can: &Can) -> Vec<(u32, Duration)> {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn fastscan_finds_one_device_within_a_second_and_several_one_after_the_other() {
+fn fastscan_finds_one_device_and_several_one_after_the_other() {
     let can = Can::get();
     for devices in [&["mh4@unconfigured"][..], &["mh4@unconfigured", "mh4@unconfigured", "mh4@unconfigured"]] {
         let simulation = Simulation::start(&can, devices);
-        let found = scan(&can);
+        let mut serials = scan(&can);
         drop(simulation);
-        let mut serials: Vec<u32> = found.iter().map(|(serial, _)| *serial).collect();
         serials.sort_unstable();
         serials.dedup();
-        assert_eq!(serials.len(), devices.len(), "{found:?}");
-        println!("{} devices: {found:?}", devices.len());
-        // The last one is alone.
-        let alone = found.last().unwrap().1;
-        assert!(alone <= Duration::from_secs(1), "{found:?}");
+        assert_eq!(serials.len(), devices.len(), "{serials:?}");
     }
 }

@@ -3,13 +3,15 @@
 //! A machine says what to send, is fed the frames of the bus and told when a time is over. It never waits.
 
 mod address;
+mod answer;
 mod error_code;
 mod exchange;
 mod fastscan;
 mod service;
 
 pub use address::{LssAddress, LssAddressError, LssRange};
+pub use answer::{Answer, Violation};
 pub use error_code::ErrorCode;
 pub use exchange::{Exchange, ExchangeError};
 pub use fastscan::{Fastscan, FastscanError, Progress, Step, Wait};
-pub use service::{Answer, Limit, Mode, Part, Request, Service, UNCONFIGURED, Violation};
+pub use service::{Limit, Mode, Part, Request, Service, UNCONFIGURED};

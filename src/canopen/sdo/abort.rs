@@ -23,6 +23,8 @@ impl AbortCode {
     pub const OUT_OF_MEMORY: AbortCode = AbortCode(0x0504_0005);
     /// Object does not exist.
     pub const NO_OBJECT: AbortCode = AbortCode(0x0602_0000);
+    /// The object cannot be mapped to a PDO.
+    pub const NOT_MAPPABLE: AbortCode = AbortCode(0x0604_0041);
     /// Data type or length does not match.
     pub const LENGTH: AbortCode = AbortCode(0x0607_0010);
     /// Length too high.
@@ -31,10 +33,14 @@ impl AbortCode {
     pub const LENGTH_LOW: AbortCode = AbortCode(0x0607_0013);
     /// Sub-index does not exist.
     pub const NO_SUB_INDEX: AbortCode = AbortCode(0x0609_0011);
+    /// Value outside its range.
+    pub const VALUE: AbortCode = AbortCode(0x0609_0030);
     /// Read of a write-only object.
     pub const WRITE_ONLY: AbortCode = AbortCode(0x0601_0001);
     /// Write of a read-only object.
     pub const READ_ONLY: AbortCode = AbortCode(0x0601_0002);
+    /// Not in the present device state.
+    pub const DEVICE_STATE: AbortCode = AbortCode(0x0800_0022);
     /// General error.
     pub const GENERAL: AbortCode = AbortCode(0x0800_0000);
 

@@ -2,8 +2,9 @@
 
 use super::slave::Slave;
 use super::{address, bus_of, configuring, ms};
+use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{MemoryBus, Outbox, Station};
-use cangauge::bus::{Bus, BusError, Event, Fault, Filters, Mono, Stamp, TimestampSource};
+use cangauge::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp, TimestampSource};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::lss::{ErrorCode, LssRange, Mode, Part, Service, Violation};
@@ -128,15 +129,18 @@ fn several_in_configuration_state_are_told_from_one() {
     assert_eq!((serial.is_one(), vendor.is_one(), id.is_one()), (true, true, true));
     assert_eq!((serial.answers, vendor.answers, id.answers), (vec![20002], vec![0x362], vec![Some(node(5))]));
     // However late the second one is.
-    for latency in [300, 20_000, 400_000] {
+    for latency in [2000, 20_000, 400_000] {
         let (serial, vendor, id) =
             all(&mut bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 5).slow(&[latency])])).unwrap();
         assert_eq!(serial.answers, [20002, 20003]);
         assert_eq!((serial.is_one(), vendor.is_one(), id.is_one()), (false, false, false), "{latency}");
         assert_eq!((vendor.answers, id.answers), (vec![0x362], vec![Some(node(5))]));
     }
+    // Answers at the very same time are one frame if they are the same, else an error frame and then two.
+    let (serial, vendor, _) = all(&mut bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 5)])).unwrap();
+    assert_eq!((serial.is_one(), vendor.is_one()), (false, true));
     // What is meant for one was taken by two: no success.
-    let mut bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 5)]);
+    let mut bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 5).slow(&[2000])]);
     let both = run(&mut bus, |lss| {
         lss.switch_global(Mode::Configuration)?;
         lss.configure_node_id(Some(node(12)))
@@ -223,37 +227,46 @@ fn another_master_ends_the_work() {
     run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();
 }
 
-/// A wire on which two answers at a time are an error frame.
-struct Colliding(MemoryBus);
+/// A wire that does something to the slaves' answers, or has one on it before anything is asked.
+struct Odd {
+    bus: MemoryBus,
+    /// Two answers at a time are an error frame.
+    collides: bool,
+    /// What was received before.
+    stale: Option<Frame>,
+}
 
-impl Bus for Colliding {
+impl Bus for Odd {
     fn name(&self) -> &str {
-        self.0.name()
+        self.bus.name()
     }
 
     fn bit_rate(&self) -> Option<u32> {
-        self.0.bit_rate()
+        self.bus.bit_rate()
     }
 
     fn timestamps(&self) -> TimestampSource {
-        self.0.timestamps()
+        self.bus.timestamps()
     }
 
     fn now(&self) -> Stamp {
-        self.0.now()
+        self.bus.now()
     }
 
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.0.listen(filters)
+        self.bus.listen(filters)
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        self.0.send(frame)
+        self.bus.send(frame)
     }
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
-        match self.0.receive(deadline)? {
-            Event::Frame(received) if received.frame.id() == CanId::LSS_SLAVE => {
+        if let Some(frame) = self.stale.take() {
+            return Ok(Event::Frame(Received { frame, at: self.now() }));
+        }
+        match self.bus.receive(deadline)? {
+            Event::Frame(received) if self.collides && received.frame.id() == CanId::LSS_SLAVE => {
                 Ok(Event::Fault(Fault::Protocol, received.at))
             }
             event => Ok(event),
@@ -263,13 +276,52 @@ impl Bus for Colliding {
 
 #[test]
 fn answers_that_destroy_each_other_are_no_silence() {
-    let mut bus = Colliding(bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 6)]));
+    let bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 6)]);
+    let mut bus = Odd { bus, collides: true, stale: None };
     let mut master = Master::new(&mut bus, Timing::default());
     let mut lss = master.lss();
     lss.switch_global(Mode::Configuration).unwrap();
     let serial = lss.inquire(Part::Serial).unwrap();
     assert!(matches!(&serial, Gathered { answers, faults, .. } if answers.is_empty() && faults[0] == Fault::Protocol));
     assert!(!serial.is_one());
+}
+
+#[test]
+fn what_was_answered_before_the_question_is_no_answer() {
+    let stale = "7E4#1700000000000000".parse().ok();
+    let mut bus = Odd { bus: bus_of([]), collides: false, stale };
+    let mut master = Master::new(&mut bus, Timing::default());
+    assert!(matches!(master.lss().store(), Err(LssError::NoAnswer { service: Service::Store, .. })));
+}
+
+/// What could not be sent before Ctrl-C is not sent after it.
+#[test]
+fn what_waited_to_be_sent_is_given_up() {
+    let mut slave = Slave::new(ONE, 5);
+    slave.is_configuring = true;
+    let mut bus = bus_of([slave]);
+    bus.interrupt_at(ms(3));
+    let plan = FaultPlan { queue_full: (0..20).collect(), ..FaultPlan::default() };
+    let mut bus = Faulty::new(bus, plan);
+    let mut master = Master::new(&mut bus, Timing::default());
+    assert!(matches!(master.lss().store(), Err(LssError::Master(Error::Interrupted))));
+    master.lss().switch_global(Mode::Waiting).unwrap();
+    drop(master);
+    let slave = bus.inner().stations::<Slave>().next().unwrap();
+    assert_eq!((slave.is_configuring, slave.told), (false, 0));
+}
+
+/// However often the queue is full: an answer that comes at once is heard.
+#[test]
+fn an_answer_is_heard_however_the_request_went_out() {
+    for full in 0..12 {
+        let mut slave = Slave::new(ONE, 5).slow(&[0]);
+        slave.is_configuring = true;
+        let bus = bus_of([slave]).with_bit_rate(1_000_000);
+        let plan = FaultPlan { queue_full: (0..full).collect(), ..FaultPlan::default() };
+        let mut bus = Faulty::new(bus, plan);
+        Master::new(&mut bus, Timing::default()).lss().store().unwrap();
+    }
 }
 
 #[test]

@@ -1,0 +1,276 @@
+//! `cangauge pdo`.
+
+use super::args::{Duration, Nodes, ObjectArg};
+use super::exit::stdout;
+use super::{Format, Global, open};
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::pdo::TpdoNumber;
+use crate::output::pdo as output;
+use crate::tasks::pdo::{Item, Line, Send, Shown, Wish, map, show, watch};
+use crate::tasks::{Failure, Kind};
+use clap::{Args, Subcommand};
+use std::io::{self, Write};
+use std::ops::ControlFlow;
+use std::str::FromStr;
+
+/// Show, change and watch what the nodes' transmit PDOs carry
+///
+/// PDO 1 is TPDO1 (1800h, 1A00h). A mapping is changed as a transaction: what was asked for is reached and
+/// read back, or the old settings are put back and the refused write is named.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  cangauge -b sim pdo show 1\n  cangauge -b sim pdo map 1 1 pressure pressure.status --transmission timer --event-timer 100ms\n  cangauge -b sim pdo map 2 1 0x6130:1/32\n  cangauge -b sim pdo watch 127 --duration 2s"
+)]
+pub(crate) struct Pdo {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Show how the TPDOs are set up
+    Show(ShowArgs),
+    /// Set what a TPDO carries, and when it is sent
+    Map(MapArgs),
+    /// Show the TPDOs as they come, decoded, until Ctrl-C
+    Watch(WatchArgs),
+}
+
+#[derive(Debug, Args)]
+struct ShowArgs {
+    /// Which node: 5, 0x7f
+    node: NodeId,
+    /// Which TPDO: 1 to 512; not given: all
+    #[arg(value_parser = tpdo)]
+    pdo: Option<TpdoNumber>,
+}
+
+#[derive(Debug, Args)]
+struct MapArgs {
+    /// Which node: 5, 0x7f
+    node: NodeId,
+    /// Which TPDO: 1 to 512
+    #[arg(value_parser = tpdo)]
+    pdo: TpdoNumber,
+    /// What it carries, in this order: pressure, pressure.status, ai-input-pv:1, 0x6130:1, 0x9130:1/32; not
+    /// given: the mapping stays as it is
+    #[arg(value_name = "SIGNAL|OBJECT")]
+    signals: Vec<MapItem>,
+    /// When it is sent: acyclic (on SYNC after a change), sync:N (on every N-th SYNC), event (255), timer
+    /// (by the event timer), or a number
+    #[arg(long, value_name = "HOW", value_parser = transmission)]
+    transmission: Option<Send>,
+    /// The event timer, in whole milliseconds; 0 is off
+    #[arg(long, value_name = "DUR", value_parser = event_timer)]
+    event_timer: Option<u16>,
+    /// The shortest time between two transmissions, in steps of 100us; 0 is none
+    #[arg(long, value_name = "DUR", value_parser = inhibit)]
+    inhibit: Option<u16>,
+    /// The identifier, 11 bits: 0x1A5
+    #[arg(long, value_name = "ID", value_parser = identifier)]
+    cob_id: Option<u16>,
+    /// Store it then (1010h, the communication settings alone where the device has them apart)
+    #[arg(long)]
+    store: bool,
+}
+
+#[derive(Debug, Args)]
+struct WatchArgs {
+    /// Which nodes: 5, 0x7f, 1-16, 1,5, all
+    nodes: Nodes,
+    /// End after this time
+    #[arg(short, long, value_name = "DUR")]
+    duration: Option<Duration>,
+}
+
+fn tpdo(text: &str) -> Result<TpdoNumber, String> {
+    let number = text.parse().ok().and_then(TpdoNumber::new);
+    number.ok_or_else(|| format!("\"{text}\" is not the number of a TPDO (1 to 512)"))
+}
+
+/// Something to be mapped, with its bits where they are fixed.
+#[derive(Clone, Debug)]
+struct MapItem(Item);
+
+impl FromStr for MapItem {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<MapItem, String> {
+        let (what, bits) = match text.split_once('/') {
+            None => (text, None),
+            Some((what, bits)) => {
+                let number = bits.parse().ok().filter(|bits| (1..=64).contains(bits));
+                (what, Some(number.ok_or_else(|| format!("\"{text}\": \"{bits}\" is no number of bits (1 to 64)"))?))
+            }
+        };
+        if what.starts_with(|first: char| first.is_ascii_digit()) {
+            let object: ObjectId = what.parse().map_err(|error| format!("{error}"))?;
+            return Ok(MapItem(Item::Object(object, bits)));
+        }
+        let bare = what.strip_suffix(".status").unwrap_or(what);
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        let named = bare.starts_with(|first: char| first.is_ascii_alphabetic()) && bare.chars().all(plain);
+        if named || matches!(what.parse(), Ok(ObjectArg::Name(_))) {
+            return Ok(MapItem(Item::Name(what.to_owned(), bits)));
+        }
+        Err(format!(
+            "\"{text}\" is neither a signal (pressure, ch1, pressure.status) nor an object (0x6130:1, 0x9130:1/32)"
+        ))
+    }
+}
+
+fn transmission(text: &str) -> Result<Send, String> {
+    let wrong =
+        || format!("\"{text}\" is not a transmission type (acyclic, sync:1 to sync:240, event, timer, 0 to 255)");
+    Ok(match text {
+        "acyclic" => Send::Code(0),
+        "event" => Send::Code(255),
+        "timer" => Send::Timer,
+        _ => match text.strip_prefix("sync:") {
+            Some(every) => Send::Code(every.parse().ok().filter(|every| (1..=240).contains(every)).ok_or_else(wrong)?),
+            None => Send::Code(text.parse().map_err(|_| wrong())?),
+        },
+    })
+}
+
+/// A duration as a number of `unit`s that fits 16 bits.
+fn units(text: &str, unit: std::time::Duration, form: &str) -> Result<u16, String> {
+    let duration = match text {
+        "0" => std::time::Duration::ZERO,
+        _ => humantime::parse_duration(text).map_err(|_| format!("\"{text}\" is not a duration ({form})"))?,
+    };
+    let whole = duration.as_nanos() % unit.as_nanos() == 0;
+    let number = u16::try_from(duration.as_nanos() / unit.as_nanos()).ok().filter(|_| whole);
+    number.ok_or_else(|| format!("\"{text}\" is not {form}"))
+}
+
+fn event_timer(text: &str) -> Result<u16, String> {
+    units(text, std::time::Duration::from_millis(1), "a number of milliseconds, 0 to 65535ms")
+}
+
+fn inhibit(text: &str) -> Result<u16, String> {
+    units(text, std::time::Duration::from_micros(100), "a multiple of 100us, 0 to 6553500us")
+}
+
+fn identifier(text: &str) -> Result<u16, String> {
+    let number = crate::canopen::id::parse_u32(text);
+    number.and_then(|number| u16::try_from(number).ok()).filter(|&number| number <= 0x7ff).ok_or_else(|| {
+        format!("\"{text}\" is not an identifier of 11 bits (0x181 to 0x57F; without the flags of the COB-ID)")
+    })
+}
+
+impl Pdo {
+    pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
+        match &self.action {
+            Action::Show(args) => args.run(global),
+            Action::Map(args) => args.run(global),
+            Action::Watch(args) => args.run(global),
+        }
+    }
+}
+
+impl ShowArgs {
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let overrides = open::overrides(global, &[self.node])?;
+        let shown = global.with_master(|master| Ok(show(master, self.node, self.pdo, &overrides)?))?;
+        print(&shown, global.format).map_err(stdout)
+    }
+}
+
+impl MapArgs {
+    fn wish(&self) -> Result<Wish, Failure> {
+        let wish = Wish {
+            node: self.node,
+            number: self.pdo,
+            items: self.signals.iter().map(|item| item.0.clone()).collect(),
+            send: self.transmission,
+            event_timer_ms: self.event_timer,
+            inhibit_100us: self.inhibit,
+            cob_id: self.cob_id,
+        };
+        let parameters = [wish.event_timer_ms, wish.inhibit_100us, wish.cob_id];
+        if wish.items.is_empty() && wish.send.is_none() && parameters.iter().all(Option::is_none) {
+            let hint = format!("how it is set: cangauge pdo show {} {}", self.node, self.pdo.get());
+            return Err(
+                Failure::new(Kind::Usage, "nothing to set: name signals, or --transmission and its like").hint(hint)
+            );
+        }
+        wish.check()?;
+        Ok(wish)
+    }
+
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let wish = self.wish()?;
+        let overrides = open::overrides(global, &[self.node])?;
+        let mapped = global.with_master(|master| Ok(map(master, &wish, self.store, &overrides)?))?;
+        let console = global.console();
+        mapped.warnings.iter().for_each(|warning| console.warn(warning));
+        let node = self.node;
+        match mapped.writes {
+            0 => console.note(&format!("node {node}: {} is already as wanted: nothing was written", self.pdo)),
+            1 => console.detail(&format!("node {node}: 1 write, read back")),
+            writes => console.detail(&format!("node {node}: {writes} writes, read back")),
+        }
+        if let Some(stored) = &mapped.stored {
+            console.note(&format!("node {node}: stored ({}), acknowledged", stored.groups()));
+            stored.notes.iter().for_each(|note| console.note(&format!("node {node}: {note}")));
+        }
+        mapped.remarks.iter().for_each(|remark| console.note(remark));
+        print(&[mapped.shown], global.format).map_err(stdout)
+    }
+}
+
+fn print(shown: &[Shown], format: Format) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match format {
+        Format::Json => shown.iter().try_for_each(|shown| output::json(&mut out, shown))?,
+        Format::Csv => output::csv(&mut out, shown)?,
+        Format::Text => output::text(&mut out, shown)?,
+    }
+    out.flush()
+}
+
+impl WatchArgs {
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let console = global.console();
+        let mut failed = None;
+        let mut out = io::stdout().lock();
+        if global.format == Format::Csv {
+            output::watched_head(&mut out).map_err(stdout)?;
+        }
+        global.with_master(|master| {
+            let nodes = open::nodes(master, global, &self.nodes)?;
+            let overrides = open::overrides(global, &nodes)?;
+            let mut tell = |seen: &Line<'_>| {
+                match seen {
+                    Line::Restarted(node) => {
+                        console.warn(&format!("node {node} restarted: its mapping is taken for the same"));
+                    }
+                    Line::Nothing => {
+                        console.note("nothing yet: are the nodes started, and does somebody send SYNC?");
+                    }
+                    Line::WrongLength { node, number, length, .. } if global.format != Format::Text => {
+                        console.warn(&format!("node {node}: {number} has {length} bytes, not those of its mapping"));
+                    }
+                    _ => {}
+                }
+                let written = match global.format {
+                    Format::Json => output::watched_json(&mut out, seen),
+                    Format::Csv => output::watched_csv(&mut out, seen),
+                    Format::Text => output::watched_text(&mut out, seen),
+                };
+                match written.and_then(|()| out.flush()) {
+                    Ok(()) => ControlFlow::Continue(()),
+                    Err(error) => {
+                        failed = Some(error);
+                        ControlFlow::Break(())
+                    }
+                }
+            };
+            let duration = self.duration.map(|duration| duration.0);
+            Ok(watch(master, &nodes, &overrides, duration, &mut tell)?)
+        })?;
+        failed.map_or(Ok(()), |error| Err(stdout(error)))
+    }
+}

@@ -1,0 +1,17 @@
+//! How like two words are, for telling what somebody may have meant.
+
+/// How many letters have to be changed, added or left out to get from one word to the other.
+pub fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (at, letter) in a.chars().enumerate() {
+        let mut corner = at;
+        row[0] = at + 1;
+        for (column, other) in b.iter().enumerate() {
+            let kept = corner + usize::from(letter != *other);
+            corner = row[column + 1];
+            row[column + 1] = kept.min(corner + 1).min(row[column] + 1);
+        }
+    }
+    row.last().copied().unwrap_or(0)
+}

@@ -1,0 +1,244 @@
+//! The TOML file of a bench, as it is written.
+
+use super::{BenchError, UNCONFIGURED, check_rate, read};
+use crate::bus::memory::Clock;
+use crate::canopen::id::{NodeId, parse_u32};
+use crate::canopen::object::ObjectId;
+use crate::device::catalog::{self, Model};
+use crate::device::description::{Scalar, SimChannel};
+use crate::sim::model::{Direction, Overload};
+use crate::sim::setup::{GoneAfter, Oddities, Setup};
+use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+fn yes() -> bool {
+    true
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BenchFile {
+    #[serde(default)]
+    pub(super) clock: ClockName,
+    pub(super) bit_rate: Option<u32>,
+    #[serde(default = "yes")]
+    pub(super) retime: bool,
+    #[serde(default)]
+    pub(super) seed: u64,
+    pub(super) record: Option<PathBuf>,
+    #[serde(default)]
+    pub(super) device: Vec<DeviceEntry>,
+}
+
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum ClockName {
+    #[default]
+    Real,
+    Virtual,
+}
+
+impl From<ClockName> for Clock {
+    fn from(name: ClockName) -> Clock {
+        match name {
+            ClockName::Real => Clock::Real,
+            ClockName::Virtual => Clock::Virtual,
+        }
+    }
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DeviceEntry {
+    pub(super) kind: String,
+    pub(super) node: Option<NodeId>,
+    #[serde(default)]
+    pub(super) twin: bool,
+    bit_rate: Option<u32>,
+    #[serde(default, deserialize_with = "duration")]
+    latency: Duration,
+    #[serde(default)]
+    gone_after: Vec<GoneName>,
+    #[serde(default)]
+    lss: LssEntry,
+    serial: Option<u32>,
+    #[serde(default)]
+    start: bool,
+    #[serde(default)]
+    set: BTreeMap<ObjectId, Scalar>,
+    #[serde(default)]
+    channel: Vec<ChannelEntry>,
+    #[serde(default)]
+    overload: Vec<OverloadEntry>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum GoneName {
+    Reset,
+    Activate,
+}
+
+impl From<GoneName> for GoneAfter {
+    fn from(name: GoneName) -> GoneAfter {
+        match name {
+            GoneName::Reset => GoneAfter::Reset,
+            GoneName::Activate => GoneAfter::Activate,
+        }
+    }
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LssEntry {
+    #[serde(default)]
+    lose: Vec<u8>,
+    #[serde(default)]
+    late: BTreeMap<Service, Late>,
+    #[serde(default)]
+    refuse: BTreeMap<Service, u8>,
+    #[serde(default)]
+    scans_for_ever: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[serde(try_from = "String")]
+struct Service(u8);
+
+impl TryFrom<String> for Service {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Service, String> {
+        let number = parse_u32(&text).and_then(|number| u8::try_from(number).ok());
+        number.map(Service).ok_or_else(|| format!("\"{text}\" is not a service (\"0x17\")"))
+    }
+}
+
+#[derive(Clone, Copy, Deserialize)]
+struct Late(#[serde(deserialize_with = "duration")] Duration);
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ChannelEntry {
+    channel: u8,
+    base: Option<f64>,
+    amplitude: Option<f64>,
+    period_s: Option<f64>,
+    noise: Option<f64>,
+    start: Option<f64>,
+    end: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OverloadEntry {
+    channel: u8,
+    #[serde(deserialize_with = "duration")]
+    from: Duration,
+    #[serde(default = "for_ever", deserialize_with = "duration")]
+    until: Duration,
+    direction: DirectionName,
+}
+
+fn for_ever() -> Duration {
+    Duration::MAX
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum DirectionName {
+    High,
+    Low,
+}
+
+fn duration<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Duration, D::Error> {
+    humantime::parse_duration(&String::deserialize(deserializer)?).map_err(serde::de::Error::custom)
+}
+
+impl DeviceEntry {
+    pub(super) fn new(kind: &str, node: Option<NodeId>) -> DeviceEntry {
+        DeviceEntry { kind: kind.to_owned(), node, ..DeviceEntry::default() }
+    }
+
+    /// As people write it: `mh4@5`.
+    pub(super) fn name(&self) -> String {
+        match self.node {
+            Some(node) => format!("{}@{node}", self.kind),
+            None => format!("{}@{UNCONFIGURED}", self.kind),
+        }
+    }
+
+    /// `before`: how many devices of this kind come before it; each has its own serial number.
+    pub(super) fn setup(&self, seed: u64, before: u32, beside: &Path) -> Result<Setup, BenchError> {
+        let mut setup = Setup::new(self.model(beside)?, self.node.unwrap_or(NodeId::MIN));
+        setup.node = self.node;
+        let named = |error| BenchError::Usage(format!("{}: {error}", self.name()));
+        setup.bit_rate = self.bit_rate.map(check_rate).transpose().map_err(named)?;
+        setup.oddities = Oddities {
+            latency: self.latency,
+            lose: self.lss.lose.clone(),
+            late: self.lss.late.iter().map(|(service, late)| (service.0, late.0)).collect(),
+            refuse: self.lss.refuse.iter().map(|(service, code)| (service.0, *code)).collect(),
+            scans_for_ever: self.lss.scans_for_ever,
+            gone_after: self.gone_after.iter().map(|name| GoneAfter::from(*name)).collect(),
+        };
+        setup.serial = self.serial.unwrap_or(setup.serial.wrapping_add(before));
+        setup.start = self.start;
+        setup.set = self.set.iter().map(|(object, value)| (*object, value.clone())).collect();
+        setup.seed = seed;
+        for changed in &self.channel {
+            changed.apply(self.find(&mut setup.channels, changed.channel)?);
+        }
+        for overload in &self.overload {
+            self.find(&mut setup.channels, overload.channel)?;
+            if overload.from >= overload.until {
+                return Err(BenchError::Usage(format!("{}: an overload that ends before it begins", self.name())));
+            }
+            let direction = match overload.direction {
+                DirectionName::High => Direction::High,
+                DirectionName::Low => Direction::Low,
+            };
+            let scripted = Overload { from: overload.from, until: overload.until, direction };
+            setup.overloads.push((overload.channel, scripted));
+        }
+        Ok(setup)
+    }
+
+    fn find<'a>(&self, channels: &'a mut [SimChannel], number: u8) -> Result<&'a mut SimChannel, BenchError> {
+        channels
+            .iter_mut()
+            .find(|channel| channel.channel == number)
+            .ok_or_else(|| BenchError::Usage(format!("{} has no channel {number}", self.name())))
+    }
+
+    fn model(&self, beside: &Path) -> Result<Arc<Model>, BenchError> {
+        if Path::new(&self.kind).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
+            let path = beside.join(&self.kind);
+            let model = Model::from_toml(&read(&path)?);
+            return model.map(Arc::new).map_err(|error| BenchError::Usage(format!("{}: {error}", path.display())));
+        }
+        catalog::by_name(&self.kind).ok_or_else(|| {
+            let known: Vec<&str> = catalog::built_in().iter().map(|model| model.description.name.as_str()).collect();
+            BenchError::Usage(format!("there is no device \"{}\" ({}, or FILE.toml)", self.kind, known.join(", ")))
+        })
+    }
+}
+
+impl ChannelEntry {
+    fn apply(&self, channel: &mut SimChannel) {
+        let SimChannel { base, amplitude, period_s, noise, start, end, .. } = channel;
+        for (given, value) in [
+            (self.base, base),
+            (self.amplitude, amplitude),
+            (self.period_s, period_s),
+            (self.noise, noise),
+            (self.start, start),
+            (self.end, end),
+        ] {
+            *value = given.unwrap_or(*value);
+        }
+    }
+}

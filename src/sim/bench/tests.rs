@@ -1,0 +1,213 @@
+use super::*;
+use crate::bus::time::Mono;
+use crate::bus::{Bus, Event};
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use std::time::Duration;
+
+fn nodes(bench: &Bench) -> Vec<u8> {
+    bench.devices.iter().filter_map(|device| Some(device.node()?.get())).collect()
+}
+
+fn refusal(bench: Result<Bench, BenchError>) -> String {
+    match bench {
+        Ok(_) => "accepted".to_owned(),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn plain_sim_is_the_bench_of_the_contract() {
+    let bench = Bench::parse("").expect("the default");
+    assert_eq!(nodes(&bench), [1, 2, 3, 127]);
+    assert_eq!((bench.clock(), bench.bit_rate), (Clock::Real, 250_000));
+}
+
+#[test]
+fn lists_of_devices() {
+    let bench = Bench::parse("mh4@5,dps@0x7f,mh4@6").expect("a list");
+    assert_eq!(nodes(&bench), [5, 127, 6]);
+    for (spec, message) in [
+        ("mh4", "\"mh4\" is not DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) and no file FILE.toml"),
+        ("mh4@200", "mh4@200: \"200\" is not a node-ID (1 to 127)"),
+        ("mh4@0", "mh4@0: \"0\" is not a node-ID (1 to 127)"),
+        ("mh4@5,", "\"\" is not DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) and no file FILE.toml"),
+        ("mh4@5,dps@5", "two devices with node-ID 5"),
+        ("mh5@5", "there is no device \"mh5\" (mh4, d20, dps, mc1609, hydac-old, baumer, hydac, jumo, or FILE.toml)"),
+    ] {
+        assert_eq!(refusal(Bench::parse(spec)), message);
+    }
+    assert!(matches!(Bench::parse("no-such-file.toml"), Err(BenchError::Io { .. })));
+}
+
+#[test]
+fn devices_without_a_node_id() {
+    let bench = Bench::parse("mh4@unconfigured,dps@5,mh4@unconfigured").expect("a list");
+    assert_eq!(bench.devices.iter().map(Device::node).collect::<Vec<_>>(), [None, NodeId::new(5).ok(), None]);
+    assert_eq!(
+        refusal(Bench::parse("mh4@UNCONFIGURED")),
+        "mh4@UNCONFIGURED: \"UNCONFIGURED\" is not a node-ID (1 to 127)"
+    );
+    let text = "[[device]]\nkind = \"mh4\"\n[[device.channel]]\nchannel = 3\n";
+    assert_eq!(refusal(Bench::from_toml(text, Path::new(""))), "mh4@unconfigured has no channel 3");
+}
+
+#[test]
+fn what_is_wrong_with_a_file_is_told_with_its_line() {
+    let text = |text: &str| refusal(Bench::from_toml(text, Path::new("")));
+    let device = "[[device]]\nkind = \"mh4\"\nnode = 5\n";
+    assert!(text("seed = 1\nsped = 2\n").starts_with("line 2: unknown field `sped`"));
+    assert!(text(&format!("{device}nod = 5\n")).starts_with("line 4: unknown field `nod`"));
+    assert!(text(&format!("clock = \"unreal\"\n{device}")).starts_with("line 1: unknown variant `unreal`"));
+    assert_eq!(text("[[device]]\nkind = \"mh4\"\nnode = 128\n"), "line 3: \"128\" is not a node-ID (1 to 127)");
+    assert_eq!(text(&format!("bit_rate = 0\n{device}")), "0 bit/s is not a bit rate of CAN (1 to 1000000)");
+    assert_eq!(text("seed = 1\n"), "no device");
+    assert_eq!(
+        text(&format!("{device}bit_rate = 2000000\n")),
+        "mh4@5: 2000000 bit/s is not a bit rate of CAN (1 to 1000000)"
+    );
+    assert_eq!(text(&format!("{device}{device}")), "two devices with node-ID 5");
+    assert!(text(&format!("{device}lss = {{ refuse = {{ \"0x117\" = 1 }} }}\n")).contains("is not a service"));
+    assert!(text(&format!("{device}lss = {{ loose = [0x17] }}\n")).contains("unknown field `loose`"));
+    assert!(text(&format!("{device}gone_after = [\"lunch\"]\n")).contains("unknown variant `lunch`"));
+    assert_eq!(text(&format!("{device}set = {{ \"0x5000\" = 1 }}\n")), "mh4@5: mh4 has no object 0x5000:0");
+    assert_eq!(
+        text(&format!("{device}set = {{ \"1017\" = 70000 }}\n")),
+        "mh4@5: 0x1017:0: 70000 does not fit u16 (0 to 65535)"
+    );
+    assert!(text(&format!("{device}set = {{ \"x\" = 1 }}\n")).starts_with("line 4: \"x\" is not an object"));
+    assert_eq!(text(&format!("{device}[[device.channel]]\nchannel = 3\n")), "mh4@5 has no channel 3");
+    let overload = "[[device.overload]]\nchannel = 1\nfrom = \"2s\"\nuntil = \"1s\"\ndirection = \"high\"\n";
+    assert_eq!(text(&format!("{device}{overload}")), "mh4@5: an overload that ends before it begins");
+    assert!(text(&format!("{device}{}", overload.replace("2s", "2 parsecs"))).starts_with("line 6: "));
+}
+
+/// Frames up to `until`.
+fn hear(bus: &mut MemoryBus, until: Duration) -> Vec<String> {
+    let mut heard = Vec::new();
+    while let Ok(Event::Frame(received)) = bus.receive(Mono::at(until)) {
+        heard.push(received.frame.to_string());
+    }
+    heard
+}
+
+#[test]
+fn everything_that_a_file_can_say() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("bench.toml");
+    let text = r#"
+        clock = "virtual"
+        bit_rate = 125000
+        seed = 7
+        record = "truth.csv"
+
+        [[device]]
+        kind = "mh4"
+        node = 5
+        serial = 4711
+        start = true
+        set = { "0x1017" = 100, "1800:2" = 254, "0x1800:5" = 150 }
+
+        [[device.channel]]
+        channel = 1
+        base = 5.0
+        amplitude = 0.0
+        noise = 0.0
+
+        [[device.overload]]
+        channel = 1
+        from = "200ms"
+        direction = "low"
+
+        [[device]]
+        kind = "dps"
+        node = 127
+    "#;
+    std::fs::write(&path, text).expect("written");
+    let mut bus = Bench::parse(path.to_str().expect("text")).expect("a bench").open().expect("opened");
+    assert_eq!(bus.bit_rate(), Some(125_000));
+    assert_eq!(
+        hear(&mut bus, Duration::from_millis(310)),
+        ["705#00", "77F#00", "705#05", "185#0000A04000", "705#05", "085#01F0810105000000", "185#0000C07F05", "705#05",]
+            .map(str::to_owned)
+    );
+    let serial: ObjectId = "1018:4".parse().expect("an object");
+    let now = bus.now().mono;
+    let device: &mut Device = bus.stations_mut().next().expect("a device");
+    assert_eq!(device.value(serial, now), Some(4711u32.to_le_bytes().to_vec()));
+    drop(bus);
+    let record = std::fs::read_to_string(folder.path().join("truth.csv")).expect("the record");
+    let values: Vec<&str> =
+        record.lines().skip(1).filter_map(|line| line.split_once(',')).map(|(_, rest)| rest).collect();
+    assert_eq!(values, ["5,pressure,5,bar,ok,0x0000A040", "5,pressure,,bar,overload-low,0x0000C07F"]);
+}
+
+#[test]
+fn what_goes_wrong_on_purpose() {
+    let text = r#"
+        clock = "virtual"
+        retime = false
+
+        [[device]]
+        kind = "mh4"
+        node = 5
+        latency = "1ms"
+        gone_after = ["reset"]
+        lss = { lose = [0x11], late = { "0x13" = "50ms" }, refuse = { "0x17" = 1 } }
+
+        [[device]]
+        kind = "mh4"
+        node = 5
+        twin = true
+        bit_rate = 125000
+    "#;
+    let bus = Bench::from_toml(text, Path::new("")).expect("a bench").open().expect("opened");
+    assert!(bus.can_set_bit_rate().is_err());
+    let rates: Vec<Option<u32>> = bus.stations::<Device>().map(Device::bit_rate).collect();
+    assert_eq!(rates, [Some(250_000), Some(125_000)]);
+    // Now without the twin, who would disturb everybody.
+    let alone = &text[..text.rfind("[[device]]").expect("two devices")];
+    let mut bus = Bench::from_toml(alone, Path::new("")).expect("a bench").open().expect("opened");
+    let lines = [
+        ("7E5#0401000000000000", "705#00"),
+        ("7E5#110C000000000000", ""),
+        ("7E5#1300040000000000", "7E4#1300000000000000"),
+        ("7E5#1700000000000000", "7E4#1701000000000000"),
+        ("000#8105", ""),
+    ];
+    for (number, (request, answer)) in (1u32..).zip(lines) {
+        bus.send(&request.parse().expect("a frame")).expect("room");
+        assert_eq!(hear(&mut bus, Duration::from_millis(100) * number).concat(), answer, "after {request}");
+    }
+    let device: &Device = bus.stations().next().expect("a device");
+    assert_eq!((device.node().map(NodeId::get), device.state()), (Some(12), None));
+}
+
+#[test]
+fn a_record_that_cannot_be_written_is_an_error_of_the_file() {
+    let text = "record = \"no/such/folder/truth.csv\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
+    let bench = Bench::from_toml(text, Path::new("")).expect("a bench");
+    assert!(matches!(bench.open(), Err(BenchError::Io { .. })));
+}
+
+#[test]
+fn devices_of_a_kind_have_serial_numbers_of_their_own() {
+    let mut bus = Bench::parse("mh4@5,dps@6,mh4@7").expect("a list").open().expect("opened");
+    let serial: ObjectId = "1018:4".parse().expect("an object");
+    let serials: Vec<Option<Vec<u8>>> =
+        bus.stations_mut::<Device>().map(|device| device.value(serial, Mono::START)).collect();
+    assert_ne!(serials[0], serials[2]);
+    assert!(serials.iter().all(|serial| serial.as_deref().is_some_and(|bytes| bytes != [0; 4])));
+}
+
+#[test]
+fn a_description_of_the_users_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = "name = \"own\"\ntitle = \"\"\nvendor = \"\"\nsource = \"\"\n[identify]\n[[object]]\nat = \"0x1000\"\n\
+                 name = \"device-type\"\ntype = \"u32\"\naccess = \"ro\"\ndefault = 404\n";
+    std::fs::write(folder.path().join("own.toml"), model).expect("written");
+    let text = "clock = \"virtual\"\n[[device]]\nkind = \"own.toml\"\nnode = 9\n";
+    let mut bus = Bench::from_toml(text, folder.path()).expect("a bench").open().expect("opened");
+    bus.send(&"609#4000100000000000".parse().expect("a frame")).expect("room");
+    assert_eq!(hear(&mut bus, Duration::from_secs(1)), ["709#00", "589#4300100094010000"]);
+}

@@ -1,0 +1,126 @@
+//! Which way to take, and which index stands for the bit rate: decided before anything is changed.
+
+use super::subject::Subject;
+use super::{Note, Tell, Via};
+use crate::canopen::object::ObjectId;
+use crate::device::assign::{AssignEntry, AssignPlace, AssignWay, RateSource, RateTable, spoken_rate};
+use crate::device::description::Description;
+use crate::device::quirk::Quirk;
+use crate::tasks::{Failure, Kind};
+
+/// A bit rate as the user names it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rate {
+    /// In bit/s.
+    Bits(u32),
+    /// The device finds it out.
+    Auto,
+    /// What stands at this index in the device's own table, and what the user says that is.
+    Index(u8, Option<u32>),
+}
+
+/// A bit rate as the device takes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct PlannedRate {
+    /// The index in the device's table.
+    pub index: u8,
+    /// In bit/s, where it is known.
+    pub bits: Option<u32>,
+}
+
+const STORE_ALL: ObjectId = ObjectId::new(0x1010, 1);
+
+/// The way to take.
+///
+/// # Errors
+/// A device without the objects that were asked for, or where they cannot be reached.
+pub(super) fn way(subject: &Subject, via: Via, tell: Tell<'_>) -> Result<AssignEntry, Failure> {
+    let description = subject.model.as_ref().map(|model| &model.description);
+    let entry = match via {
+        Via::Auto => description.and_then(Description::assign_way).cloned(),
+        Via::Lss => description.and_then(|description| description.assign_by(AssignWay::Lss)).cloned(),
+        Via::Sdo => {
+            let entry = description.and_then(|description| description.assign_by(AssignWay::Objects)).cloned();
+            Some(entry.ok_or_else(|| {
+                let message = "no source at hand says which objects of this device take node-ID and bit rate";
+                subject
+                    .failure(Kind::CheckFailed, format!("{message}: nothing was changed"))
+                    .hint("by LSS: --via lss; with another description: --device NAME")
+            })?)
+        }
+    };
+    let entry = entry.unwrap_or_else(AssignEntry::lss);
+    if entry.way == AssignWay::Objects && (subject.node.is_none() || !subject.alone) {
+        let message =
+            "its objects cannot be reached: SDO under its node-ID does not reach it alone; nothing was changed";
+        return Err(subject.failure(Kind::CheckFailed, message).hint("connect it alone, or by LSS: --via lss"));
+    }
+    if entry.unverified {
+        let message = format!("{}: no source prints this way: {}", subject.name(), entry.doubt);
+        tell(Note::Warning(message));
+    }
+    let wipes = description.is_some_and(|description| description.quirks.contains(&Quirk::SaveAllResetsCobIds));
+    if entry.store == Some(STORE_ALL) && wipes {
+        let message = format!(
+            "{}: 1010h:1 keeps every value as it is now, and puts the COB-IDs of 1014h and 180xh:1 to their defaults",
+            subject.name()
+        );
+        tell(Note::Warning(message));
+    }
+    Ok(entry)
+}
+
+/// The index of a bit rate in a device's table.
+///
+/// # Errors
+/// [`Kind::Usage`] with the list of what the device offers.
+pub(super) fn plan_rate(description: Option<&Description>, rate: Rate, way: AssignWay) -> Result<PlannedRate, Failure> {
+    let table = RateTable::of(description);
+    let title = description.map_or("CiA 305", |description| &description.title);
+    let refuse = |what: String| {
+        let mut list: Vec<String> = table.rates().into_iter().map(spoken_rate).collect();
+        list.extend(table.auto().map(|_| "auto".to_owned()));
+        let list = list.join(", ");
+        let source = if table.source == RateSource::Standard { "the table of CiA 305" } else { "its table" };
+        Failure::new(Kind::Usage, format!("{title} has no bit rate {what}: nothing was changed"))
+            .hint(format!("{source} has {list}; another by its index: --table-index N"))
+    };
+    if way == AssignWay::Objects && table.source == RateSource::Standard && !matches!(rate, Rate::Index(..)) {
+        let message = format!("the codes that {title} has for bit rates are not known: nothing was changed");
+        return Err(Failure::new(Kind::Usage, message).hint("look it up in its manual: --table-index N"));
+    }
+    match rate {
+        Rate::Index(index, bits) => Ok(PlannedRate { index, bits: bits.or_else(|| table.rate_of(index)) }),
+        Rate::Auto => {
+            table.auto().map(|index| PlannedRate { index, bits: None }).ok_or_else(|| refuse("auto".to_owned()))
+        }
+        Rate::Bits(bits) => table
+            .index_of(bits)
+            .map(|index| PlannedRate { index, bits: Some(bits) })
+            .ok_or_else(|| refuse(spoken_rate(bits))),
+    }
+}
+
+/// Refuses a bit rate that a device of this description does not offer; to be asked before the bus is opened.
+///
+/// # Errors
+/// [`Kind::Usage`] with the list of what the device offers.
+pub fn check_rate(description: &Description, rate: Rate, via: Via) -> Result<(), Failure> {
+    let way = match via {
+        Via::Auto => description.assign_way().map_or(AssignWay::Lss, |entry| entry.way),
+        Via::Lss => AssignWay::Lss,
+        Via::Sdo => AssignWay::Objects,
+    };
+    plan_rate(Some(description), rate, way).map(|_| ())
+}
+
+/// The object that takes a number by this way.
+///
+/// # Errors
+/// A device that has none for it.
+pub(super) fn place(subject: &Subject, place: Option<AssignPlace>, what: &str) -> Result<AssignPlace, Failure> {
+    place.ok_or_else(|| {
+        let message = format!("no source at hand says which object takes its {what}: nothing was changed");
+        subject.failure(Kind::CheckFailed, message).hint("by LSS: --via lss")
+    })
+}

@@ -1,0 +1,49 @@
+//! The writes that lead from one setting of a TPDO to another, in the order that the standard prescribes.
+
+use super::device::Write;
+use super::settings::Settings;
+use crate::device::description::Remap;
+
+/// The writes from `now` to `wanted`; none when nothing differs.
+///
+/// The mapping is changed while the PDO is off ([`Remap::Invalidate`]) or while it has no entries
+/// ([`Remap::CountOnly`]); identifier and inhibit time are changed while it is off. Off is bit 31 of the COB-ID
+/// with all other bits as they were read: dropping bit 30 is what some devices refuse. With `never_off` the
+/// device takes no bit 31.
+pub(super) fn writes(now: &Settings, wanted: &Settings, remap: Remap, never_off: bool) -> Vec<Write> {
+    let number = now.number;
+    let remaps = now.mapping != wanted.mapping;
+    let moves = now.cob_id.can_id() != wanted.cob_id.can_id();
+    let inhibits = now.inhibit_100us != wanted.inhibit_100us;
+    let off = (remaps && remap == Remap::Invalidate || moves || inhibits) && now.cob_id.is_valid() && !never_off;
+    let mut writes = Vec::new();
+    let mut cob_id = now.cob_id;
+    if off {
+        cob_id = cob_id.switched_off();
+        writes.push(Write::new(number.communication(1), cob_id.0, 4));
+    }
+    if remaps {
+        let count = u32::try_from(wanted.mapping.len()).unwrap_or(u32::MAX);
+        if !now.mapping.is_empty() {
+            writes.push(Write::new(number.mapping(0), 0, 1));
+        }
+        let entries = (1..=u8::MAX).zip(&wanted.mapping);
+        writes.extend(entries.map(|(sub, entry)| Write::new(number.mapping(sub), entry.word(), 4)));
+        if count > 0 {
+            writes.push(Write::new(number.mapping(0), count, 1));
+        }
+    }
+    if now.transmission != wanted.transmission {
+        writes.push(Write::new(number.communication(2), wanted.transmission.into(), 1));
+    }
+    if let Some(timer) = wanted.event_timer_ms.filter(|_| now.event_timer_ms != wanted.event_timer_ms) {
+        writes.push(Write::new(number.communication(5), timer.into(), 2));
+    }
+    if let Some(inhibit) = wanted.inhibit_100us.filter(|_| inhibits) {
+        writes.push(Write::new(number.communication(3), inhibit.into(), 2));
+    }
+    if cob_id.without_rtr() != wanted.cob_id.without_rtr() {
+        writes.push(Write::new(number.communication(1), wanted.cob_id.0, 4));
+    }
+    writes
+}

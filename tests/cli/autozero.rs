@@ -1,0 +1,169 @@
+//! `cangauge autozero`.
+
+use super::{ALL, Bench};
+
+/// An MH-4, a D-20-9 and a DPS that stand still, with these readings.
+fn still(mh4: f64, d20: f64, dps: f64) -> Bench {
+    let device = |kind: &str, node: u8, base: f64| {
+        format!(
+            "[[device]]\nkind = \"{kind}\"\nnode = {node}\n[[device.channel]]\nchannel = 1\nbase = {base:?}\n\
+             amplitude = 0.0\nnoise = 0.0\n"
+        )
+    };
+    Bench::described(&[device("mh4", 1, mh4), device("d20", 2, d20), device("dps", 127, dps)].concat())
+}
+
+#[test]
+fn the_zero_is_set_where_each_device_keeps_it() {
+    let bench = still(0.0625, -0.125, 0.5);
+    let done = bench.run("autozero 1,2,127").exit(0);
+    assert_eq!(
+        done.stdout,
+        "1    pressure  0.062 -> 0.000 bar   shift -0.062 bar  offset 0 -> -0.0625\n\
+         2    pressure  -0.125 -> 0.000 bar  shift 0.125 bar   offset 0 -> 0.125\n\
+         127  pressure  0.50 -> 0.00 psi     shift -0.50 psi   offset 0.000 -> -0.500\n"
+    );
+    assert_eq!(
+        done.stderr,
+        "node 1: undo: cangauge sdo write 1 0x6127:1 0 --type r32\n\
+         node 1: not stored, gone with the power: cangauge store 1 --group app\n\
+         node 2: undo: cangauge sdo write 2 0x6124:1 0 --type r32\n\
+         node 2: not stored, gone with the power: cangauge store 2 --group all\n\
+         node 127: undo: cangauge sdo write 127 0x6124:1 0 --type i32\n\
+         node 127: not stored, gone with the power: cangauge store 127 --group all\n"
+    );
+    // MH-4: 2.5 (23h); D-20-9: 22h; DPS: table 30.
+    for (id, signature) in [("601", "232561017A65726F"), ("602", "222561017A65726F"), ("67F", "222561017A65726F")] {
+        let frames = done.frames_of(id);
+        assert_eq!(frames.iter().filter(|frame| frame[2..6] == *"2561").collect::<Vec<_>>(), [&signature]);
+        assert_eq!(frames.iter().filter(|frame| frame.starts_with('2')).count(), 1, "{frames:?}");
+    }
+    let done = still(0.0625, 0.0, 0.0).run("autozero 1 --store -f json").exit(0);
+    assert_eq!(
+        done.stdout,
+        "{\"node\":1,\"channel\":1,\"unit\":\"bar\",\"before\":0.0625,\"after\":0.0,\"offset_before\":0.0,\
+         \"offset\":-0.0625,\"stored\":true}\n"
+    );
+    assert!(done.frames_of("601").contains(&"2310100373617665"), "the application settings: {:?}", done.frames);
+    assert!(done.stderr.contains("--type r32 && cangauge store 1 --group app\n"), "{}", done.stderr);
+    let done = bench.run("autozero 127 -f csv --dry-run").exit(0);
+    assert_eq!(
+        done.stdout,
+        "node,channel,unit,before,after,offset_before,offset,stored\n127,1,psi,0.5000,,0.000,,false\n"
+    );
+}
+
+/// That a command was refused and no frame to node 1 changed anything.
+#[track_caller]
+fn refuses(bench: &Bench, line: &str, stderr: &str) {
+    let done = bench.run(line).exit(1);
+    assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("", stderr));
+    assert!(done.frames_of("601").iter().all(|request| request.starts_with(['4', '6', '7'])), "{:?}", done.frames);
+}
+
+#[test]
+fn what_is_no_zero_is_refused() {
+    refuses(
+        &still(3.204, 0.0, 0.0),
+        "autozero 1",
+        "cangauge: node 1: pressure reads 3.204 bar; more than 0.100 bar (1 % of the range) is not taken for zero: \
+         nothing was changed\n\
+         hint: vent the line, or allow it: cangauge autozero 1 --limit 3.4\n",
+    );
+    let done = still(3.204, 0.0, 0.0).run("autozero 1 --limit 3.4").exit(0);
+    assert_eq!(done.stdout, "1  pressure  3.204 -> 0.000 bar  shift -3.204 bar  offset 0 -> -3.204\n");
+    still(0.15, 0.0, 0.0).run("autozero 1 --limit 2%").exit(0);
+    still(0.15, 0.0, 0.0).run("autozero 1 --limit 2psi").exit(1);
+    still(0.15, 0.0, 0.0).run("autozero 1 --limit 1e-1bar").exit(1);
+    // What was taken away before counts along.
+    let device = "[[device]]\nkind = \"mh4\"\nnode = 1\nset = { \"0x6127:1\" = -0.45 }\n[[device.channel]]\n\
+                  channel = 1\nbase = 0.5125\namplitude = 0.0\nnoise = 0.0\n";
+    refuses(
+        &Bench::described(device),
+        "autozero 1",
+        "cangauge: node 1: an offset of -0.450 bar stands already and would become -0.513 bar, more than 0.500 bar: \
+         nothing was changed\n\
+         hint: many small steps make a large one: check the sensor, or --force\n",
+    );
+    let done = Bench::described(device).run("autozero 1 --force").exit(0);
+    assert!(done.stderr.starts_with("node 1: forced: an offset of -0.450 bar stands already"), "{}", done.stderr);
+    assert!(done.stderr.contains("undo: cangauge sdo write 1 0x6127:1 -0.45 --type r32\n"), "{}", done.stderr);
+}
+
+#[test]
+fn a_restless_or_invalid_reading_is_refused() {
+    let restless = "[[device]]\nkind = \"mh4\"\nnode = 1\n[[device.channel]]\nchannel = 1\nbase = 0.0\namplitude = 0.0\n\
+                    noise = 0.09\n";
+    let done = Bench::described(restless).run("autozero 1").exit(1);
+    assert!(done.stderr.contains("apart; more than 0.050 bar (0.5 % of the range) is no rest"), "{}", done.stderr);
+    let overloaded = "[[device]]\nkind = \"mh4\"\nnode = 1\n[[device.overload]]\nchannel = 1\nfrom = \"0s\"\n\
+                      direction = \"low\"\n";
+    refuses(
+        &Bench::described(overloaded),
+        "autozero 1",
+        "cangauge: node 1: pressure has no valid value: overload-low: nothing was changed\n\
+         hint: find out why, then try again\n",
+    );
+    // Forced, it is still no zero afterwards, and no success.
+    let done = Bench::described(overloaded).run("autozero 1 --force").exit(6);
+    assert!(
+        done.stderr.contains("pressure has no valid value afterwards; the offset went from 0 to"),
+        "{}",
+        done.stderr
+    );
+}
+
+#[test]
+fn absolute_pressure_has_no_zero() {
+    let device = "[[device]]\nkind = \"dps\"\nnode = 1\nset = { \"0x200D\" = 1 }\n[[device.channel]]\nchannel = 1\n\
+                  base = 0.1\namplitude = 0.0\nnoise = 0.0\n";
+    refuses(
+        &Bench::described(device),
+        "autozero 1",
+        "cangauge: node 1: the sensor measures absolute pressure: vented it reads the air's, and that is no zero: \
+         nothing was changed\n\
+         hint: with a vacuum on it, --force\n",
+    );
+    Bench::described(device).run("autozero 1 --force").exit(0);
+}
+
+#[test]
+fn who_has_no_zero_says_so() {
+    Bench::of(ALL).run("autozero 3").fails(2, "cangauge: node 3: HBM SomatXR MC1609 has no autozero\n");
+    Bench::of(ALL)
+        .run("autozero 1 --channel 2")
+        .fails(2, "cangauge: node 1: WIKA MH-4-CAN has no autozero of channel 2\nhint: it has one of: 1\n");
+    // Asked as an unknown device, it refuses the object itself.
+    let bench = Bench::of("mc1609@3");
+    std::fs::write(bench.path("none.eds"), "[FileInfo]\nFileName=none.eds\n[1000]\nDataType=7\nAccessType=ro\n")
+        .expect("a file");
+    let done = bench.run("autozero 3 --eds none.eds --channel 1").exit(4);
+    assert!(done.stderr.contains("it has no autozero of channel 1 (no 0x6125:1)"), "{}", done.stderr);
+    // Everybody was meant who has one.
+    let done = Bench::of("mc1609@3,mh4@1").run("autozero all --limit 2bar --samples 2").exit(0);
+    assert!(done.stdout.starts_with("1  pressure"), "{}", done.stdout);
+    assert!(done.stderr.contains("node 3: HBM SomatXR MC1609 has no autozero\n"), "{}", done.stderr);
+}
+
+#[test]
+fn a_device_that_is_not_known_is_treated_by_the_standard() {
+    let bench = still(0.0625, 0.0, 0.0);
+    std::fs::write(bench.path("none.eds"), "[FileInfo]\nFileName=none.eds\n[1000]\nDataType=7\nAccessType=ro\n")
+        .expect("a file");
+    let done = bench.run("autozero 1 --eds none.eds --channel 1 --store").exit(0);
+    assert_eq!(done.stdout, "1  ch1  0.062 -> 0.000 bar  shift -0.062 bar  offset 0 -> -0.0625\n");
+    assert!(done.stderr.contains("undo: cangauge sdo write 1 0x6127:1 0 --type r32 && "), "{}", done.stderr);
+    assert!(done.frames_of("601").contains(&"2310100373617665"), "{:?}", done.frames);
+    let done = bench.run("autozero 1 --eds none.eds").exit(2);
+    assert!(done.stderr.contains("which channel? It has several"), "{}", done.stderr);
+}
+
+#[test]
+fn arguments_are_checked_before_the_bus_is_opened() {
+    let bench = Bench::of("mh4@1");
+    bench.run("autozero 1 --limit 1x").refuses("\"1x\" is not a limit (0.1, 100mbar, 2%)");
+    bench.run("autozero 1 --limit 0").refuses("\"0\": a limit is more than 0");
+    bench.run("autozero 1 --samples 1").exit(2);
+    let done = bench.run("autozero 1 --limit 5degC").exit(2);
+    assert!(done.stderr.contains("pressure is in bar, and a limit in degC does not convert"), "{}", done.stderr);
+}

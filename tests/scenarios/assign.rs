@@ -1,0 +1,96 @@
+//! Node-ID and bit rate: whatever goes wrong, no device is changed that was not meant, nothing is a success that the
+//! device does not hold, and nobody stays in configuration state.
+
+mod faults;
+mod interrupted;
+mod retime;
+mod targets;
+
+use cangauge::bus::memory::MemoryBus;
+use cangauge::canopen::id::NodeId;
+use cangauge::master::{Master, Timing};
+use cangauge::measure::survey::Overrides;
+use cangauge::sim::{Bench, Device};
+use cangauge::tasks::lss::{Job, Note, Rate, Report, Via, assign};
+use cangauge::tasks::{Failure, Kind};
+use std::path::Path;
+
+fn bus(toml: &str) -> MemoryBus {
+    Bench::from_toml(&format!("clock = \"virtual\"\n{toml}"), Path::new("")).unwrap().open().unwrap()
+}
+
+fn node(id: u8) -> NodeId {
+    NodeId::new(id).unwrap()
+}
+
+/// What a device holds: its node-ID and bit rate, now and after power off and on.
+type Held = (Option<u8>, Option<u32>, Option<u8>, Option<u32>);
+
+fn held(device: &Device) -> Held {
+    let number = |node: Option<NodeId>| node.map(NodeId::get);
+    let (stored, rate) = device.stored();
+    (number(device.node()), device.bit_rate(), number(stored), rate)
+}
+
+fn all_held(bus: &MemoryBus) -> Vec<Held> {
+    bus.stations::<Device>().map(held).collect()
+}
+
+/// A job, what it said, and that nobody stays in configuration state.
+struct Done {
+    result: Result<Report, Failure>,
+    notes: Vec<Note>,
+}
+
+impl Done {
+    #[track_caller]
+    fn failure(&self) -> (Kind, &str) {
+        let failure = self.result.as_ref().expect_err("it succeeded");
+        (failure.kind, &failure.message)
+    }
+
+    fn warns(&self, of: &str) -> bool {
+        self.notes.iter().any(|note| matches!(note, Note::Warning(text) if text.contains(of)))
+    }
+}
+
+#[derive(Default)]
+struct Wanted {
+    id: Option<u8>,
+    rate: Option<Rate>,
+    retime: bool,
+    no_store: bool,
+    force: bool,
+    via: Via,
+    device: Option<&'static str>,
+}
+
+#[track_caller]
+fn run(bus: &mut MemoryBus, target: &str, wanted: &Wanted) -> Done {
+    let overrides = Overrides::new();
+    let job = Job {
+        target: target.parse().unwrap(),
+        id: wanted.id.map(node),
+        rate: wanted.rate,
+        store: !wanted.no_store,
+        retime: wanted.retime,
+        via: wanted.via,
+        force: wanted.force,
+        overrides: &overrides,
+        given: wanted.device.map(|name| cangauge::device::catalog::by_name(name).unwrap()),
+    };
+    let mut notes = Vec::new();
+    let mut master = Master::new(bus, Timing::default());
+    let result = assign(&mut master, &job, &mut |note| notes.push(note));
+    master.settle();
+    // What was handed over last gets there.
+    let until = master.now() + std::time::Duration::from_millis(20);
+    while !matches!(master.next(until), Ok(cangauge::master::Happening::Deadline) | Err(_)) {}
+    drop(master);
+    assert!(!bus.stations::<Device>().any(Device::is_configuring), "left in configuration state: {result:?}");
+    Done { result, notes }
+}
+
+fn id(id: u8) -> Wanted {
+    Wanted { id: Some(id), ..Wanted::default() }
+}

@@ -1,0 +1,124 @@
+//! Devices that lose answers, refuse, and do not come back.
+
+use super::{Held, Wanted, all_held, bus, id, run};
+use cangauge::tasks::Kind;
+use cangauge::tasks::lss::{Rate, Via};
+
+/// The device with these oddities at node 5, and two that are not meant: one of the same kind, one without a node-ID.
+fn bench(kind: &str, oddities: &str) -> String {
+    format!(
+        "device = [{{ kind = '{kind}', node = 5, serial = 100 {oddities} }}, {{ kind = '{kind}', node = 6, serial = 200 }}, \
+         {{ kind = 'mh4', serial = 300 }}]"
+    )
+}
+
+/// What must be so whatever happens.
+#[track_caller]
+fn check(before: &[Held], after: &[Held], succeeded: bool, new: u8) {
+    assert_eq!(before[1..], after[1..], "somebody who was not meant");
+    if succeeded {
+        assert_eq!((after[0].0, after[0].2), (Some(new), Some(new)), "no success that the device does not hold");
+    }
+}
+
+#[test]
+fn whatever_goes_wrong_with_one_service() {
+    let faults = [
+        ", lss = { lose = [0x11] }",
+        ", lss = { lose = [0x17] }",
+        ", lss = { lose = [0x43] }",
+        ", lss = { lose = [0x11, 0x17, 0x43] }",
+        ", lss = { late = { '0x11' = '700ms' } }",
+        ", lss = { late = { '0x17' = '2s' } }",
+        ", lss = { late = { '0x17' = '5s' } }",
+        ", lss = { refuse = { '0x11' = 1 } }",
+        ", lss = { refuse = { '0x17' = 1 } }",
+        ", lss = { refuse = { '0x17' = 2 } }",
+        ", gone_after = ['reset']",
+        ", latency = '90ms'",
+    ];
+    for kind in ["mh4", "dps", "d20", "mc1609"] {
+        for fault in faults {
+            for target in ["5", "identity"] {
+                let mut bus = bus(&bench(kind, fault));
+                let before = all_held(&bus);
+                let target = match target {
+                    "5" => "5".to_owned(),
+                    _ => identity(kind),
+                };
+                let done = run(&mut bus, &target, &id(12));
+                let after = all_held(&bus);
+                check(&before, &after, done.result.is_ok(), 12);
+                if let Err(failure) = &done.result {
+                    let says_all = failure.kind == Kind::Refused;
+                    assert!(says_all || failure.hint.is_some(), "{kind}{fault}: {failure}");
+                    // What says that nothing was changed is right even after a reset.
+                    if failure.message.contains("nothing was changed") {
+                        bus.power_cycle();
+                        assert_eq!(all_held(&bus)[0], before[0], "{kind}{fault}: {failure}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn identity(kind: &str) -> String {
+    let mut bus = bus(&bench(kind, ""));
+    run(&mut bus, "5", &id(5)).result.unwrap().address.unwrap().to_string()
+}
+
+#[test]
+fn storing_refused_is_put_back_and_no_success() {
+    let mut bus = bus(&bench("mh4", ", lss = { refuse = { '0x17' = 1 } }"));
+    let before = all_held(&bus);
+    let done = run(&mut bus, "5", &id(12));
+    assert_eq!(done.failure().0, Kind::Refused);
+    assert!(done.failure().1.contains("storing not supported"), "{}", done.failure().1);
+    assert!(done.failure().1.contains("nothing was changed"), "{}", done.failure().1);
+    assert!(done.result.unwrap_err().hint.unwrap().contains("--via sdo"));
+    assert_eq!(all_held(&bus), before);
+    // What waited in it waits no longer: a reset leaves it where it is.
+    let mut master = cangauge::master::Master::new(&mut bus, cangauge::master::Timing::default());
+    master.send("000#8105".parse().unwrap());
+    let until = master.now() + std::time::Duration::from_millis(500);
+    while !matches!(master.next(until), Ok(cangauge::master::Happening::Deadline)) {}
+    drop(master);
+    assert_eq!(all_held(&bus), before);
+    // And by its objects it goes.
+    run(&mut bus, "5", &Wanted { via: Via::Sdo, ..id(12) }).result.unwrap();
+    assert_eq!(all_held(&bus)[0].2, Some(12));
+}
+
+#[test]
+fn a_lost_acknowledge_of_a_store_is_no_success() {
+    let mut bus = bus(&bench("mh4", ", lss = { lose = [0x17] }"));
+    let done = run(&mut bus, "5", &id(12));
+    assert_eq!(done.failure().0, Kind::NoAnswer);
+    assert!(done.failure().1.contains("whether it is stored is not known"), "{}", done.failure().1);
+}
+
+#[test]
+fn one_that_does_not_come_back() {
+    let mut bus = bus(&bench("mh4", ", gone_after = ['reset']"));
+    let done = run(&mut bus, "5", &id(12));
+    assert_eq!(done.failure().0, Kind::NoAnswer);
+    assert!(done.failure().1.contains("node-ID 12 configured, stored"), "{}", done.failure().1);
+    let hint = done.result.unwrap_err().hint.unwrap();
+    assert!(hint.contains("power it off and on"), "{hint}");
+}
+
+#[test]
+fn a_bit_rate_that_the_device_refuses() {
+    let mut bus = bus(&bench("mh4", ", lss = { refuse = { '0x13' = 1 } }"));
+    let before = all_held(&bus);
+    let wanted = Wanted { rate: Some(Rate::Bits(500_000)), ..id(12) };
+    let done = run(&mut bus, "5", &wanted);
+    assert_eq!(done.failure().0, Kind::Refused);
+    assert!(
+        done.failure().1.contains("nothing was changed") || done.failure().1.contains("put back"),
+        "{}",
+        done.failure().1
+    );
+    assert_eq!(all_held(&bus), before);
+}

@@ -1,0 +1,240 @@
+//! Who is meant, and that it is nobody else.
+
+use super::{Wanted, all_held, bus, id, run};
+use cangauge::device::assign::spoken_rate;
+use cangauge::sim::Device;
+use cangauge::tasks::Kind;
+use cangauge::tasks::lss::{Confirmed, Via};
+
+const ALL: &str = "device = [
+    { kind = 'mh4', node = 1 }, { kind = 'd20', node = 2 }, { kind = 'mc1609', node = 3 }, { kind = 'dps', node = 127 },
+]";
+
+const TWINS: &str = "device = [
+    { kind = 'dps', node = 5, serial = 100, twin = true }, { kind = 'dps', node = 5, serial = 200, twin = true },
+    { kind = 'mh4', node = 6 },
+]";
+
+#[test]
+fn each_kind_by_its_node_id_among_all() {
+    for (place, old) in [(0, 1), (1, 2), (2, 3), (3, 127)] {
+        let mut bus = bus(ALL);
+        let mut expected = all_held(&bus);
+        let done = run(&mut bus, &old.to_string(), &id(20));
+        let report = done.result.unwrap();
+        assert_eq!((report.confirmed, report.stored), (Confirmed::BootUp, true), "{old}");
+        (expected[place].0, expected[place].2) = (Some(20), Some(20));
+        assert_eq!(all_held(&bus), expected, "{old}");
+    }
+}
+
+#[test]
+fn each_kind_by_its_identity_among_all() {
+    for (place, old) in [(0, 1), (1, 2), (2, 3), (3, 127)] {
+        let mut bus = bus(ALL);
+        let mut expected = all_held(&bus);
+        let address = run(&mut bus, &old.to_string(), &id(old)).result.unwrap().address.unwrap();
+        let done = run(&mut bus, &address.to_string(), &id(20));
+        let report = done.result.unwrap_or_else(|failure| panic!("{old}: {failure}"));
+        assert_eq!((report.confirmed, report.old.map(|old| old.get())), (Confirmed::BootUp, Some(old)));
+        (expected[place].0, expected[place].2) = (Some(20), Some(20));
+        assert_eq!(all_held(&bus), expected, "{old}");
+    }
+}
+
+#[test]
+fn a_node_id_that_is_taken_is_refused() {
+    let mut bus = bus(ALL);
+    let before = all_held(&bus);
+    for target in ["1", "0x362:0x443150:0x10000:20002"] {
+        let done = run(&mut bus, target, &id(3));
+        assert_eq!(done.failure().0, Kind::CheckFailed, "{target}");
+        assert!(done.failure().1.contains("node-ID 3 is taken"), "{}", done.failure().1);
+    }
+    assert_eq!(all_held(&bus), before);
+}
+
+#[test]
+fn a_stopped_node_with_a_heartbeat_is_there_too() {
+    let mut bus = bus("device = [{ kind = 'mh4', node = 1 }, { kind = 'mh4', node = 7, set = { '0x1017' = 1000 } }]");
+    let mut master = cangauge::master::Master::new(&mut bus, cangauge::master::Timing::default());
+    master.send("000#0207".parse().unwrap());
+    master.settle();
+    drop(master);
+    let done = run(&mut bus, "1", &id(7));
+    assert!(done.failure().1.contains("a node shows itself there"), "{:?}", done.failure());
+}
+
+#[test]
+fn two_devices_with_one_node_id() {
+    let mut bus = bus(TWINS);
+    let before = all_held(&bus);
+    let done = run(&mut bus, "5", &id(12));
+    assert_eq!(done.failure().0, Kind::CheckFailed);
+    assert!(done.failure().1.contains("more than one device has this node-ID"), "{}", done.failure().1);
+    assert!(done.result.unwrap_err().hint.unwrap().contains("VENDOR:PRODUCT:REVISION:SERIAL"));
+    assert_eq!(all_held(&bus), before);
+    // By its identity one of them takes it; nobody is reset, and it is no success yet.
+    let done = run(&mut bus, "0x362:0x443150:0x10000:200", &id(12));
+    assert_eq!(done.failure().0, Kind::Unexpected);
+    assert!(done.failure().1.contains("not reset") && done.failure().1.contains("stored"), "{}", done.failure().1);
+    let mut expected = before;
+    expected[1].2 = Some(12);
+    assert_eq!(all_held(&bus), expected);
+    bus.power_cycle();
+    expected[1].0 = Some(12);
+    assert_eq!(all_held(&bus), expected);
+}
+
+#[test]
+fn unconfigured_devices_one_after_the_other() {
+    let mut bus =
+        bus("device = [{ kind = 'mh4', serial = 9 }, { kind = 'mh4', node = 6 }, { kind = 'mh4', serial = 4 }]");
+    let mut expected = all_held(&bus);
+    for (place, new) in [(2, 20), (0, 21)] {
+        let done = run(&mut bus, "unconfigured", &id(new));
+        let report = done.result.unwrap_or_else(|failure| panic!("{new}: {failure}"));
+        assert_eq!((report.confirmed, report.old), (Confirmed::BootUp, None));
+        (expected[place].0, expected[place].2) = (Some(new), Some(new));
+        assert_eq!(all_held(&bus), expected);
+    }
+    let done = run(&mut bus, "unconfigured", &id(22));
+    assert_eq!(done.failure().0, Kind::NoAnswer);
+    assert_eq!(all_held(&bus), expected);
+}
+
+#[test]
+fn only_is_for_one_device_alone() {
+    for kind in ["mh4", "d20", "mc1609", "dps"] {
+        let mut bus = bus(&format!("device = [{{ kind = '{kind}', node = 5 }}]"));
+        let done = run(&mut bus, "only", &id(12));
+        // DPS knows neither the inquiries nor the question for others; the D-20-9 listens when it is stopped.
+        assert_eq!(done.warns("does not know"), matches!(kind, "dps" | "d20"), "{kind} {:?}", done.notes);
+        let report = done.result.unwrap_or_else(|failure| panic!("{kind}: {failure}"));
+        assert_eq!(report.confirmed, Confirmed::BootUp, "{kind}");
+        assert_eq!(all_held(&bus)[0].2, Some(12), "{kind}");
+    }
+}
+
+#[test]
+fn only_is_refused_where_another_one_shows_itself() {
+    let two = [
+        "device = [{ kind = 'mh4', node = 5 }, { kind = 'dps', node = 6 }]",
+        "device = [{ kind = 'mh4', node = 5 }, { kind = 'mh4' }]",
+        "device = [{ kind = 'mh4' }, { kind = 'mh4' }]",
+        "device = [{ kind = 'mh4', node = 5, twin = true }, { kind = 'mh4', node = 5, twin = true }]",
+        "device = [{ kind = 'dps', node = 5 }, { kind = 'mh4' }]",
+    ];
+    for bench in two {
+        let mut bus = bus(bench);
+        let before = all_held(&bus);
+        let done = run(&mut bus, "only", &id(12));
+        assert_eq!(done.failure().0, Kind::CheckFailed, "{bench}");
+        assert!(done.failure().1.ends_with("nothing was changed"), "{}", done.failure().1);
+        assert_eq!(all_held(&bus), before, "{bench}");
+    }
+}
+
+#[test]
+fn only_one_and_it_has_no_node_id() {
+    let mut bus = bus("device = [{ kind = 'mh4' }]");
+    let report = run(&mut bus, "only", &id(12)).result.unwrap();
+    assert_eq!((report.confirmed, all_held(&bus)[0].2), (Confirmed::BootUp, Some(12)));
+}
+
+#[test]
+fn forced_on_several_it_is_no_success() {
+    let mut bus = bus("device = [{ kind = 'mh4', node = 5 }, { kind = 'mh4', node = 6 }]");
+    let done = run(&mut bus, "only", &Wanted { force: true, ..id(12) });
+    assert_eq!(done.failure().0, Kind::Unexpected, "{:?}", done.failure());
+    assert!(done.warns("all of them will take it"), "{:?}", done.notes);
+    assert_eq!(
+        all_held(&bus).iter().map(|held| (held.0, held.2)).collect::<Vec<_>>(),
+        [(Some(5), Some(12)), (Some(6), Some(12))]
+    );
+}
+
+#[test]
+fn nobody_is_no_answer() {
+    for target in ["9", "1:2:3:4", "unconfigured"] {
+        let mut bus = bus(ALL);
+        let before = all_held(&bus);
+        assert_eq!(run(&mut bus, target, &id(12)).failure().0, Kind::NoAnswer, "{target}");
+        assert_eq!(all_held(&bus), before);
+    }
+}
+
+#[test]
+fn without_a_serial_number_it_cannot_be_told_from_another() {
+    let mut bus = bus("device = [{ kind = 'mh4', node = 5, serial = 0 }]");
+    let done = run(&mut bus, "5", &id(12));
+    assert_eq!(done.failure().0, Kind::CheckFailed);
+    assert!(done.failure().1.contains("no serial number"), "{}", done.failure().1);
+}
+
+#[test]
+fn by_objects_of_its_own() {
+    let cases = [("mh4", None), ("baumer", Some("baumer"))];
+    for (kind, device) in cases {
+        // The only rate of which Baumer's code is known.
+        let mut bus = bus(&format!(
+            "bit_rate = 500000\ndevice = [{{ kind = '{kind}', node = 5 }}, {{ kind = 'dps', node = 6 }}]"
+        ));
+        let mut expected = all_held(&bus);
+        let done = run(&mut bus, "5", &Wanted { via: Via::Sdo, device, ..id(12) });
+        assert_eq!(done.warns("COB-IDs"), kind == "mh4", "{:?}", done.notes);
+        let report = done.result.unwrap_or_else(|failure| panic!("{kind}: {failure}"));
+        assert_eq!(report.confirmed, Confirmed::BootUp, "{kind}");
+        (expected[0].0, expected[0].2) = (Some(12), Some(12));
+        assert_eq!(all_held(&bus), expected, "{kind}");
+    }
+    let mut bus = bus("device = [{ kind = 'dps', node = 6 }]");
+    let done = run(&mut bus, "6", &Wanted { via: Via::Sdo, ..id(12) });
+    assert!(done.failure().1.contains("no source at hand"), "{:?}", done.failure());
+}
+
+#[test]
+fn what_is_not_stored_is_gone_with_the_power() {
+    let mut bus = bus(ALL);
+    let expected = all_held(&bus);
+    let report = run(&mut bus, "1", &Wanted { no_store: true, ..id(12) }).result.unwrap();
+    assert_eq!((report.stored, all_held(&bus)[0].0, all_held(&bus)[0].2), (false, Some(12), Some(1)));
+    bus.power_cycle();
+    assert_eq!(all_held(&bus), expected);
+}
+
+#[test]
+fn identifiers_that_have_not_followed_are_named() {
+    let mut bus = bus("device = [{ kind = 'mh4', node = 5, set = { '0x1800:1' = 0x40000185 } }]");
+    let report = run(&mut bus, "5", &id(12)).result.unwrap();
+    let ids = report.cob_ids.unwrap();
+    let stale: Vec<String> = ids.stale.iter().map(ToString::to_string).collect();
+    let moved: Vec<String> = ids.tpdos.iter().map(|(number, id)| format!("{number} {id}")).collect();
+    // Whether a COB-ID that was written with its default follows, the simulated device decides; the two agree.
+    assert_eq!(stale.is_empty(), moved[0] == "1 18C", "{stale:?} {moved:?}");
+}
+
+#[test]
+fn a_bit_rate_that_the_device_does_not_have_is_refused_with_the_list() {
+    use cangauge::tasks::lss::Rate;
+    let mut bus = bus(ALL);
+    let before = all_held(&bus);
+    for (target, rate, list) in [
+        ("127", Rate::Bits(800_000), "1M, 500k, 250k, 125k, 100k, 50k"),
+        ("127", Rate::Auto, "1M, 500k, 250k, 125k, 100k, 50k"),
+        ("1", Rate::Bits(100_000), "1M, 800k, 500k, 250k, 125k, 50k, 20k, auto"),
+    ] {
+        let done = run(&mut bus, target, &Wanted { rate: Some(rate), ..Wanted::default() });
+        assert_eq!(done.failure().0, Kind::Usage);
+        let hint = done.result.unwrap_err().hint.unwrap();
+        assert!(hint.contains(list), "{hint}");
+    }
+    assert_eq!(all_held(&bus), before);
+    // Its own table: 5 is 100k.
+    let done = run(&mut bus, "127", &Wanted { rate: Some(Rate::Bits(100_000)), ..Wanted::default() });
+    let report = done.result.unwrap();
+    assert_eq!((report.rate, report.confirmed), (Some((Some(100_000), 5)), Confirmed::Acknowledge));
+    let stored = bus.stations::<Device>().map(|device| device.stored().1).collect::<Vec<_>>();
+    assert_eq!(stored[3].map(spoken_rate).as_deref(), Some("100k"));
+    assert_eq!(all_held(&bus)[..3], before[..3]);
+}

@@ -1,0 +1,434 @@
+//! `pdo map` with something going wrong at every single frame that it sends: the device is left with its old
+//! mapping or the new one, and what is said is what it holds.
+
+use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::bus::{Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource};
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::{CanId, NodeId};
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::pdo::TpdoNumber;
+use cangauge::device::catalog::by_name;
+use cangauge::device::description::Scalar;
+use cangauge::master::{Master, Timing};
+use cangauge::sim::{Device, Setup, State};
+use cangauge::tasks::pdo::{Item, Mapped, Send, Wish, map};
+use cangauge::tasks::{Failure, Kind};
+use std::collections::VecDeque;
+use std::time::Duration;
+
+const NODE: u8 = 5;
+
+/// What happens at a frame that is sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mishap {
+    None,
+    /// It never reaches the device.
+    LoseRequest,
+    /// What comes next is lost.
+    LoseAnswer,
+    /// The device refuses it.
+    Refuse(u32),
+    /// Ctrl-C, before the answer is there.
+    Interrupt,
+    /// Ctrl-C, and again at the next frame.
+    InterruptTwice,
+    /// The device is reset by somebody before it gets the request.
+    ResetBefore,
+    /// The device is reset by somebody right after its answer.
+    ResetAfter,
+    /// The wire is broken for a while.
+    Away(Duration),
+    /// The device is gone.
+    Gone,
+}
+
+/// A bus on which a mishap happens at the n-th frame sent.
+struct Meddler {
+    bus: MemoryBus,
+    mishap: Mishap,
+    at: usize,
+    sent: Vec<Frame>,
+    events: VecDeque<Event>,
+    lose_next: bool,
+    reset_next: bool,
+    away_until: Option<Mono>,
+}
+
+impl Meddler {
+    fn is_away(&self) -> bool {
+        self.away_until.is_some_and(|until| self.bus.now().mono < until)
+    }
+
+    fn reset(&mut self) -> Result<(), BusError> {
+        self.bus.send(&format!("000#81{NODE:02X}").parse().unwrap())
+    }
+}
+
+impl Bus for Meddler {
+    fn name(&self) -> &str {
+        "meddler"
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        self.bus.bit_rate()
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        self.bus.timestamps()
+    }
+
+    fn now(&self) -> Stamp {
+        self.bus.now()
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        self.bus.listen(filters)
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        let number = self.sent.len();
+        self.sent.push(*frame);
+        let twice = self.mishap == Mishap::InterruptTwice && number == self.at + 1;
+        if number != self.at && !twice {
+            return if self.is_away() { Ok(()) } else { self.bus.send(frame) };
+        }
+        match self.mishap {
+            Mishap::None => {}
+            Mishap::LoseRequest => return Ok(()),
+            Mishap::LoseAnswer => self.lose_next = true,
+            Mishap::Refuse(code) => {
+                let [_, a, b, c, ..] = *frame.data() else { return self.bus.send(frame) };
+                let [d, e, f, g] = code.to_le_bytes();
+                let data = format!("80{a:02X}{b:02X}{c:02X}{d:02X}{e:02X}{f:02X}{g:02X}");
+                let frame = format!("{:03X}#{data}", 0x580 + u16::from(NODE)).parse().unwrap();
+                self.events.push_back(Event::Frame(Received { frame, at: self.bus.now() }));
+                return Ok(());
+            }
+            Mishap::Interrupt | Mishap::InterruptTwice => self.events.push_back(Event::Interrupted),
+            Mishap::ResetBefore => self.reset()?,
+            Mishap::ResetAfter => self.reset_next = true,
+            Mishap::Away(time) => {
+                self.away_until = Some(self.bus.now().mono + time);
+                return Ok(());
+            }
+            Mishap::Gone => {
+                self.away_until = Some(Mono::at(Duration::MAX));
+                return Ok(());
+            }
+        }
+        self.bus.send(frame)
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        loop {
+            if let Some(event) = self.events.pop_front() {
+                return Ok(event);
+            }
+            let event = self.bus.receive(deadline)?;
+            let is_answer = |frame: &Frame| frame.id() == CanId::sdo_response(node());
+            match &event {
+                Event::Frame(_) if self.is_away() => {}
+                Event::Frame(received) if self.lose_next && is_answer(&received.frame) => self.lose_next = false,
+                Event::Frame(received) => {
+                    if self.reset_next && is_answer(&received.frame) {
+                        self.reset_next = false;
+                        self.reset()?;
+                    }
+                    return Ok(event);
+                }
+                _ => return Ok(event),
+            }
+        }
+    }
+}
+
+fn node() -> NodeId {
+    NodeId::new(NODE).unwrap()
+}
+
+/// One device, what its TPDO1 is set to before, and what is wanted of it.
+#[derive(Clone, Copy)]
+struct Case {
+    device: &'static str,
+    /// Set and saved before.
+    set: &'static [(&'static str, i64)],
+    items: &'static [&'static str],
+    send: Option<Send>,
+    event_timer_ms: Option<u16>,
+    cob_id: Option<u16>,
+}
+
+const CASES: [Case; 6] = [
+    Case {
+        device: "mh4",
+        set: &[],
+        items: &["0x9130:1", "pressure.status", "temperature.status"],
+        send: Some(Send::Timer),
+        event_timer_ms: Some(50),
+        cob_id: None,
+    },
+    Case {
+        device: "d20",
+        set: &[],
+        items: &["pressure"],
+        send: Some(Send::Timer),
+        event_timer_ms: Some(200),
+        cob_id: None,
+    },
+    Case {
+        device: "mc1609",
+        set: &[],
+        items: &["ch16", "ch1"],
+        send: Some(Send::Code(3)),
+        event_timer_ms: Some(250),
+        cob_id: None,
+    },
+    Case {
+        device: "dps",
+        set: &[],
+        items: &["0x7100:1", "pressure"],
+        send: Some(Send::Code(0)),
+        event_timer_ms: Some(1000),
+        cob_id: None,
+    },
+    // Parameters alone.
+    Case { device: "mh4", set: &[], items: &[], send: Some(Send::Code(0)), event_timer_ms: Some(7), cob_id: None },
+    // A TPDO that was off.
+    Case {
+        device: "mh4",
+        set: &[("0x1800:1", 0xc000_0185)],
+        items: &["temperature"],
+        send: None,
+        event_timer_ms: None,
+        cob_id: None,
+    },
+];
+
+impl Case {
+    fn wish(&self) -> Wish {
+        let item = |text: &&str| match text.parse() {
+            Ok(object) => Item::Object(object, None),
+            Err(_) => Item::Name((*text).to_owned(), None),
+        };
+        Wish {
+            node: node(),
+            number: TpdoNumber::new(1).unwrap(),
+            items: self.items.iter().map(item).collect(),
+            send: self.send,
+            event_timer_ms: self.event_timer_ms,
+            inhibit_100us: None,
+            cob_id: self.cob_id,
+        }
+    }
+
+    fn bus(&self, start: bool) -> MemoryBus {
+        let mut setup = Setup::new(by_name(self.device).unwrap(), node());
+        setup.start = start;
+        setup.set = self.set.iter().map(|(at, value)| (at.parse().unwrap(), Scalar::Integer(*value))).collect();
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(Device::new(setup).unwrap());
+        // The boot-up message is none of a restart.
+        while bus.receive(Mono::at(Duration::from_millis(20))).unwrap() != Event::Timeout {}
+        bus
+    }
+
+    /// What becomes of the wish when this happens at the n-th frame.
+    fn run(&self, start: bool, mishap: Mishap, at: usize) -> Outcome {
+        let mut meddler = Meddler {
+            bus: self.bus(start),
+            mishap,
+            at,
+            sent: Vec::new(),
+            events: VecDeque::new(),
+            lose_next: false,
+            reset_next: false,
+            away_until: None,
+        };
+        let mut master = Master::new(&mut meddler, Timing::default());
+        let result = map(&mut master, &self.wish(), false, &Default::default());
+        master.settle();
+        // What is on the wire gets there.
+        let soon = meddler.bus.now().mono + Duration::from_millis(200);
+        while meddler.bus.receive(soon).unwrap() != Event::Timeout {}
+        let state = meddler.bus.stations::<Device>().next().unwrap().state();
+        Outcome { result, held: held(&mut meddler.bus), state, sent: meddler.sent }
+    }
+}
+
+/// How it ended.
+struct Outcome {
+    result: Result<Mapped, Failure>,
+    held: Held,
+    state: Option<State>,
+    sent: Vec<Frame>,
+}
+
+/// What the device's own memory holds: COB-ID, transmission type, event timer, mapping.
+#[derive(Debug, PartialEq, Eq)]
+struct Held(u32, u32, u32, Vec<u32>);
+
+fn held(bus: &mut MemoryBus) -> Held {
+    let now = bus.now().mono;
+    let device: &mut Device = bus.stations_mut().next().unwrap();
+    let mut number = |index, sub| {
+        let bytes = device.value(ObjectId::new(index, sub), now).unwrap();
+        bytes.iter().rev().fold(0u32, |number, byte| number << 8 | u32::from(*byte))
+    };
+    let count = u8::try_from(number(0x1a00, 0)).unwrap();
+    let mapping = (1..=count).map(|sub| number(0x1a00, sub)).collect();
+    Held(number(0x1800, 1), number(0x1800, 2), number(0x1800, 5), mapping)
+}
+
+/// That what is said is what the device holds.
+fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Held, new: &Held) {
+    let Outcome { result, held, state, .. } = case.run(start, mishap, at);
+    let what = format!("{} (started: {start}), {mishap:?} at {at}: {result:?}\n{held:X?}", case.device);
+    match &result {
+        Ok(_) => assert_eq!(&held, new, "{what}"),
+        Err(failure) => {
+            let message = &failure.message;
+            let said_to_be_half = message.contains("left half changed") || message.contains("was changed is not known");
+            if said_to_be_half {
+                assert_eq!(mishap, Mishap::Gone, "it could have been mended: {what}");
+                let hint = failure.hint.as_deref().unwrap_or_default();
+                assert!(hint.starts_with("when it answers again: cangauge "), "{what}");
+            } else {
+                assert_eq!(&held, old, "{what}");
+            }
+            if matches!(mishap, Mishap::Interrupt | Mishap::InterruptTwice) {
+                assert_eq!(failure.kind, Kind::Interrupted, "{what}");
+            }
+        }
+    }
+    let resets = matches!(mishap, Mishap::ResetBefore | Mishap::ResetAfter | Mishap::Gone);
+    if !resets {
+        let before = if start { State::Operational } else { State::PreOperational };
+        // A state that nothing told is not guessed, and an NMT command that is lost is not repeated: that is said.
+        let words = ["state before is not known", "was operational before and is", "nothing confirms it"];
+        let says = |remark: &String| words.iter().any(|words| remark.contains(words));
+        let told = match &result {
+            Ok(mapped) => mapped.warnings.iter().any(says),
+            Err(failure) => says(&failure.message),
+        };
+        assert!(told || state == Some(before), "{state:?}: {what}");
+    }
+}
+
+/// A TPDO that moves to another identifier.
+const MOVED: Case = Case { cob_id: Some(0x3a5), ..CASES[4] };
+
+/// Runs every case with mishaps at every frame.
+fn everywhere(mishaps: &[Mishap]) {
+    for (number, case) in CASES.iter().chain([&MOVED]).enumerate() {
+        let starts: &[bool] = if number < 2 { &[false, true] } else { &[true] };
+        for &start in starts {
+            let old = held(&mut case.bus(start));
+            let well = case.run(start, Mishap::None, 0);
+            let new = well.held;
+            assert!(well.result.is_ok_and(|mapped| mapped.writes > 0), "{}", case.device);
+            assert_ne!(old, new);
+            // Finding out what the device is goes alike everywhere: twice is enough.
+            let first = well.sent.iter().position(is_read_back).unwrap();
+            let begin = if number < 2 { 0 } else { first };
+            for &mishap in mishaps {
+                for at in begin..well.sent.len() {
+                    // The scan for a free identifier asks who is not there, twice each.
+                    if case.cob_id.is_some() && is_scan(&well.sent[at]) {
+                        continue;
+                    }
+                    // Who is reset when everything is done is reset by somebody else.
+                    let last = well.sent.iter().rposition(is_read_back).unwrap();
+                    if mishap == Mishap::ResetAfter && at >= last || mishap == Mishap::ResetBefore && at > last {
+                        continue;
+                    }
+                    check(case, start, mishap, at, &old, &new);
+                }
+            }
+        }
+    }
+}
+
+/// A read of the TPDO's parameters.
+fn is_read_back(frame: &Frame) -> bool {
+    frame.id() == CanId::sdo_request(node()) && matches!(frame.data(), [0x40, 0x00, 0x18 | 0x1a, ..])
+}
+
+fn is_scan(frame: &Frame) -> bool {
+    frame.id().sdo_request_node().is_some_and(|asked| asked != node())
+}
+
+#[test]
+fn a_frame_that_is_lost() {
+    everywhere(&[Mishap::LoseRequest, Mishap::LoseAnswer]);
+}
+
+#[test]
+fn a_refusal_of_every_step() {
+    everywhere(&[Mishap::Refuse(0x0800_0000), Mishap::Refuse(0x0609_0030), Mishap::Refuse(0x0800_0022)]);
+}
+
+#[test]
+fn ctrl_c_at_every_step() {
+    everywhere(&[Mishap::Interrupt, Mishap::InterruptTwice]);
+}
+
+#[test]
+fn a_reset_at_every_step() {
+    everywhere(&[Mishap::ResetBefore, Mishap::ResetAfter]);
+}
+
+#[test]
+fn a_broken_wire_at_every_step() {
+    everywhere(&[Mishap::Away(Duration::from_millis(700)), Mishap::Away(Duration::from_secs(4))]);
+}
+
+#[test]
+fn a_device_that_is_gone_at_every_step() {
+    everywhere(&[Mishap::Gone]);
+}
+
+#[test]
+fn the_right_steps_in_the_right_order() {
+    let writes = |case: &Case, start| {
+        let sent = case.run(start, Mishap::None, 0).sent;
+        let is_step = |frame: &&Frame| {
+            let is_write = frame.id() == CanId::sdo_request(node()) && frame.data()[0] >> 5 == 1;
+            is_write || frame.id() == CanId::NMT
+        };
+        sent.iter().filter(is_step).map(|frame| frame.to_string()).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        writes(&CASES[0], true),
+        [
+            "605#23001801850100C0",
+            "605#2F001A0000000000",
+            "605#23001A0120013091",
+            "605#23001A0208015061",
+            "605#23001A0308025061",
+            "605#2F001A0003000000",
+            "605#2F001802FE000000",
+            "605#2B00180532000000",
+            "605#2300180185010040",
+        ]
+    );
+    let count_only = [
+        "605#22001A0000000000",
+        "605#22001A0120013061",
+        "605#22001A0001000000",
+        "605#22001802FE000000",
+        "605#22001805C8000000",
+    ];
+    assert_eq!(writes(&CASES[1], false), count_only);
+    let started: Vec<&str> = ["000#8005"].into_iter().chain(count_only).chain(["000#0105"]).collect();
+    assert_eq!(writes(&CASES[1], true), started);
+    // What is set already is not written.
+    let bus = |case: &Case| {
+        let mut bus = case.bus(false);
+        let first = map(&mut Master::new(&mut bus, Timing::default()), &case.wish(), false, &Default::default());
+        let again = map(&mut Master::new(&mut bus, Timing::default()), &case.wish(), false, &Default::default());
+        (first.unwrap().writes, again.unwrap().writes)
+    };
+    for (case, writes) in CASES.iter().zip([9, 5, 8, 8, 2, 4]) {
+        assert_eq!(bus(case), (writes, 0), "{}", case.device);
+    }
+}

@@ -1,0 +1,195 @@
+//! `pdo map` on devices unlike the four: no bit 31, a fixed mapping, an inhibit time, a TPDO without an
+//! identifier, an object of unknown width.
+
+use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::pdo::TpdoNumber;
+use cangauge::device::catalog::Model;
+use cangauge::master::{Master, Timing};
+use cangauge::sim::{Device, Setup, State};
+use cangauge::tasks::pdo::{Item, Mapped, Send, Wish, map};
+use cangauge::tasks::{Failure, Kind};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A transmitter with one channel; what stands at 1800h and 1A00h follows, and above it how it is remapped.
+fn description(pdo: &str, parameters: &str) -> Arc<Model> {
+    let text = format!(
+        r#"
+        name = "other"
+        title = "a device of the tests"
+        vendor = "nobody"
+        source = "none"
+        identify = {{ device_type = 0x00020194 }}
+        {pdo}
+        object = [
+            {{ at = "0x1000", name = "device-type", type = "u32", access = "ro", default = 0x00020194 }},
+            {{ at = "0x2000", name = "own", type = "u16", access = "ro", default = 7, pdo = true }},
+            {{ at = "0x6130:0", name = "pv-entries", type = "u8", access = "ro", default = 1 }},
+            {{ at = "0x6130:1-1", name = "pv", type = "r32", access = "ro", default = 1.0, pdo = true }},
+            {{ at = "0x6150:1-1", name = "status", type = "u8", access = "ro", default = 0, pdo = true }},
+            {parameters}
+        ]
+    "#
+    );
+    Arc::new(Model::from_toml(&text).unwrap())
+}
+
+fn parameter(at: &str, data_type: &str, more: &str) -> String {
+    let name: String = at.chars().filter(char::is_ascii_alphanumeric).collect();
+    format!("{{ at = \"{at}\", name = \"p{name}\", type = \"{data_type}\", access = \"rw\", {more} }},\n")
+}
+
+/// The usual parameters, `cob_id` with its limits.
+fn parameters(cob_id: &str) -> String {
+    [
+        parameter("0x1800:1", "u32", cob_id),
+        parameter("0x1800:2", "u8", "default = 254"),
+        parameter("0x1800:3", "u16", "default = 0"),
+        parameter("0x1800:5", "u16", "default = 100"),
+        parameter("0x1A00:0", "u8", "default = 1, high = 4"),
+        parameter("0x1A00:1", "u32", "default = 0x61300120"),
+        parameter("0x1A00:2", "u32", "default = 0"),
+    ]
+    .concat()
+}
+
+fn node() -> NodeId {
+    NodeId::new(9).unwrap()
+}
+
+fn wish(items: &[&str]) -> Wish {
+    let item = |text: &&str| match text.parse() {
+        Ok(object) => Item::Object(object, None),
+        Err(_) => Item::Name((*text).to_owned(), None),
+    };
+    Wish {
+        node: node(),
+        number: TpdoNumber::new(1).unwrap(),
+        items: items.iter().map(item).collect(),
+        send: None,
+        event_timer_ms: None,
+        inhibit_100us: None,
+        cob_id: None,
+    }
+}
+
+struct Bench {
+    bus: MemoryBus,
+    model: Arc<Model>,
+}
+
+impl Bench {
+    fn new(model: Arc<Model>) -> Bench {
+        let mut setup = Setup::new(Arc::clone(&model), node());
+        setup.start = true;
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(Device::new(setup).unwrap());
+        Bench { bus, model }
+    }
+
+    /// Maps, with the description at hand or without.
+    fn map(&mut self, wish: &Wish, described: bool) -> Result<Mapped, Failure> {
+        let given = described.then(|| (node(), Arc::clone(&self.model)));
+        let overrides: BTreeMap<_, _> = given.into_iter().collect();
+        map(&mut Master::new(&mut self.bus, Timing::default()), wish, false, &overrides)
+    }
+
+    fn number(&mut self, object: &str) -> u32 {
+        let object: ObjectId = object.parse().unwrap();
+        let device: &mut Device = self.bus.stations_mut().next().unwrap();
+        let bytes = device.value(object, cangauge::bus::Mono::START).unwrap();
+        bytes.iter().rev().fold(0u32, |number, byte| number << 8 | u32::from(*byte))
+    }
+
+    fn state(&self) -> Option<State> {
+        self.bus.stations::<Device>().next().unwrap().state()
+    }
+}
+
+#[test]
+fn a_device_that_takes_no_bit_31_is_mapped_without_it() {
+    let refuses_31 = parameters("default = \"$NODEID+0x180\", allow = [\"0-0x7FFFFFFF\"]");
+    let mut bench = Bench::new(description("pdo = { remap = \"count-only\" }", &refuses_31));
+    let mapped = bench.map(&wish(&["ch1", "ch1.status"]), false).unwrap();
+    assert_eq!(mapped.writes, 4);
+    let warning = "node 9: write 0x1800:1: refused by the device (0x06090030, value outside its range): TPDO1 is \
+                   changed while it stays on";
+    assert_eq!(mapped.warnings[0], warning);
+    // It has neither heartbeat nor guarding: what nothing told is not guessed.
+    assert!(mapped.warnings[1].contains("state before is not known, so it stays there"), "{:?}", mapped.warnings);
+    assert_eq!((bench.number("1A00:0"), bench.number("1A00:2")), (2, 0x6150_0108));
+    assert_eq!(bench.state(), Some(State::PreOperational));
+    // Of a device whose description says that it takes bit 31, a refusal is one.
+    let mut bench = Bench::new(description("", &refuses_31));
+    let failure = bench.map(&wish(&["ch1", "ch1.status"]), true).unwrap_err();
+    assert_eq!((failure.kind, bench.number("1A00:0")), (Kind::Refused, 1));
+    assert_eq!(bench.state(), Some(State::Operational));
+}
+
+#[test]
+fn a_fixed_mapping_is_as_wanted_or_cannot_be() {
+    let fixed = parameters("default = \"$NODEID+0x40000180\"");
+    let fixed = fixed
+        .lines()
+        .map(|line| if line.contains("1A00") { line.replace("\"rw\"", "\"const\"") } else { line.to_owned() })
+        .collect::<Vec<_>>()
+        .join("\n");
+    for described in [true, false] {
+        let mut bench = Bench::new(description("", &fixed));
+        assert_eq!(bench.map(&wish(&["0x6130:1"]), described).unwrap().writes, 0);
+        let failure = bench.map(&wish(&["0x6130:1", "0x6150:1"]), described).unwrap_err();
+        assert_eq!(failure.kind, Kind::Refused);
+        if described {
+            let message = "node 9: the mapping of TPDO1 is fixed (0x6130:1/32): nothing was changed";
+            assert_eq!(failure.message, message);
+        } else {
+            let message = "node 9: write 0x1A00:0 (0 entries): refused by the device (0x06010002, the object is \
+                           read-only): TPDO1 has its old mapping and parameters";
+            assert_eq!(failure.message, message);
+        }
+        assert_eq!(bench.number("1800:1"), 0x4000_0189);
+        // What is not fixed can be set all the same.
+        let mapped = bench.map(&Wish { send: Some(Send::Code(1)), ..wish(&[]) }, described).unwrap();
+        assert_eq!((mapped.writes, bench.number("1800:2")), (1, 1));
+    }
+}
+
+#[test]
+fn the_inhibit_time_is_written_while_the_pdo_is_off() {
+    let mut bench = Bench::new(description("", &parameters("default = \"$NODEID+0x180\"")));
+    let inhibited = Wish { inhibit_100us: Some(25), ..wish(&[]) };
+    assert_eq!(bench.map(&inhibited, false).unwrap().writes, 3);
+    assert_eq!((bench.number("1800:3"), bench.number("1800:1")), (25, 0x189));
+    assert_eq!(bench.map(&inhibited, false).unwrap().writes, 0);
+}
+
+#[test]
+fn a_tpdo_without_an_identifier_is_not_switched_on() {
+    let mut bench = Bench::new(description("", &parameters("default = 0x80000000")));
+    let failure = bench.map(&wish(&["ch1.status"]), false).unwrap_err();
+    assert_eq!((failure.kind, failure.message.as_str()), (Kind::Usage, "node 9: TPDO1 has no identifier yet (0x000)"));
+    assert_eq!((bench.number("1A00:1"), bench.number("1800:1")), (0x6130_0120, 0x8000_0000));
+    // Parameters alone leave it off; with an identifier of its own it comes on.
+    bench.map(&Wish { event_timer_ms: Some(20), ..wish(&[]) }, false).unwrap();
+    assert_eq!((bench.number("1800:5"), bench.number("1800:1")), (20, 0x8000_0000));
+    let mapped = bench.map(&Wish { cob_id: Some(0x3a5), ..wish(&["ch1.status"]) }, false).unwrap();
+    assert_eq!((mapped.shown.settings.cob_id.0, bench.number("1800:1")), (0x3a5, 0x3a5));
+}
+
+#[test]
+fn the_device_is_asked_for_a_width_that_nothing_tells() {
+    let mut bench = Bench::new(description("", &parameters("default = \"$NODEID+0x180\"")));
+    bench.map(&wish(&["0x2000", "ch1"]), false).unwrap();
+    assert_eq!((bench.number("1A00:1"), bench.number("1A00:2")), (0x2000_0010, 0x6130_0120));
+    let failure = bench.map(&wish(&["0x3000"]), false).unwrap_err();
+    assert_eq!(failure.message, "node 9: read 0x3000:0: refused by the device (0x06020000, the object does not exist)");
+    let failure = bench.map(&wish(&["ch1", "0x2000", "0x2000", "ch1.status"]), false).unwrap_err();
+    assert_eq!(
+        (failure.kind, failure.message.as_str()),
+        (Kind::Usage, "node 9: that makes 9 bytes; a PDO carries 8 bytes at most")
+    );
+    let failure = bench.map(&wish(&["ch2"]), false).unwrap_err();
+    assert_eq!((failure.kind, failure.message.as_str()), (Kind::Usage, "node 9: it has no object or signal \"ch2\""));
+}

@@ -1,0 +1,299 @@
+//! "zero", "save" and "load" under bad conditions, at every frame that goes out: the request or its answer is lost, the
+//! user asks to stop, the device restarts. None of the signatures goes out twice, and what is told is what the device
+//! holds.
+
+use cangauge::bus::memory::MemoryBus;
+use cangauge::bus::time::{Mono, Stamp};
+use cangauge::bus::{Bus, BusError, Event, Filters, TimestampSource};
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::object::ObjectId;
+use cangauge::master::{Master, Timing};
+use cangauge::sim::{Bench, Device, State};
+use cangauge::tasks::autozero::{Limit, Options, Zeroed, autozero};
+use cangauge::tasks::store::{self, Done, Group, Verified};
+use cangauge::tasks::{Failure, Kind, restore};
+use std::path::Path;
+use std::time::Duration;
+
+/// What happens to one frame that goes out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mishap {
+    LoseIt,
+    LoseItsAnswer,
+    Interrupt,
+    /// The device restarts as soon as it has answered.
+    Restart,
+}
+
+const MISHAPS: [Mishap; 4] = [Mishap::LoseIt, Mishap::LoseItsAnswer, Mishap::Interrupt, Mishap::Restart];
+
+/// A bus on which something happens to the frame of this number.
+struct Unlucky {
+    inner: MemoryBus,
+    at: Option<(usize, Mishap)>,
+    sent: Vec<String>,
+    /// Answers still to be lost.
+    deaf: bool,
+    interrupted: bool,
+    restarts: bool,
+}
+
+impl Unlucky {
+    fn of(kind: &str, settings: &str, at: Option<(usize, Mishap)>) -> Unlucky {
+        let bench = format!("clock = \"virtual\"\n[[device]]\nkind = \"{kind}\"\nnode = 5\n{settings}");
+        let inner = Bench::from_toml(&bench, Path::new("")).expect("a bench").open().expect("a bus");
+        Unlucky { inner, at, sent: Vec::new(), deaf: false, interrupted: false, restarts: false }
+    }
+
+    /// How often this went out.
+    fn count(&self, frame: &str) -> usize {
+        self.sent.iter().filter(|sent| sent.ends_with(frame)).count()
+    }
+
+    /// Lets the bus run on without anybody, then looks into the device.
+    fn look(&mut self, object: &str) -> Vec<u8> {
+        self.run_on();
+        let now = self.inner.now().mono;
+        let object: ObjectId = object.parse().expect("an object");
+        let device = self.inner.stations_mut::<Device>().next().expect("the device");
+        device.value(object, now).expect("it has the object")
+    }
+
+    fn run_on(&mut self) {
+        let until = self.inner.now().mono + Duration::from_secs(1);
+        while !matches!(self.inner.receive(until).expect("the bus works"), Event::Timeout) {}
+    }
+
+    fn state(&mut self) -> Option<State> {
+        self.run_on();
+        self.inner.stations::<Device>().next().expect("the device").state()
+    }
+
+    /// Power off and on is a reset as far as what is kept goes.
+    fn reset(&mut self) {
+        self.inner.send(&"000#8105".parse().expect("a frame")).expect("sent");
+        self.run_on();
+    }
+}
+
+impl Bus for Unlucky {
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        self.inner.bit_rate()
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        self.inner.timestamps()
+    }
+
+    fn now(&self) -> Stamp {
+        self.inner.now()
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        self.inner.listen(filters)
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        let number = self.sent.len();
+        self.sent.push(frame.to_string());
+        match self.at {
+            Some((at, mishap)) if at == number => match mishap {
+                Mishap::LoseIt => return Ok(()),
+                Mishap::LoseItsAnswer => self.deaf = true,
+                Mishap::Interrupt => self.interrupted = true,
+                Mishap::Restart => self.restarts = true,
+            },
+            _ => {}
+        }
+        self.inner.send(frame)
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        loop {
+            let event = self.inner.receive(deadline)?;
+            if let Event::Frame(received) = &event
+                && received.frame.to_string().starts_with("585#")
+            {
+                if std::mem::take(&mut self.restarts) {
+                    self.inner.send(&"000#8105".parse().expect("a frame"))?;
+                }
+                if std::mem::take(&mut self.deaf) {
+                    continue;
+                }
+                if std::mem::take(&mut self.interrupted) {
+                    return Ok(Event::Interrupted);
+                }
+            }
+            return Ok(event);
+        }
+    }
+}
+
+fn node() -> NodeId {
+    NodeId::new(5).expect("a node-ID")
+}
+
+fn with<T>(bus: &mut Unlucky, work: impl FnOnce(&mut Master<'_>) -> T) -> T {
+    let mut master = Master::new(bus, Timing::default());
+    let result = work(&mut master);
+    master.settle();
+    result
+}
+
+/// How many frames go out when nothing happens.
+fn frames(run: impl Fn(&mut Unlucky), kind: &str, settings: &str) -> usize {
+    let mut bus = Unlucky::of(kind, settings, None);
+    run(&mut bus);
+    bus.sent.len()
+}
+
+const STILL: &str = "[[device.channel]]\nchannel = 1\nbase = 0.0625\namplitude = 0.0\nnoise = 0.0\n";
+
+fn zero(bus: &mut Unlucky, store: bool) -> Result<Zeroed, Failure> {
+    let options = Options { channel: None, limit: Limit::Default, samples: 2, force: false, store, dry_run: false };
+    with(bus, |master| autozero(master, node(), &Default::default(), &options))
+}
+
+#[test]
+fn a_zero_that_is_told_is_there_and_one_that_is_denied_is_not() {
+    for (kind, offset, new) in [
+        ("mh4", "0x6127:1", (-0.0625f32).to_le_bytes()),
+        ("d20", "0x6124:1", (-0.0625f32).to_le_bytes()),
+        ("dps", "0x6124:1", (-63i32).to_le_bytes()),
+    ] {
+        let count = frames(|bus| drop(zero(bus, false)), kind, STILL);
+        let mut acted_without_answer = 0;
+        for (at, mishap) in (0..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
+            let mut bus = Unlucky::of(kind, STILL, Some((at, mishap)));
+            let result = zero(&mut bus, false);
+            let went = bus.count("2561017A65726F");
+            let place = format!("{kind}: {mishap:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
+            assert!(went <= 1, "{place}");
+            let last = at + 1 == bus.sent.len();
+            let holds = bus.look(offset);
+            match result {
+                Ok(report) => {
+                    // A restart behind the last answer comes when everything has been told.
+                    assert!(holds == new || mishap == Mishap::Restart && last, "{place}");
+                    assert!(report.after.expect("measured").abs() <= 0.001 && !report.stored, "{place}");
+                    assert_ne!(mishap, Mishap::Interrupt, "{place}");
+                    acted_without_answer += usize::from(report.notes[0].contains("no answer came to the signature"));
+                }
+                Err(failure) => {
+                    let nothing = failure.message.contains("nothing was changed");
+                    assert!(!nothing || went == 0, "{place}");
+                    assert!(nothing || went == 1 || mishap != Mishap::Interrupt, "{place}");
+                    assert!(!nothing || holds == [0; 4], "{place}");
+                    if went > 0 && failure.message.contains("the offset is as before") {
+                        assert_eq!(holds, [0; 4], "{place}");
+                    }
+                    assert_eq!(failure.kind == Kind::Interrupted, mishap == Mishap::Interrupt, "{place}");
+                }
+            }
+        }
+        assert_eq!(acted_without_answer, 1, "{kind}");
+    }
+}
+
+#[test]
+fn a_zero_that_is_told_as_stored_outlasts_a_reset() {
+    for (kind, offset, new) in
+        [("mh4", "0x6127:1", (-0.0625f32).to_le_bytes()), ("dps", "0x6124:1", (-63i32).to_le_bytes())]
+    {
+        let count = frames(|bus| drop(zero(bus, true)), kind, STILL);
+        for (at, mishap) in (0..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
+            let mut bus = Unlucky::of(kind, STILL, Some((at, mishap)));
+            let result = zero(&mut bus, true);
+            let place = format!("{kind}: {mishap:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
+            assert!(bus.count("73617665") <= 1 && bus.count("2561017A65726F") <= 1, "{place}");
+            if let Ok(report) = result {
+                bus.reset();
+                assert!(report.stored && bus.look(offset) == new, "{place}");
+            }
+        }
+    }
+}
+
+/// Operational, with a heartbeat that tells it; the number of digits is another one than it was stored with.
+const RUNS: &str = "start = true\nset = { \"0x1017\" = 100, \"0x6131:1\" = 0xAB0000 }\n";
+
+fn save(bus: &mut Unlucky, verify: bool) -> Result<Done, Failure> {
+    with(bus, |master| {
+        let device = store::device(master, node(), &Default::default())?;
+        store::store(master, &device, Group::All, verify)
+    })
+}
+
+/// Writes a setting that is not stored yet.
+fn set(bus: &mut Unlucky) {
+    let request = "605#2F32610101000000";
+    bus.inner.send(&request.parse().expect("a frame")).expect("sent");
+    bus.run_on();
+    assert_eq!(bus.look("0x6132:1"), [1], "the setting was not taken");
+}
+
+#[test]
+fn what_is_told_as_stored_outlasts_a_reset() {
+    for verify in [false, true] {
+        let run = |bus: &mut Unlucky| {
+            set(bus);
+            drop(save(bus, verify));
+        };
+        let count = frames(run, "mh4", RUNS);
+        for (at, mishap) in (0..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
+            let mut bus = Unlucky::of("mh4", RUNS, Some((at, mishap)));
+            set(&mut bus);
+            let result = save(&mut bus, verify);
+            let place = format!("verify {verify}: {mishap:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
+            assert!(bus.count("73617665") <= 1, "{place}");
+            assert!(bus.state().is_some_and(|state| state == State::Operational), "{place}");
+            match result {
+                Ok(done) => {
+                    assert_eq!(done.verified, if verify { Verified::Reset } else { Verified::Ack });
+                    bus.reset();
+                    // Whoever restarts in between has lost the setting before it was stored.
+                    assert!(bus.look("0x6132:1") == [1] || mishap == Mishap::Restart, "{place}");
+                }
+                Err(failure) => {
+                    let told = ["whether it was stored is not known", "is not proven"];
+                    let told = told.iter().any(|told| failure.message.contains(told));
+                    assert_eq!(told, bus.count("73617665") == 1, "{place}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_told_as_restored_is_as_delivered() {
+    let run = |bus: &mut Unlucky| {
+        with(bus, |master| {
+            let device = store::device(master, node(), &Default::default())?;
+            restore::restore(master, &device, Group::All, true)
+        })
+    };
+    let count = frames(|bus| drop(run(bus)), "mh4", RUNS);
+    for (at, mishap) in (0..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
+        let mut bus = Unlucky::of("mh4", RUNS, Some((at, mishap)));
+        let result = run(&mut bus);
+        let place = format!("{mishap:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
+        assert!(bus.count("6C6F6164") <= 1, "{place}");
+        match result {
+            Ok(done) => {
+                assert_eq!(done.verified, Verified::Reset, "{place}");
+                assert_eq!(bus.look("0x6131:1"), 0x4E_0000u32.to_le_bytes(), "{place}");
+                assert_eq!(bus.look("0x1017"), [0, 0], "{place}");
+            }
+            Err(failure) => {
+                let told = ["the defaults is not known", "in force is not proven"];
+                let told = told.iter().any(|told| failure.message.contains(told));
+                assert_eq!(told, bus.count("6C6F6164") == 1, "{place}");
+            }
+        }
+    }
+}
