@@ -10,7 +10,7 @@ use cangauge::canopen::value::{DataType, Value};
 use cangauge::device::catalog::{Model, built_in};
 use cangauge::device::description::{Access, ObjectEntry, Remap, SizeIndication};
 use cangauge::device::dictionary::Entry;
-use cangauge::master::{Master, Request, SdoFailure, Timing};
+use cangauge::master::{Happening, Master, Request, SdoFailure, Timing};
 use cangauge::sim::{Device, Setup};
 use std::sync::Arc;
 use std::time::Duration;
@@ -445,4 +445,25 @@ fn every_object_says_what_it_is() {
 
 fn index(object: &ObjectEntry) -> u16 {
     object.objects().expect("an address").next().expect("one").index
+}
+
+#[test]
+fn hydac_keeps_its_node_id_with_1010h_4_alone() {
+    let model = cangauge::device::catalog::by_name("hydac").expect("built in");
+    for (sub, expected) in [(1, 9), (4, 12)] {
+        with_desk(&model, |desk| {
+            desk.write(ObjectId::new(0x2003, 2), &[12]).expect("pending");
+            desk.write(ObjectId::new(0x1010, sub), b"save").expect("saved");
+            desk.master.send("000#8109".parse().expect("a frame"));
+            let later = desk.master.now() + Duration::from_secs(1);
+            let mut heard = Vec::new();
+            while desk.master.now() < later {
+                if let Happening::Frame(received) = desk.master.next(later).expect("the bus works") {
+                    heard.push(received.frame.to_string());
+                }
+            }
+            let boot_up = format!("{:03X}#00", 0x700 + expected);
+            assert!(heard.contains(&boot_up), "1010h:{sub}: {heard:?}");
+        });
+    }
 }

@@ -21,7 +21,7 @@ fn channel(number: u8, base: f64) -> String {
     format!("[[device.channel]]\nchannel = {number}\nbase = {base:?}\namplitude = 0.0\nnoise = 0.0\n")
 }
 
-const STORE: &str = "kept after power off only when it is stored (1010h)\n";
+const STORE: &str = "kept after power off only when it is stored: cangauge store";
 
 #[test]
 fn the_unit_of_one_signal_is_bare() {
@@ -51,7 +51,7 @@ fn table_19_and_what_the_new_unit_rescales() {
          ai-span-start:1    0.000 psi    ->  0.000 bar\n\
          ai-span-end:1      100.000 psi  ->  6.895 bar\n"
     );
-    assert_eq!(done.stderr, format!("node 127: {STORE}"));
+    assert_eq!(done.stderr, format!("node 127: {STORE} 127\n"));
     let writes: Vec<&str> = done.frames_of("67F").into_iter().filter(|frame| frame.starts_with("22")).collect();
     assert_eq!(writes, ["2231610100004E00"], "one write, as printed");
     let answers = done.frames_of("5FF");
@@ -166,7 +166,7 @@ fn limits() {
         [json!({"node": 5, "signal": "temperature", "delta": 0.5, "lower": -20.0, "upper": 80.0, "hysteresis": 1.0,
             "unit": "degC", "silent": []})]
     );
-    assert_eq!(done.stderr, format!("node 5: {STORE}"));
+    assert_eq!(done.stderr, format!("node 5: {STORE} 5\n"));
     bench
         .run("limits 5 pressure --lower 11")
         .fails(2, "cangauge: node 5: pressure: the lower limit 11 is above the upper one, 10\n");

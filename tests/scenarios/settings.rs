@@ -123,8 +123,8 @@ fn undisturbed_they_all_succeed() {
 
 #[test]
 fn a_lost_frame_is_asked_for_again() {
-    each(|number| FaultPlan { lose: [number].into(), ..FaultPlan::default() }, |deed, plan| succeeds(deed, plan));
-    each(|number| FaultPlan { lose_sent: [number].into(), ..FaultPlan::default() }, |deed, plan| succeeds(deed, plan));
+    each(|number| FaultPlan { lose: [number].into(), ..FaultPlan::default() }, succeeds);
+    each(|number| FaultPlan { lose_sent: [number].into(), ..FaultPlan::default() }, succeeds);
 }
 
 #[test]
