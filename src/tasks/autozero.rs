@@ -193,12 +193,13 @@ impl<'a> Procedure<'a> {
             Err(error) if matches!(error.failure, SdoFailure::Cancelled) => return Err(unsure(error.into())),
             Err(error) => Some(error),
         };
-        let offsets = channel::offsets(master, device, channel).map_err(unsure)?;
         let after = samples::take(master, device, &channel.signal.name, count).map_err(unsure)?;
+        // Last, so that a device that has restarted meanwhile shows the offset of before.
+        let offsets = channel::offsets(master, device, channel).map_err(unsure)?;
         let shown_by = match error {
             None => None,
             Some(_) if self.moved(&offsets).is_some() => Some("the offset"),
-            Some(_) if self.came_nearer(&after) && self.is_zero(&after) => Some("the reading"),
+            Some(_) if self.shows_it(&after) && self.is_zero(&after) => Some("the reading"),
             Some(error) => {
                 let now = if self.offsets.is_empty() {
                     "no offset can be read here, and the reading has not come to zero"
@@ -228,9 +229,10 @@ impl<'a> Procedure<'a> {
         samples.mean().is_some_and(|mean| mean.abs() <= self.tolerance())
     }
 
-    /// Whether the reading has come nearer to zero than its unrest explains.
-    fn came_nearer(&self, after: &Samples) -> bool {
-        let means = self.before.mean().zip(after.mean());
+    /// Whether the reading shows that the signature acted: it has come nearer to zero than its unrest explains. Where
+    /// an offset is known to be moved, that alone counts.
+    fn shows_it(&self, after: &Samples) -> bool {
+        let means = self.before.mean().zip(after.mean()).filter(|_| !self.channel.is_described);
         means.is_some_and(|(before, after)| after.abs() + self.before.spread() < before.abs())
     }
 
@@ -253,7 +255,7 @@ impl<'a> Procedure<'a> {
         if written.after.booted {
             return fail("it took the signature and restarted: a zero that was not stored is gone".to_owned());
         }
-        let acted = self.moved(&written.offsets).is_some() || self.came_nearer(&written.after) || self.was_zero();
+        let acted = self.moved(&written.offsets).is_some() || self.shows_it(&written.after) || self.was_zero();
         if acted && self.is_zero(&written.after) {
             return Ok(());
         }

@@ -31,7 +31,7 @@ pub(super) struct Held {
 }
 
 impl Held {
-    /// The value in words: `0x1017 producer-heartbeat-time 1000`.
+    /// Address and name: `0x1017:0 producer-heartbeat-time`.
     pub(super) fn name(&self) -> String {
         match &self.name {
             Some(name) => format!("{} {name}", self.object),
@@ -163,7 +163,7 @@ pub(super) fn reset<T>(
     };
     let reports = nmt::command(master, NmtCommand::ResetNode, &[node], false).map_err(|error| lost(error.into()))?;
     if reports.iter().all(|report| report.state.is_none()) {
-        let failure = Failure::of_node(Kind::NoAnswer, node, "no boot-up came within 3 s of the reset");
+        let failure = Failure::of_node(Kind::NoAnswer, node, "no boot-up came after the reset");
         return Err(lost(failure).hint(format!("is it there? cangauge nmt state {node}; cangauge scan")));
     }
     let found = look(master);

@@ -4,7 +4,7 @@
 
 use cangauge::bus::memory::MemoryBus;
 use cangauge::bus::time::{Mono, Stamp};
-use cangauge::bus::{Bus, BusError, Event, Filters, TimestampSource};
+use cangauge::bus::{Bus, BusError, Event, Filters, Received, TimestampSource};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
@@ -24,15 +24,22 @@ enum Mishap {
     Interrupt,
     /// The device restarts as soon as it has answered.
     Restart,
+    /// The device has restarted before, and nobody has seen its boot-up.
+    Restarted,
+    /// The device refuses it with this code instead of its answer.
+    Refuse(u32),
 }
 
-const MISHAPS: [Mishap; 4] = [Mishap::LoseIt, Mishap::LoseItsAnswer, Mishap::Interrupt, Mishap::Restart];
+const MISHAPS: [Mishap; 5] =
+    [Mishap::LoseIt, Mishap::LoseItsAnswer, Mishap::Interrupt, Mishap::Restart, Mishap::Restarted];
 
 /// A bus on which something happens to the frame of this number.
 struct Unlucky {
     inner: MemoryBus,
     at: Option<(usize, Mishap)>,
     sent: Vec<String>,
+    /// What its answer becomes.
+    refusal: Option<u32>,
     /// Answers still to be lost.
     deaf: bool,
     interrupted: bool,
@@ -43,7 +50,7 @@ impl Unlucky {
     fn of(kind: &str, settings: &str, at: Option<(usize, Mishap)>) -> Unlucky {
         let bench = format!("clock = \"virtual\"\n[[device]]\nkind = \"{kind}\"\nnode = 5\n{settings}");
         let inner = Bench::from_toml(&bench, Path::new("")).expect("a bench").open().expect("a bus");
-        Unlucky { inner, at, sent: Vec::new(), deaf: false, interrupted: false, restarts: false }
+        Unlucky { inner, at, sent: Vec::new(), refusal: None, deaf: false, interrupted: false, restarts: false }
     }
 
     /// How often this went out.
@@ -107,6 +114,8 @@ impl Bus for Unlucky {
                 Mishap::LoseItsAnswer => self.deaf = true,
                 Mishap::Interrupt => self.interrupted = true,
                 Mishap::Restart => self.restarts = true,
+                Mishap::Restarted => self.reset(),
+                Mishap::Refuse(code) => self.refusal = Some(code),
             },
             _ => {}
         }
@@ -121,6 +130,12 @@ impl Bus for Unlucky {
             {
                 if std::mem::take(&mut self.restarts) {
                     self.inner.send(&"000#8105".parse().expect("a frame"))?;
+                }
+                if let Some(code) = self.refusal.take() {
+                    let [_, a, b, c, ..] = *received.frame.data() else { panic!("an answer has eight bytes") };
+                    let bytes = [&[0x80, a, b, c], code.to_le_bytes().as_slice()].concat();
+                    let frame = Frame::new(received.frame.id(), &bytes).expect("a frame");
+                    return Ok(Event::Frame(Received { frame, at: received.at }));
                 }
                 if std::mem::take(&mut self.deaf) {
                     continue;
@@ -168,7 +183,9 @@ fn a_zero_that_is_told_is_there_and_one_that_is_denied_is_not() {
     ] {
         let count = frames(|bus| drop(zero(bus, false)), kind, STILL);
         let mut acted_without_answer = 0;
-        for (at, mishap) in (0..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
+        // How a device is recognised is the same for all of them.
+        let first = if kind == "mh4" { 0 } else { count.saturating_sub(20) };
+        for (at, mishap) in (first..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
             let mut bus = Unlucky::of(kind, STILL, Some((at, mishap)));
             let result = zero(&mut bus, false);
             let went = bus.count("2561017A65726F");
@@ -182,7 +199,8 @@ fn a_zero_that_is_told_is_there_and_one_that_is_denied_is_not() {
                     assert!(holds == new || mishap == Mishap::Restart && last, "{place}");
                     assert!(report.after.expect("measured").abs() <= 0.001 && !report.stored, "{place}");
                     assert_ne!(mishap, Mishap::Interrupt, "{place}");
-                    acted_without_answer += usize::from(report.notes[0].contains("no answer came to the signature"));
+                    let silent = report.notes[0].contains("no answer came to the signature");
+                    acted_without_answer += usize::from(silent && mishap == Mishap::LoseItsAnswer);
                 }
                 Err(failure) => {
                     let nothing = failure.message.contains("nothing was changed");
@@ -206,7 +224,8 @@ fn a_zero_that_is_told_as_stored_outlasts_a_reset() {
         [("mh4", "0x6127:1", (-0.0625f32).to_le_bytes()), ("dps", "0x6124:1", (-63i32).to_le_bytes())]
     {
         let count = frames(|bus| drop(zero(bus, true)), kind, STILL);
-        for (at, mishap) in (0..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
+        // What comes before is the same without storing.
+        for (at, mishap) in (count.saturating_sub(25)..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
             let mut bus = Unlucky::of(kind, STILL, Some((at, mishap)));
             let result = zero(&mut bus, true);
             let place = format!("{kind}: {mishap:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
@@ -245,7 +264,9 @@ fn what_is_told_as_stored_outlasts_a_reset() {
             drop(save(bus, verify));
         };
         let count = frames(run, "mh4", RUNS);
-        for (at, mishap) in (0..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
+        // What comes before is the same with and without proof.
+        let first = if verify { 0 } else { count.saturating_sub(20) };
+        for (at, mishap) in (first..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
             let mut bus = Unlucky::of("mh4", RUNS, Some((at, mishap)));
             set(&mut bus);
             let result = save(&mut bus, verify);
@@ -257,7 +278,11 @@ fn what_is_told_as_stored_outlasts_a_reset() {
                     assert_eq!(done.verified, if verify { Verified::Reset } else { Verified::Ack });
                     bus.reset();
                     // Whoever restarts in between has lost the setting before it was stored.
-                    assert!(bus.look("0x6132:1") == [1] || mishap == Mishap::Restart, "{place}");
+                    // Proven is what was read of it before.
+                    let read = bus.sent.iter().position(|sent| sent.ends_with("#4032610100000000"));
+                    let proven = read.is_some_and(|read| read < at);
+                    let restarts = matches!(mishap, Mishap::Restart | Mishap::Restarted) && !proven;
+                    assert!(bus.look("0x6132:1") == [1] || restarts, "{place}");
                 }
                 Err(failure) => {
                     let told = ["whether it was stored is not known", "is not proven"];
@@ -296,4 +321,28 @@ fn what_is_told_as_restored_is_as_delivered() {
             }
         }
     }
+}
+
+#[test]
+fn a_refusal_is_told_in_the_words_of_the_device_and_only_its_form_is_tried_again() {
+    let place = |verify: bool| {
+        let mut usual = Unlucky::of("d20", "", None);
+        save(&mut usual, verify).expect("stored");
+        usual.sent.iter().position(|sent| sent.ends_with("2210100173617665")).expect("the signature")
+    };
+    // Page 12: "If the storing failed": 06060000h; a wrong signature: 0800002xh.
+    for (code, words) in [
+        (0x0606_0000, "access failed because of a hardware error"),
+        (0x0800_0020, "data cannot be transferred or stored"),
+    ] {
+        let mut bus = Unlucky::of("d20", "", Some((place(true), Mishap::Refuse(code))));
+        let failure = save(&mut bus, true).expect_err("refused");
+        assert_eq!((failure.kind, failure.abort.map(|abort| abort.0)), (Kind::Refused, Some(code)));
+        assert!(failure.message.contains(words), "{failure}");
+        assert_eq!((bus.count("73617665"), bus.count("000#8105")), (1, 0), "neither repeated nor reset");
+    }
+    // A device that takes the size, or its absence, amiss has not acted.
+    let mut bus = Unlucky::of("d20", "", Some((place(false), Mishap::Refuse(0x0504_0001))));
+    save(&mut bus, false).expect("stored");
+    assert_eq!((bus.count("2210100173617665"), bus.count("2310100173617665")), (1, 1));
 }

@@ -433,6 +433,8 @@ fn several_signals_are_judged_when_each_has_come() {
     let at_the_end = [("5.p", "bar", &[1.0, 9.0][..]), ("6.p", "bar", &[1.0])];
     assert_eq!(verdict("5.p - 6.p < 1", &at_the_end).violations, 1);
     assert_eq!(verdict("5.p < 2 or 6.p > 5", &uneven).violations, 1);
+    let invalid = [("5.p", "bar", &[1.0][..]), ("6.p", "bar", &[NAN])];
+    assert_eq!(verdict("5.p < 2 or 6.p > 5", &invalid).ruling, Ruling::Fail, "one side that holds does not excuse it");
     let missing = [("5.p", "bar", &[1.0, 9.0][..]), ("6.p", "bar", &[])];
     let judged = verdict("5.p - 6.p < 1", &missing);
     assert_eq!((judged.ruling, judged.reason.as_deref()), (Ruling::NoData, Some("node 6: p did not come")));

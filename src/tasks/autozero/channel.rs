@@ -19,6 +19,8 @@ pub(super) struct Channel {
     pub(super) signature: Vec<u8>,
     /// Where the offset may stand: one object of a device that is known, else those of CiA 404.
     pub(super) offsets: Vec<ObjectId>,
+    /// Whether a description says where the offset stands.
+    pub(super) is_described: bool,
     /// Whether the sensor measures absolute pressure; `None` where nothing tells.
     pub(super) absolute: Option<bool>,
     /// The width of the measuring range in the present unit.
@@ -65,7 +67,8 @@ pub(super) fn find(master: &mut Master<'_>, device: &Instrument, number: Option<
     let range = range(master, device, &signal, entry.range.as_ref())?;
     let signature = entry.signature.clone().into_bytes();
     let offsets = entry.offset.into_iter().collect();
-    Ok(Channel { signal, object: entry.object, signature, offsets, absolute, range })
+    let is_described = entry.offset.is_some();
+    Ok(Channel { signal, object: entry.object, signature, offsets, is_described, absolute, range })
 }
 
 /// 6125h:n, where the device has it.
@@ -97,7 +100,8 @@ fn by_the_standard(master: &mut Master<'_>, device: &Instrument, number: Option<
     let family = signal.value.0.index & 0xf000;
     let offsets = [0x6127, family | 0x124].map(|index| ObjectId::new(index, signal.channel)).to_vec();
     let range = range(master, device, &signal, None)?;
-    Ok(Channel { signal, object, signature: b"zero".to_vec(), offsets, absolute: None, range })
+    let signature = b"zero".to_vec();
+    Ok(Channel { signal, object, signature, offsets, is_described: false, absolute: None, range })
 }
 
 fn signal(device: &Instrument, channel: u8) -> Result<&Signal, Failure> {
