@@ -75,7 +75,7 @@ impl Filter {
             ));
         }
         if change.before != change.now {
-            console.note(&format!("node {node}: kept after power off only when it is stored (1010h)"));
+            console.note(&format!("node {node}: kept after power off only when it is stored: cangauge store {node}"));
         }
         Ok(())
     }

@@ -69,7 +69,8 @@ impl Limits {
             ));
         }
         if !wanted.is_empty() {
-            console.note(&format!("node {}: kept after power off only when it is stored (1010h)", self.node));
+            console
+                .note(&format!("node {0}: kept after power off only when it is stored: cangauge store {0}", self.node));
         }
         Ok(())
     }

@@ -84,7 +84,7 @@ pub struct Global {
     #[arg(long, global = true, value_name = "N")]
     pub(crate) retries: Option<u32>,
 
-    /// Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, or a description in
+    /// Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, hydac, jumo, or a description in
     /// TOML; NODE=NAME for one node of several
     #[arg(long, global = true, value_name = "[NODE=]NAME|FILE")]
     pub(crate) device: Vec<Override>,

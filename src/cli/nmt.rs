@@ -244,6 +244,9 @@ impl StartupArgs {
         }
         .and_then(|()| out.flush())
         .map_err(stdout)?;
+        if !report.doubt.is_empty() {
+            global.console().warn(&format!("node {}: {}", self.node, report.doubt));
+        }
         if set.is_some() {
             global.console().note(&format!("node {}: kept after power off only when it is stored (1010h)", self.node));
         }

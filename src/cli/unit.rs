@@ -77,7 +77,7 @@ impl Unit {
             let number = item.after.map(|after| after.to_string()).unwrap_or_default();
             console.warn(&format!("node {node}: {} was not converted by the device: it is now {number}", item.name));
         }
-        console.note(&format!("node {node}: kept after power off only when it is stored (1010h)"));
+        console.note(&format!("node {node}: kept after power off only when it is stored: cangauge store {node}"));
     }
 }
 

@@ -21,7 +21,7 @@ fn channel(number: u8, base: f64) -> String {
     format!("[[device.channel]]\nchannel = {number}\nbase = {base:?}\namplitude = 0.0\nnoise = 0.0\n")
 }
 
-const STORE: &str = "kept after power off only when it is stored (1010h)\n";
+const STORE: &str = "kept after power off only when it is stored: cangauge store";
 
 #[test]
 fn the_unit_of_one_signal_is_bare() {
@@ -51,7 +51,7 @@ fn table_19_and_what_the_new_unit_rescales() {
          ai-span-start:1    0.000 psi    ->  0.000 bar\n\
          ai-span-end:1      100.000 psi  ->  6.895 bar\n"
     );
-    assert_eq!(done.stderr, format!("node 127: {STORE}"));
+    assert_eq!(done.stderr, format!("node 127: {STORE} 127\n"));
     let writes: Vec<&str> = done.frames_of("67F").into_iter().filter(|frame| frame.starts_with("22")).collect();
     assert_eq!(writes, ["2231610100004E00"], "one write, as printed");
     let answers = done.frames_of("5FF");
@@ -166,7 +166,7 @@ fn limits() {
         [json!({"node": 5, "signal": "temperature", "delta": 0.5, "lower": -20.0, "upper": 80.0, "hysteresis": 1.0,
             "unit": "degC", "silent": []})]
     );
-    assert_eq!(done.stderr, format!("node 5: {STORE}"));
+    assert_eq!(done.stderr, format!("node 5: {STORE} 5\n"));
     bench
         .run("limits 5 pressure --lower 11")
         .fails(2, "cangauge: node 5: pressure: the lower limit 11 is above the upper one, 10\n");
@@ -241,4 +241,57 @@ fn errors_in_the_words_of_the_device() {
     bench.run("errors 2 --clear").fails(6, "cangauge: node 2: it keeps no error history (1003h)\n");
     let done = bench.run("errors 9").exit(3);
     assert!(done.stdout.is_empty());
+}
+
+/// A device of CiA 404 that no description fits goes by the standard, and says itself what it does not take.
+#[test]
+fn a_device_that_nothing_describes() {
+    let devices = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/device/devices/mh4.toml");
+    let text = fs::read_to_string(devices).expect("the description");
+    let text = text.replacen("name = \"mh4\"", "name = \"other\"", 1);
+    let text = text.replacen("default = \"MH-4-CAN\"", "default = \"OTHER\"", 1);
+    let bench = Bench::described(&format!(
+        "[[device]]\nkind = \"other.toml\"\nnode = 5\n{}{}",
+        channel(1, 1.25),
+        channel(2, 25.5)
+    ));
+    fs::write(bench.path("other.toml"), text).expect("written");
+    bench.run("unit 5").prints("ch1  bar\nch2  degC\n");
+    let done = bench.run("unit 5 psi").exit(0);
+    assert!(done.stdout.starts_with("ch1       bar       ->  psi\n"), "{}", done.stdout);
+    assert!(done.stdout.contains("0x6149:1  10 bar    ->  145.03773 psi"), "{}", done.stdout);
+    let done = bench.run("unit 5 ch1 kPa").exit(4);
+    assert!(done.stderr.contains("0x06090030"), "{}", done.stderr);
+    bench.run("limits 5 ch2 --delta 0.5 -f csv").prints(
+        "node,signal,limit,value,unit\n5,ch2,delta,0.5,degC\n5,ch2,lower,-40,degC\n5,ch2,upper,125,degC\n\
+         5,ch2,hysteresis,0,degC\n",
+    );
+    bench.run("filter 5 ch1 --type moving").prints("ch1  moving average (1)  constant 1\n");
+    let done = bench.run("filter 5 ch1 --type repeating --constant 3 -f csv").exit(0);
+    assert_eq!(done.stdout, "node,signal,code,type,constant\n5,ch1,2,repeating average,3\n");
+    let page = bench.run("info 5").exit(0).stdout;
+    assert!(page.starts_with("node 5: not a device that is known\n"), "{page}");
+    for part in ["ai-sensor-type        90 pressure transducer", "range 0 to 10", "  kept     not known"] {
+        assert!(page.contains(part), "{part:?} is not in\n{page}");
+    }
+}
+
+#[test]
+fn what_was_set_is_put_back_where_a_later_limit_is_refused() {
+    let devices = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/device/devices/mh4.toml");
+    let text = fs::read_to_string(devices).expect("the description");
+    let at = text.find("at = \"0x6134:1-1\"").expect("the lower limit");
+    let (head, tail) = text.split_at(at);
+    let tail = tail.replacen("default = 0.0\n", "default = 0.0\nhigh = 5.0\n", 1);
+    let bench = Bench::described("[[device]]\nkind = \"strict.toml\"\nnode = 5\n");
+    let text = format!("{}{tail}", head.replacen("name = \"mh4\"", "name = \"strict\"", 1));
+    fs::write(bench.path("strict.toml"), text).expect("written");
+    let done = bench.run("limits 5 pressure --lower 6 --upper 14").exit(4);
+    assert_eq!(
+        done.stderr,
+        "cangauge: node 5: write 0x6134:1: refused by the device (0x06090031, value too high)\n\
+         hint: the limits are as before: cangauge limits 5 pressure\n"
+    );
+    let writes: Vec<&str> = done.frames_of("605").into_iter().filter(|frame| frame.starts_with("23")).collect();
+    assert_eq!(writes, ["2335610100006041", "233461010000C040", "2335610100002041"], "14, 6, and 10 again");
 }

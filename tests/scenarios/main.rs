@@ -12,6 +12,7 @@ mod pdo_map_devices;
 mod scan;
 mod second_master;
 mod second_sync;
+mod settings;
 mod signatures;
 mod stalled;
 

@@ -1,12 +1,13 @@
 //! Who starts a device after power on: the master, or the device itself (1F80h, and its like).
 
 use crate::canopen::id::NodeId;
-use crate::canopen::sdo::DownloadSize;
 use crate::canopen::value::DataType;
 use crate::device::description::Startup;
-use crate::master::{Master, Request};
+use crate::master::{BlockMode, Master};
 use crate::measure::survey::{Overrides, recognised};
+use crate::tasks::sdo::{Knowledge, Options, SizeMode, write};
 use crate::tasks::{Failure, Kind};
+use std::sync::Arc;
 
 /// Who starts the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,12 +21,14 @@ pub enum Starts {
 }
 
 /// What a device is set to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StartupReport {
     /// Who starts it.
     pub starts: Starts,
     /// The number in the object.
     pub raw: u64,
+    /// What the manual contradicts or leaves open.
+    pub doubt: String,
 }
 
 /// Reads who starts a device, after setting it if `set` says so. It is read back after being set.
@@ -53,7 +56,10 @@ pub fn startup(
     if let Some(number) = wanted {
         let data = DataType::Unsigned(4).encode_text(&number.to_string());
         let data = data.map_err(|error| Failure::of_node(Kind::Usage, node, error))?;
-        master.transfer_one(Request::write(node, entry.object, data, DownloadSize::Indicated))??;
+        let known = model.as_ref().map(|model| (node, Arc::clone(model)));
+        let knowledge = Knowledge::new(node, &known.into_iter().collect());
+        let mut options = Options { blocks: BlockMode::Never, size: SizeMode::Auto, progress: &mut |_| {} };
+        write(master, &knowledge, entry.object, &data, &mut options)?;
     }
     let found = report(&entry, master, node)?;
     if wanted.is_some_and(|wanted| u64::from(wanted) != found.raw) {
@@ -72,5 +78,5 @@ fn report(entry: &Startup, master: &mut Master<'_>, node: NodeId) -> Result<Star
     } else {
         Starts::Other(raw)
     };
-    Ok(StartupReport { starts, raw })
+    Ok(StartupReport { starts, raw, doubt: entry.doubt.clone() })
 }

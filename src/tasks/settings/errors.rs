@@ -43,8 +43,13 @@ pub struct PastError {
 /// # Errors
 /// Silence, and a device that has neither.
 pub fn read(master: &mut Master<'_>, device: &Device) -> Result<Errors, Failure> {
-    let values = device.read_each(master, &[REGISTER, HISTORY])?;
-    let [register, count] = [0, 1].map(|at| values.get(at).and_then(Option::as_ref).and_then(Value::as_u64));
+    let mut number = |object: ObjectId| -> Result<Option<u64>, Failure> {
+        if !device.may_have(object) {
+            return Ok(None);
+        }
+        Ok(device.read_each(master, &[object])?.first().and_then(Option::as_ref).and_then(Value::as_u64))
+    };
+    let (register, count) = (number(REGISTER)?, number(HISTORY)?);
     let register = register.and_then(|bits| u8::try_from(bits).ok());
     if register.is_none() && count.is_none() {
         let message = "it has neither an error register (1001h) nor a history (1003h)";

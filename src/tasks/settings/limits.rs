@@ -126,13 +126,10 @@ pub fn set(master: &mut Master<'_>, device: &Device, signal: &str, wanted: &[(Li
             return Err(failure.hint(format!("what stands now: cangauge limits {} {signal}", device.node())));
         }
         // The one that acknowledged and keeps something else is put back too.
-        let done = writes.iter().take(at + 1).rev();
-        let undone = done.filter(|(.., undo)| !undo.is_empty()).map(|(_, _, object, _, undo)| (*object, undo));
-        let undone: Vec<_> = undone.collect();
-        let all_back = undone.into_iter().filter(|_| at > 0 || failure.kind == Kind::Unexpected);
+        let done = if failure.kind == Kind::Unexpected { at + 1 } else { at };
         let mut back = true;
-        for (object, undo) in all_back {
-            back &= device.set(master, object, undo).is_ok();
+        for (_, _, object, _, undo) in writes.iter().take(done).rev() {
+            back &= !undo.is_empty() && device.set(master, *object, undo).is_ok();
         }
         let told = if back { "the limits are as before" } else { "not all limits could be put back" };
         return Err(failure.hint(format!("{told}: cangauge limits {} {signal}", device.node())));

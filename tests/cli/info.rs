@@ -1,0 +1,183 @@
+//! `cangauge info`, and the two devices that are described by one TOML file each: HYDAC and JUMO.
+
+use super::{ALL, Bench};
+use serde_json::{Value, json};
+
+/// A setting of a list by its name.
+fn named<'a>(list: &'a Value, name: &str) -> &'a Value {
+    let list = list.as_array().expect("a list");
+    list.iter().find(|item| item["name"] == name).unwrap_or_else(|| panic!("no {name} in {list:?}"))
+}
+
+#[test]
+fn a_page_of_an_mh4() {
+    let channel = |number: u8, base: f64| {
+        format!("[[device.channel]]\nchannel = {number}\nbase = {base:?}\namplitude = 0.0\nnoise = 0.0\n")
+    };
+    let bench = Bench::described(&format!(
+        "[[device]]\nkind = \"mh4\"\nnode = 5\nset = {{ \"0x1017\" = 1000, \"0x61A0:1\" = 1 }}\n{}{}",
+        channel(1, 1.25),
+        channel(2, 25.5)
+    ));
+    let page = bench.run("info 5").exit(0).stdout;
+    for line in [
+        "node 5: WIKA MH-4-CAN",
+        "  revision     0x00010007 1.7",
+        "  bit rate                 250 kbit/s",
+        "  monitoring               heartbeat every 1000 ms",
+        "  emcy-inhibit-time        0.0 ms",
+        "  nmt-startup              0 the master starts the device",
+        "  register  0x00 no error",
+        "  history   empty",
+        "  pressure     1.25 bar   ok  range 0 to 10 bar",
+        "  temperature  25.5 degC  ok  range -40 to 125 degC",
+        "                            pressure                temperature",
+        "  ai-sensor-type            90 pressure transducer  100 temperature transducer",
+        "  ai-operating-mode         1 normal operation      1 normal operation",
+        "  ai-filter-type            1 moving average        -",
+        "  ai-interrupt-upper-limit  10 bar                  125 degC",
+        "  measuring-range-end       10 bar                  125 degC",
+        "  original-unit             bar                     degC",
+        "  minimum-pv                1.25 bar                25.5 degC",
+        "  TPDO1  0x185  sync:1  pressure 0x6130:1/32, pressure.status 0x6150:1/8",
+        "  bit-rate  3 250 kbit/s",
+        "  group 2   communication: on command",
+        "  not kept  original-unit",
+    ] {
+        assert!(page.lines().any(|found| found == line), "{line:?} is not in\n{page}");
+    }
+    assert!(page.lines().all(|line| line.chars().count() <= 100), "it fits a page:\n{page}");
+}
+
+#[test]
+fn every_device_has_its_page_and_one_object() {
+    let bench = Bench::of(&format!("{ALL},hydac@10,jumo@126"));
+    for node in [1, 2, 3, 10, 126, 127] {
+        let done = bench.run(&format!("info {node} -f json")).exit(0);
+        let objects = done.json();
+        assert_eq!((objects.len(), &objects[0]["node"]), (1, &json!(node)));
+        assert_eq!(done.stderr, "");
+        let csv = bench.run(&format!("info {node} -f csv")).exit(0).stdout;
+        assert!(csv.starts_with("node,object,name,value,text\n") && csv.lines().count() > 5);
+        assert_eq!(done.frames_of("000"), [""; 0], "nobody is started for it");
+        // Once it is recognised nothing is asked that it has not; these three are by their identity alone.
+        if ![1, 2, 127].contains(&node) {
+            continue;
+        }
+        let asked_in_vain = |frame: &&&str| frame.starts_with("80");
+        assert_eq!(done.frames_of(&format!("{:X}", 0x580 + node)).iter().filter(asked_in_vain).count(), 0, "{node}");
+    }
+}
+
+#[test]
+fn what_only_some_devices_have() {
+    let bench = Bench::of(ALL);
+    let page = |node: u8| bench.run(&format!("info {node} -f json")).exit(0).json().remove(0);
+    let dps = page(127);
+    assert_eq!(dps["calibrated"], "2016-04-01");
+    assert_eq!(named(&dps["own"], "span-overflow-count")["value"], 0);
+    assert_eq!(named(&dps["own"], "span-underflow-count")["object"], "0x2005:0");
+    assert_eq!(named(&dps["own"], "sensor-type")["text"], "2 gauge");
+    assert_eq!(named(&dps["own"], "pressure-span")["text"], "100.000 psi");
+    assert!(dps["store"]["not_kept"].as_array().expect("a list").contains(&json!("tpdo1-mapping")));
+    let d20 = page(2);
+    assert_eq!((&d20["calibrated"], &d20["produced"]), (&json!("2004-09-15"), &json!("2004-08-30")));
+    assert_eq!(named(&d20["own"], "user-device-name")["value"], "D209");
+    assert_eq!(named(&d20["communication"], "auto-operational")["text"], "0 the master starts the device");
+    assert_eq!(named(&d20["communication"], "guard-time")["text"], "off");
+    let settings = &d20["signals"][0]["settings"];
+    for (name, text) in [
+        ("ai-scaling-1-fv", "0"),
+        ("ai-scaling-1-pv", "0 bar"),
+        ("ai-scaling-2-fv", "10000"),
+        ("ai-scaling-2-pv", "16 bar"),
+        ("ai-input-offset", "0 bar"),
+        ("ai-adc-sample-rate", "1000 us"),
+    ] {
+        assert_eq!(named(settings, name)["text"], text, "{name}");
+    }
+    let mc1609 = page(3);
+    assert_eq!(mc1609["signals"].as_array().map(Vec::len), Some(16));
+    assert_eq!(named(&mc1609["signals"][15]["settings"], "ai-filter-type")["text"], "0 repeating average");
+}
+
+#[test]
+fn many_channels_are_gathered_by_value() {
+    let bench =
+        Bench::described("[[device]]\nkind = \"mc1609\"\nnode = 3\nset = { \"0x6110:2\" = 1, \"0x6110:5\" = 1 }\n");
+    let page = bench.run("info 3").exit(0).stdout;
+    let line = page.lines().find(|line| line.contains("ai-sensor-type")).expect("a line");
+    assert!(line.contains("2 thermocouple type K (ch1 ch3 ch4 ch6 "), "{line}");
+    assert!(line.contains(", 1 thermocouple type J (ch2 ch5)") || line.contains("(ch2 ch5)"), "{line}");
+    assert!(page.contains("ai-scaling-2-pv-i16   1372.0 degC\n"), "{page}");
+}
+
+#[test]
+fn guarding_is_told_against_the_heartbeat() {
+    let bench = Bench::described("[[device]]\nkind = \"d20\"\nnode = 2\nset = { \"0x100C\" = 100, \"0x100D\" = 3 }\n");
+    let page = bench.run("info 2 -f json").exit(0).json().remove(0);
+    assert_eq!(page["monitoring"], "node guarding every 100 ms, life time 300 ms");
+}
+
+#[test]
+fn silence_fails_and_refusals_do_not() {
+    let bench = Bench::of("mh4@5");
+    bench.run("info 9").exit(3);
+    // Taken for another device, most of what is asked for does not exist.
+    let done = bench.run("info 5 --device dps -f json").exit(0);
+    assert_eq!(done.json()[0]["calibrated"], Value::Null);
+    bench.run("info all").exit(2);
+}
+
+#[test]
+fn a_hydac_and_a_jumo_by_one_file_each() {
+    let bench = Bench::of("hydac@1,jumo@126");
+    let found = bench.run("scan -f json").exit(0).json();
+    assert_eq!((&found[0]["device"], &found[1]["device"]), (&json!("hydac"), &json!("jumo")));
+    let rows = bench.run("read all -f json").exit(0).json();
+    let signals: Vec<&str> = rows.iter().filter_map(|row| row["signal"].as_str()).collect();
+    assert_eq!(signals, ["pressure", "ch1", "ch2"]);
+    assert!(rows.iter().all(|row| row["status"] == "ok"));
+    let rows = bench.run("log 1,126 --duration 3s -f json").exit(0).json();
+    let of = |node: u8, signal: &str| rows.iter().filter(|row| row["node"] == node && row["signal"] == signal).count();
+    // 3601h goes out every second under the name of the signal; TPDO5 is off as delivered.
+    assert!((2..=3).contains(&of(1, "pressure")), "{}", of(1, "pressure"));
+    assert!(of(126, "ch1") >= 28, "{}", of(126, "ch1"));
+    assert_eq!(of(126, "ch2"), 0);
+}
+
+#[test]
+fn a_hydac_boots_operational_and_takes_its_node_id_with_1010h_4_alone() {
+    let bench = Bench::of("hydac@1");
+    let done = bench.run("log 1 --passive --device hydac --duration 3s -f json").exit(0);
+    assert!(done.stdout.lines().count() >= 2, "it sends before anybody has started it: {}", done.stderr);
+    bench.run("nmt startup 1").prints("auto\n");
+    let kept = Bench::described("[[device]]\nkind = \"hydac\"\nnode = 1\nset = { \"0x1F80\" = 12 }\n");
+    kept.run("nmt startup 1").prints("wait\n");
+    bench.run("sdo write 1 0x2003:2 9 --type u8").exit(0);
+    bench.run("unit 1 psi").exit(0);
+    bench.run("unit 1 kPa").fails(2, "cangauge: node 1: pressure takes bar, psi, not kPa\n");
+}
+
+#[test]
+fn the_fifth_tpdo_of_a_jumo() {
+    let bench = Bench::described("[[device]]\nkind = \"jumo\"\nnode = 126\nset = { \"0x1804:1\" = 0x1FF }\n");
+    let rows = bench.run("log 126 --duration 1s -f json").exit(0).json();
+    assert!(rows.iter().filter(|row| row["signal"] == "ch2").count() >= 8);
+    let done = bench.run("sdo write 126 0x1A00:1 0x91300220").exit(4);
+    assert!(done.stderr.contains("0x06010002"), "its mapping is fixed: {}", done.stderr);
+    let done = bench.run("sdo write 126 emcy-repeat-time 500 --verify").exit(0);
+    assert!(done.frames_of("67E").contains(&"22022000F4010000"), "written with 22h: {:?}", done.frames_of("67E"));
+}
+
+#[test]
+fn an_emergency_that_is_repeated_is_one() {
+    let overload = "[[device.overload]]\nchannel = 1\nfrom = \"1s\"\nuntil = \"6500ms\"\ndirection = \"high\"\n";
+    let bench = Bench::described(&format!("[[device]]\nkind = \"jumo\"\nnode = 126\n{overload}"));
+    let done = bench.run("log 126 --duration 9s -o run.csv").exit(0);
+    let sent: Vec<&str> = done.frames_of("0FE");
+    assert!((5..=7).contains(&sent.iter().filter(|frame| frame.starts_with("3050")).count()), "every second: {sent:?}");
+    assert_eq!(sent.iter().filter(|frame| frame.starts_with("0000")).count(), 1, "{sent:?}");
+    let told = done.stderr.lines().filter(|line| line.contains("sensor break or short circuit")).count();
+    assert_eq!(told, 1, "{}", done.stderr);
+}

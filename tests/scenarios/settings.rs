@@ -1,0 +1,195 @@
+//! Settings while single frames are lost, doubled and late: whatever is reported as done, the device holds.
+
+use cangauge::bus::faults::{FaultPlan, Faulty};
+use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::value::{DataType, Value};
+use cangauge::device::catalog;
+use cangauge::device::unit::Unit;
+use cangauge::master::{Master, Timing};
+use cangauge::sim::{Device, Direction, Overload, Setup};
+use cangauge::tasks::settings::filter::{FilterType, Wanted};
+use cangauge::tasks::settings::limits::Limit;
+use cangauge::tasks::settings::{self, errors, filter, limits, minmax, unit};
+use cangauge::tasks::{Failure, Kind};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+const PSI: Unit = Unit(0x00ab_0000);
+
+fn node() -> NodeId {
+    NodeId::new(5).expect("a node-ID")
+}
+
+/// What is done, and what the device must then hold.
+struct Deed {
+    name: &'static str,
+    run: fn(&mut Master<'_>, &mut settings::Device) -> Result<(), Failure>,
+    held: &'static [(u16, u8, DataType, Value)],
+}
+
+const DEEDS: [Deed; 4] = [
+    Deed {
+        name: "unit",
+        run: |master, device| unit::set(master, device, Some("pressure"), PSI).map(|_| ()),
+        held: &[(0x6131, 1, DataType::Unsigned(4), Value::Unsigned(0x00ab_0000))],
+    },
+    Deed {
+        name: "filter",
+        run: |master, device| {
+            let wanted = Wanted { kind: Some(FilterType::Moving), constant: Some(8), damping: None };
+            filter::set(master, device, None, wanted).map(|_| ())
+        },
+        held: &[
+            (0x61a0, 1, DataType::Unsigned(1), Value::Unsigned(1)),
+            (0x61a1, 1, DataType::Unsigned(2), Value::Unsigned(8)),
+        ],
+    },
+    Deed {
+        name: "limits",
+        run: |master, device| {
+            let wanted = [(Limit::Lower, 12.0), (Limit::Upper, 14.0)];
+            limits::set(master, device, "pressure", &wanted).map(|_| ())
+        },
+        held: &[(0x6134, 1, DataType::Real32, Value::Real32(12.0)), (0x6135, 1, DataType::Real32, Value::Real32(14.0))],
+    },
+    Deed {
+        name: "errors",
+        run: |master, device| errors::clear(master, device).map(|_| ()),
+        held: &[(0x1003, 0, DataType::Unsigned(1), Value::Unsigned(0))],
+    },
+];
+
+/// An MH-4 with an error in its history, behind these faults.
+fn bus(plan: FaultPlan) -> Faulty<MemoryBus> {
+    let mut setup = Setup::new(catalog::by_name("mh4").expect("built in"), node());
+    let (from, until) = (Duration::ZERO, Duration::from_millis(1));
+    setup.overloads = vec![(1, Overload { from, until, direction: Direction::High })];
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(250_000);
+    bus.attach(Device::new(setup).expect("a device"));
+    Faulty::new(bus, plan)
+}
+
+/// Does it, and tells how it ended; what is reported as done is held.
+fn run(deed: &Deed, plan: FaultPlan, retries: u32) -> Result<(), Failure> {
+    let told = format!("{} {plan:?}", deed.name);
+    let mut bus = bus(plan);
+    let mut master = Master::new(&mut bus, Timing { timeout: Duration::from_millis(100), retries });
+    let result = settings::Device::open(&mut master, node(), &BTreeMap::new())
+        .and_then(|mut device| (deed.run)(&mut master, &mut device));
+    let late = master.now() + Duration::from_secs(2);
+    while master.now() < late {
+        master.next(late).expect("the bus works");
+    }
+    if result.is_ok() {
+        for (index, sub, data_type, value) in deed.held {
+            let object = ObjectId::new(*index, *sub);
+            let found = master.read(node(), object, *data_type).expect("the bus works");
+            // A frame of the plan may lie in this reading; then it is asked once more.
+            let found = found.or_else(|_| master.read(node(), object, *data_type).expect("the bus works"));
+            assert_eq!(found.as_ref(), Ok(value), "{told}: {object}");
+        }
+    }
+    result
+}
+
+/// With one repeat it succeeds, unless the fault lies in the device's name: segments are not repeated.
+fn succeeds(deed: &Deed, plan: FaultPlan) {
+    if let Err(failure) = run(deed, plan, 1) {
+        assert!(in_the_name(&failure), "{}: {failure}", deed.name);
+    }
+}
+
+fn in_the_name(failure: &Failure) -> bool {
+    failure.object == Some(ObjectId::new(0x1008, 0))
+}
+
+/// Plans that hit one frame each, until one lies behind the end.
+fn each(make: impl Fn(u64) -> FaultPlan, mut judge: impl FnMut(&Deed, FaultPlan)) {
+    for deed in &DEEDS {
+        for number in 25..75 {
+            judge(deed, make(number));
+        }
+    }
+}
+
+#[test]
+fn undisturbed_they_all_succeed() {
+    for deed in &DEEDS {
+        assert_eq!(run(deed, FaultPlan::default(), 0), Ok(()), "{}", deed.name);
+    }
+}
+
+#[test]
+fn a_lost_frame_is_asked_for_again() {
+    each(|number| FaultPlan { lose: [number].into(), ..FaultPlan::default() }, succeeds);
+    each(|number| FaultPlan { lose_sent: [number].into(), ..FaultPlan::default() }, succeeds);
+}
+
+#[test]
+fn without_repeats_silence_is_no_success() {
+    let mut failed = 0;
+    each(
+        |number| FaultPlan { lose: [number].into(), ..FaultPlan::default() },
+        |deed, plan| {
+            if let Err(failure) = run(deed, plan, 0) {
+                assert_eq!(failure.kind, Kind::NoAnswer, "{}: {failure}", deed.name);
+                failed += 1;
+            }
+        },
+    );
+    assert!(failed > 40, "{failed}");
+}
+
+#[test]
+fn doubled_and_late_frames_are_no_answers_to_something_else() {
+    each(
+        |number| FaultPlan { duplicate: [number].into(), ..FaultPlan::default() },
+        |deed, plan| {
+            // The acknowledge of a write that comes twice is taken for a wrong answer to the reading behind it.
+            if let Err(failure) = run(deed, plan, 1) {
+                assert_eq!(failure.kind, Kind::Unexpected, "{}: {failure}", deed.name);
+            }
+        },
+    );
+    each(
+        |number| FaultPlan { delay: [(number, Duration::from_millis(150))].into(), ..FaultPlan::default() },
+        |deed, plan| {
+            if let Err(failure) = run(deed, plan, 1)
+                && !in_the_name(&failure)
+            {
+                assert_eq!(failure.kind, Kind::NoAnswer, "{}: {failure}", deed.name);
+            }
+        },
+    );
+}
+
+#[test]
+fn the_signature_of_a_reset_is_sent_once_and_its_silence_is_looked_into() {
+    let reset = |plan: FaultPlan| {
+        let mut bus = bus(plan);
+        let mut master = Master::new(&mut bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
+        let device = settings::Device::open(&mut master, node(), &BTreeMap::new())?;
+        // Something to forget.
+        for _ in 0..5 {
+            minmax::show(&mut master, &device)?;
+        }
+        minmax::reset(&mut master, &device)
+    };
+    assert_eq!(reset(FaultPlan::default()).map(|all| all.len()), Ok(2));
+    let mut lost = 0;
+    for number in 40..110 {
+        // The answer is lost: what the device reads then shows that it has been reset.
+        if let Err(failure) = reset(FaultPlan { lose: [number].into(), ..FaultPlan::default() }) {
+            assert!(in_the_name(&failure), "answer {number}: {failure}");
+        }
+        // The request is lost: nothing has been reset, and that is no success.
+        if let Err(failure) = reset(FaultPlan { lose_sent: [number].into(), ..FaultPlan::default() }) {
+            assert_eq!(failure.kind, Kind::NoAnswer, "request {number}: {failure}");
+            assert!(in_the_name(&failure) || failure.message.contains("write 0x2022"), "{failure}");
+            lost += u32::from(!in_the_name(&failure));
+        }
+    }
+    assert!((1..=2).contains(&lost), "one request a channel: {lost}");
+}
