@@ -72,10 +72,10 @@ fn every_example_on_the_simulated_bus_works() {
         let done = bench.finish(&mut bench.command(&words)).exit(0);
         assert!(!done.stdout.is_empty() || !bench.files().is_empty() || example.contains(" sdo write "), "{example}");
     };
-    // On the real clock, as people have it: side by side.
-    thread::scope(|scope| {
-        for example in examples.iter().filter(|example| !TOO_LONG.contains(&example.as_str())) {
-            scope.spawn(move || run(example));
-        }
-    });
+    // On the real clock, as people have it: side by side, yet not all at once, since a device that gets no turn
+    // on the processor is no device that answers in time.
+    let left: Vec<&String> = examples.iter().filter(|example| !TOO_LONG.contains(&example.as_str())).collect();
+    for some in left.chunks(6) {
+        thread::scope(|scope| some.iter().for_each(|example| drop(scope.spawn(|| run(example)))));
+    }
 }
