@@ -13,9 +13,9 @@ const ONLY: &[(&str, &str, &[&str])] = &[
     ("tasks", "bus", THE_TRAIT),
     ("measure", "bus", STAMPS),
     ("output", "bus", STAMPS),
-    ("output", "canopen", &["id", "value"]),
+    ("output", "canopen", &["id", "lss", "value"]),
     ("sim", "canopen", &["frame", "id", "object", "value", "wire_length"]),
-    ("cli", "canopen", &["emcy", "id", "nmt", "object", "value"]),
+    ("cli", "canopen", &["emcy", "id", "lss", "nmt", "object", "pdo", "value"]),
 ];
 
 /// The trait and what it speaks of; no transport.

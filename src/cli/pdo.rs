@@ -20,7 +20,7 @@ use std::str::FromStr;
 /// read back, or the old settings are put back and the refused write is named.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  cangauge -b sim pdo show 1\n  cangauge -b sim pdo map 1 1 pressure pressure.status --transmission timer --event-timer 100ms\n  cangauge -b sim pdo map 2 1 0x6130:1/32\n  cangauge -b sim pdo watch 127 --duration 2s"
+    after_help = "Examples:\n  cangauge -b sim pdo show 1\n  cangauge -b sim pdo map 1 1 pressure pressure.status --transmission timer --event-timer 100ms\n  cangauge -b sim pdo map 2 1 0x6130:1/32\n  cangauge pdo watch 127 --duration 10s"
 )]
 pub(crate) struct Pdo {
     #[command(subcommand)]

@@ -109,7 +109,7 @@ impl<'bus> Master<'bus> {
     /// What the interface says; it may then be down.
     pub fn set_bit_rate(&mut self, bit_rate: u32) -> Result<(), BusError> {
         self.sdo.cancel(&mut Vec::new());
-        self.outgoing = Outgoing::new();
+        self.outgoing.begin_anew();
         self.put_back = None;
         self.bus.set_bit_rate(bit_rate, crate::bus::Mode::Normal)
     }

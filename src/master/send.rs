@@ -51,6 +51,11 @@ impl Outgoing {
         is_new
     }
 
+    /// Forgets everything, and what it knew of the bus: that is at another bit rate now.
+    pub(super) fn begin_anew(&mut self) {
+        *self = Outgoing { rides_out: self.rides_out, ..Outgoing::new() };
+    }
+
     pub(super) fn ride_out(&mut self, rides_out: bool) {
         self.rides_out = rides_out;
     }

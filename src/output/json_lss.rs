@@ -2,8 +2,7 @@
 
 use super::json::line;
 use crate::canopen::id::NodeId;
-use crate::canopen::lss::LssAddress;
-use crate::tasks::lss::{Inquired, Report, Slave};
+use crate::tasks::lss::{Inquired, LssAddress, Report, Slave};
 use serde::Serialize;
 use std::io::{self, Write};
 

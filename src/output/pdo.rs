@@ -156,7 +156,7 @@ pub fn watched_json(out: &mut dyn Write, seen: &Line<'_>) -> io::Result<()> {
             raw: sample.raw.to_string(),
         })
     });
-    let time = text::utc(at.wall);
+    let time = text::utc(*at);
     line(out, &Pdo { time, node: node.get(), pdo: number.get(), values: values.collect() })
 }
 
@@ -166,7 +166,7 @@ pub fn watched_csv(out: &mut dyn Write, seen: &Line<'_>) -> io::Result<()> {
     let row = |sample: &Sample| {
         let source = sources.get(sample.source)?;
         Some(vec![
-            text::utc(at.wall),
+            text::utc(*at),
             node.to_string(),
             number.get().to_string(),
             source.signal.to_string(),
@@ -191,10 +191,10 @@ pub fn watched_text(out: &mut dyn Write, seen: &Line<'_>) -> io::Result<()> {
                 Some(words.iter().filter(|word| !word.is_empty()).copied().collect::<Vec<_>>().join(" "))
             };
             let values: Vec<String> = samples.iter().filter_map(value).collect();
-            writeln!(out, "{}  {node:>3}  {number}  {}", text::utc(at.wall), values.join("  "))
+            writeln!(out, "{}  {node:>3}  {number}  {}", text::utc(*at), values.join("  "))
         }
         Line::WrongLength { at, node, number, length } => {
-            let time = text::utc(at.wall);
+            let time = text::utc(*at);
             writeln!(out, "{time}  {node:>3}  {number}  {length} bytes, which is not the length of its mapping")
         }
         Line::Restarted(_) | Line::Nothing => Ok(()),

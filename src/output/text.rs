@@ -1,6 +1,6 @@
 //! Text for people.
 
-use crate::bus::Wall;
+use crate::bus::Stamp;
 use std::fmt::Write;
 
 /// Makes text that came from a device safe for a terminal: control characters, and the marks that turn
@@ -24,8 +24,8 @@ pub fn safe(text: &str) -> String {
 }
 
 /// A moment as RFC 3339 in UTC with microseconds.
-pub fn utc(at: Wall) -> String {
-    humantime::format_rfc3339_micros(at.system_time()).to_string()
+pub fn utc(at: Stamp) -> String {
+    humantime::format_rfc3339_micros(at.wall.system_time()).to_string()
 }
 
 /// A count with thousands separated: `124,310`.

@@ -18,6 +18,8 @@ use std::time::Duration;
 
 const NODE: u8 = 5;
 
+const TIMEOUT: Duration = Duration::from_millis(500);
+
 /// What happens at a frame that is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mishap {
@@ -247,11 +249,12 @@ impl Case {
         let mut master = Master::new(&mut meddler, Timing::default());
         let result = map(&mut master, &self.wish(), false, &Default::default());
         master.settle();
+        let took = meddler.bus.now().mono.since_start();
         // What is on the wire gets there.
         let soon = meddler.bus.now().mono + Duration::from_millis(200);
         while meddler.bus.receive(soon).unwrap() != Event::Timeout {}
         let state = meddler.bus.stations::<Device>().next().unwrap().state();
-        Outcome { result, held: held(&mut meddler.bus), state, sent: meddler.sent }
+        Outcome { result, held: held(&mut meddler.bus), state, sent: meddler.sent, took }
     }
 }
 
@@ -261,6 +264,17 @@ struct Outcome {
     held: Held,
     state: Option<State>,
     sent: Vec<Frame>,
+    took: Duration,
+}
+
+impl Outcome {
+    fn writes(&self) -> usize {
+        self.sent.iter().filter(|frame| is_write(frame)).count()
+    }
+}
+
+fn is_write(frame: &Frame) -> bool {
+    frame.id() == CanId::sdo_request(node()) && frame.data().first().is_some_and(|command| command >> 5 == 1)
 }
 
 /// What the device's own memory holds: COB-ID, transmission type, event timer, mapping.
@@ -280,8 +294,11 @@ fn held(bus: &mut MemoryBus) -> Held {
 }
 
 /// That what is said is what the device holds.
-fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Held, new: &Held) {
-    let Outcome { result, held, state, .. } = case.run(start, mishap, at);
+fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Held, well: &Outcome) {
+    let outcome = case.run(start, mishap, at);
+    let (sent, took) = (outcome.writes(), outcome.took);
+    let Outcome { result, held, state, .. } = outcome;
+    let new = &well.held;
     let what = format!("{} (started: {start}), {mishap:?} at {at}: {result:?}\n{held:X?}", case.device);
     match &result {
         Ok(_) => assert_eq!(&held, new, "{what}"),
@@ -299,6 +316,17 @@ fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Held, new: &
                 assert_eq!(failure.kind, Kind::Interrupted, "{what}");
             }
         }
+    }
+    // Neither a text in segments nor an NMT command is sent again.
+    let asked = at >= well.sent.iter().position(is_read_back).unwrap() && well.sent[at].id() != CanId::NMT;
+    match mishap {
+        // What is lost is asked for again; a write that has arrived is not sent again.
+        Mishap::LoseRequest | Mishap::LoseAnswer if !asked => {}
+        Mishap::LoseRequest => assert!(result.is_ok(), "{what}"),
+        Mishap::LoseAnswer => assert_eq!((result.is_ok(), sent), (true, well.writes()), "{what}"),
+        // Nothing is waited for in vain.
+        Mishap::Interrupt | Mishap::InterruptTwice => assert!(took < well.took + TIMEOUT, "{took:?}: {what}"),
+        _ => {}
     }
     let resets = matches!(mishap, Mishap::ResetBefore | Mishap::ResetAfter | Mishap::Gone);
     if !resets {
@@ -324,9 +352,8 @@ fn everywhere(mishaps: &[Mishap]) {
         for &start in starts {
             let old = held(&mut case.bus(start));
             let well = case.run(start, Mishap::None, 0);
-            let new = well.held;
-            assert!(well.result.is_ok_and(|mapped| mapped.writes > 0), "{}", case.device);
-            assert_ne!(old, new);
+            assert!(well.result.as_ref().is_ok_and(|mapped| mapped.writes > 0), "{}", case.device);
+            assert_ne!(old, well.held);
             // Finding out what the device is goes alike everywhere: twice is enough.
             let first = well.sent.iter().position(is_read_back).unwrap();
             let begin = if number < 2 { 0 } else { first };
@@ -341,7 +368,7 @@ fn everywhere(mishaps: &[Mishap]) {
                     if mishap == Mishap::ResetAfter && at >= last || mishap == Mishap::ResetBefore && at > last {
                         continue;
                     }
-                    check(case, start, mishap, at, &old, &new);
+                    check(case, start, mishap, at, &old, &well);
                 }
             }
         }
@@ -391,10 +418,7 @@ fn a_device_that_is_gone_at_every_step() {
 fn the_right_steps_in_the_right_order() {
     let writes = |case: &Case, start| {
         let sent = case.run(start, Mishap::None, 0).sent;
-        let is_step = |frame: &&Frame| {
-            let is_write = frame.id() == CanId::sdo_request(node()) && frame.data()[0] >> 5 == 1;
-            is_write || frame.id() == CanId::NMT
-        };
+        let is_step = |frame: &&Frame| is_write(frame) || frame.id() == CanId::NMT;
         sent.iter().filter(is_step).map(|frame| frame.to_string()).collect::<Vec<_>>()
     };
     assert_eq!(

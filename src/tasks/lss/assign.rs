@@ -6,7 +6,7 @@ use super::objects::by_objects;
 use super::presence::taken;
 use super::progress::{Done, Stage};
 use super::retime::{Host, Retiming};
-use super::session::{prepared, put_back};
+use super::session::{Session, prepared, put_back};
 use super::subject::{Knowledge, Subject, subject};
 use super::ways::{PlannedRate, Rate, plan_rate, way};
 use super::{Note, Target, Tell, Via};
@@ -90,7 +90,7 @@ pub struct Report {
 /// Why it was not done, what has been done and how to go on. Nothing is a success that the device has not shown.
 pub fn assign(master: &mut Master<'_>, job: &Job<'_>, tell: Tell<'_>) -> Result<Report, Failure> {
     let knowledge = Knowledge { overrides: job.overrides, given: job.given.as_ref() };
-    let subject = subject(master, &job.target, &knowledge, job.force, tell)?;
+    let subject = subject(master, &job.target, &knowledge, (job.via, job.force), tell)?;
     let way = way(&subject, job.via, tell)?;
     let description = subject.model.as_ref().map(|model| &model.description);
     let rate = job.rate.map(|rate| plan_rate(description, rate, way.way)).transpose()?;
@@ -156,19 +156,24 @@ fn carry_out(
             return Ok(report);
         }
     }
+    // Reset, it would come back at a bit rate at which nobody here hears it.
+    let new = job.id.filter(|_| follows || !host.is_left_behind());
     let booted = match way.way {
-        AssignWay::Lss => by_lss(master, job, subject, way, rate.filter(|_| !follows), done, tell)?,
+        AssignWay::Lss => {
+            let session = by_lss(master, job, subject, way, rate.filter(|_| !follows), done, tell)?;
+            // A reset puts the NMT state to rights by itself.
+            if new.is_none() {
+                put_back(master, session.before, tell);
+            }
+            new.is_some_and(|new| session.booted.contains(&new))
+        }
         AssignWay::Objects => {
             by_objects(master, subject, way, job.store, done)?;
             false
         }
     };
     tell(Note::Step(done.spoken()));
-    let Some(new) = job.id else { return Ok(report) };
-    if host.is_left_behind() && !follows {
-        // Reset, it would come back at a bit rate at which nobody here hears it.
-        return Ok(report);
-    }
+    let Some(new) = new else { return Ok(report) };
     let reset = match (subject.node.filter(|_| subject.alone), subject.unconfigured) {
         (Some(node), _) => Some(node),
         (None, true) => None,
@@ -190,7 +195,7 @@ fn not_reset(subject: &Subject, new: NodeId) -> Failure {
     subject.failure(Kind::Unexpected, message)
 }
 
-/// Configures and stores by LSS. Returns whether the boot-up under the new node-ID has been seen already.
+/// Configures and stores by LSS.
 fn by_lss(
     master: &mut Master<'_>,
     job: &Job<'_>,
@@ -199,20 +204,15 @@ fn by_lss(
     rate: Option<PlannedRate>,
     done: &mut Done,
     tell: Tell<'_>,
-) -> Result<bool, Failure> {
+) -> Result<Session<()>, Failure> {
     let old_rate = old_index(master, subject);
-    let session = prepared(master, subject, way, tell, |lss| {
+    prepared(master, subject, way, tell, |lss| {
         let result = configure(lss, job, rate, done).map_err(|error| subject.lss_failure(error));
         if result.is_err() && done.is_pending() {
             undo(lss, subject, old_rate, done);
         }
         result
-    })?;
-    // A reset puts the NMT state to rights by itself.
-    if job.id.is_none() {
-        put_back(master, session.before, tell);
-    }
-    Ok(job.id.is_some_and(|id| session.booted.contains(&id)))
+    })
 }
 
 /// The index of the bit rate at which the device works at the moment.

@@ -26,7 +26,8 @@ pub use single::{Inquired, Named, activate, inquire, store};
 pub use ways::{Rate, check_rate};
 
 use crate::canopen::id::NodeId;
-use crate::canopen::lss::{LssAddress, LssAddressError};
+use crate::canopen::lss::LssAddressError;
+pub use crate::canopen::lss::{LssAddress, LssRange};
 use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;

@@ -120,14 +120,15 @@ impl<'a> Retiming<'a> {
             (Ok(session), Some(_)) => session.before,
             (Ok(_), None) => return Err(subject.failure(Kind::Unexpected, "it was not activated")),
             (Err(failure), None) => return Err(failure),
-            (Err(failure), Some(_)) => return Err(self.go_back(master, failure, None, done, tell)),
+            (Err(failure), Some(_)) => return Err(self.go_back(master, failure, (master.now(), None), done, tell)),
         };
         let begun = activated.unwrap_or_else(|| master.now());
         let (name, new) = (subject.name(), spoken_rate(self.new));
         tell(Note::Step(format!("{name} goes to {new} in {DELAY_MS} ms, this side too")));
-        if let Err(failure) = self.follow(master, begun) {
-            return Err(self.go_back(master, failure, before, done, tell));
-        }
+        let followed = self.follow(master, begun);
+        let followed = followed.map_err(|failure| self.go_back(master, failure, (begun, before), done, tell));
+        master.ride_out(false);
+        followed?;
         done.retimed = true;
         tell(Note::Step(format!("{name} answers at {new}")));
         if self.job.id.is_some() {
@@ -150,6 +151,8 @@ impl<'a> Retiming<'a> {
 
     /// Follows the device to the new rate, and looks for it there.
     fn follow(&self, master: &mut Master<'_>, begun: Mono) -> Result<(), Failure> {
+        // Where the device is not, nobody acknowledges.
+        master.ride_out(true);
         wait(master, begun + DELAY + MARGIN)?;
         set(master, self.new)?;
         wait(master, begun + DELAY * 2 + MARGIN)?;
@@ -165,7 +168,7 @@ impl<'a> Retiming<'a> {
         &self,
         master: &mut Master<'_>,
         failure: Failure,
-        before: Option<Before>,
+        (begun, before): (Mono, Option<Before>),
         done: &mut Done,
         tell: Tell<'_>,
     ) -> Failure {
@@ -177,6 +180,8 @@ impl<'a> Retiming<'a> {
                 format!("{}; and this side could not be set back to {old}: {}", failure.message, error.message);
             return Failure { message, ..failure }.hint(by_hand(master.bus().name(), Some(self.old)));
         }
+        // Until then it may be at the old rate and on its way to the new one. A second Ctrl-C ends the waiting.
+        let _ = wait(master, begun + DELAY * 2 + MARGIN);
         if !matches!(is_there(master, subject, subject.node), Ok(true)) {
             let message = format!("{}; this side is back at {old}", failure.message);
             let hint = format!("nothing was stored: power off and on brings the device back to {old}");
@@ -212,7 +217,10 @@ impl<'a> Retiming<'a> {
         wait(master, settled)?;
         set(master, self.new)?;
         done.retimed = true;
-        if is_there(master, subject, self.job.id.or(subject.node))? {
+        master.ride_out(true);
+        let found = is_there(master, subject, self.job.id.or(subject.node));
+        master.ride_out(false);
+        if found? {
             return Ok(());
         }
         let back = match set(master, self.old) {

@@ -31,7 +31,7 @@ fn find(
     force: bool,
     tell: Tell<'_>,
 ) -> Result<Subject, Failure> {
-    subject(master, target, &Knowledge { overrides, given }, force, tell)
+    subject(master, target, &Knowledge { overrides, given }, (Via::Lss, force), tell)
 }
 
 /// Asks a slave for its identity and node-ID by LSS.

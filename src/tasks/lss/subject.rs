@@ -3,10 +3,11 @@
 use super::only::{known_service, only};
 use super::presence::{Presence, only_one, presence};
 use super::session::{Reach, configured};
-use super::{Note, Target, Tell};
+use super::{Note, Target, Tell, Via};
 use crate::bus::Filters;
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
+use crate::device::assign::AssignWay;
 use crate::device::catalog::{self, Model};
 use crate::master::Master;
 use crate::measure::survey::{Overrides, recognised};
@@ -65,6 +66,16 @@ impl Subject {
         }
     }
 
+    /// Whether it is LSS by which it takes its node-ID.
+    fn uses_lss(&self, via: Via) -> bool {
+        let way = self.model.as_ref().and_then(|model| model.description.assign_way());
+        match via {
+            Via::Auto => way.is_none_or(|way| way.way == AssignWay::Lss),
+            Via::Lss => true,
+            Via::Sdo => false,
+        }
+    }
+
     /// A failure of this device.
     pub(super) fn failure(&self, kind: Kind, message: impl fmt::Display) -> Failure {
         Failure { node: self.node, ..Failure::new(kind, format!("{}: {message}", self.name())) }
@@ -100,7 +111,8 @@ impl Knowledge<'_> {
     }
 }
 
-/// Finds the device that is meant. Nothing is changed by it, and configuration state is left again.
+/// Finds the device that is meant. Nothing is changed by it, and configuration state is left again. `force` is for
+/// [`Target::Only`].
 ///
 /// # Errors
 /// Nobody there, more than one device, none that can be told from another.
@@ -108,16 +120,26 @@ pub(super) fn subject(
     master: &mut Master<'_>,
     target: &Target,
     knowledge: &Knowledge<'_>,
-    force: bool,
+    (via, force): (Via, bool),
     tell: Tell<'_>,
 ) -> Result<Subject, Failure> {
     match target {
         Target::Node(node) => {
             let address = only_one(master, *node)?;
+            nobody_alike(master, address, Some(*node))?;
             let (reach, node, address) = (Reach::Selective(address), Some(*node), Some(address));
             let subject = Subject { address, node, unconfigured: false, alone: true, model: None, reach };
             let model = knowledge.model(master, &subject)?;
-            Ok(Subject { model, ..subject })
+            let subject = Subject { model, ..subject };
+            if subject.uses_lss(via)
+                && let Ok(Some(told)) = told(master, &subject)?
+                && told != node
+            {
+                let told = told.map_or_else(|| "has no node-ID".to_owned(), |told| format!("is node {told}"));
+                let message = format!("by LSS the device with its identity {told}: nothing was changed");
+                return Err(subject.failure(Kind::CheckFailed, message).hint(ALONE));
+            }
+            Ok(subject)
         }
         Target::Address(address) => addressed(master, *address, knowledge, tell),
         Target::Only => only(master, knowledge, force, tell),
@@ -136,6 +158,8 @@ pub(super) fn subject(
             })?;
             let (reach, address) = (Reach::Selective(address), Some(address));
             let subject = Subject { address, node: None, unconfigured: true, alone: false, model: None, reach };
+            // Another one that has a node-ID and the same identity shows itself here.
+            let _ = told(master, &subject)?;
             let model = knowledge.model(master, &subject)?;
             Ok(Subject { model, ..subject })
         }
@@ -152,22 +176,17 @@ fn addressed(
     let reach = Reach::Selective(address);
     let mut subject =
         Subject { address: Some(address), node: None, unconfigured: false, alone: false, model: None, reach };
-    let mut told = None;
     // A device that wants another NMT state first does not answer here; SDO may show it all the same.
-    let silence = match configured(master, &subject, |lss| {
-        let node = known_service(lss.inquire_node_id()).map_err(|error| subject.lss_failure(error))?;
-        told = node.and_then(|node| node.answers.first().copied());
-        Ok(())
-    }) {
-        Ok(_) => None,
-        Err(failure) if failure.kind == Kind::NoAnswer => Some(failure),
-        Err(failure) => return Err(failure),
+    let (silence, told) = match told(master, &subject)? {
+        Ok(told) => (None, told),
+        Err(silence) => (Some(silence), None),
     };
     match told {
         Some(Some(node)) => subject.node = Some(node),
         Some(None) => subject.unconfigured = true,
-        None => subject.node = place_of(master, address)?,
+        None => subject.node = alike(master, address)?.first().copied(),
     }
+    nobody_alike(master, address, subject.node)?;
     if let Some(node) = subject.node {
         match presence(master, node)? {
             Presence::One(found) if found == address => subject.alone = true,
@@ -184,17 +203,48 @@ fn addressed(
     Ok(subject)
 }
 
-/// Where SDO finds a device with this identity.
-fn place_of(master: &mut Master<'_>, address: LssAddress) -> Result<Option<NodeId>, Failure> {
+/// The node-ID that the device with an identity tells by LSS; `Some(None)` of one that has none, `None` where it does not
+/// know the question. The inner error is that nobody answers to the identity: some devices do so in one NMT state only.
+///
+/// # Errors
+/// [`Kind::CheckFailed`] where more than one answers; what stops everything.
+fn told(master: &mut Master<'_>, subject: &Subject) -> Result<Result<Option<Option<NodeId>>, Failure>, Failure> {
+    let asked = configured(master, subject, |lss| {
+        known_service(lss.inquire_node_id()).map_err(|error| subject.lss_failure(error))
+    });
+    let told = match asked {
+        Ok(session) => session.done,
+        Err(failure) if failure.kind == Kind::NoAnswer => return Ok(Err(failure)),
+        Err(failure) => return Err(failure),
+    };
+    match told {
+        Some(told) if !told.is_one() => {
+            let message = "more than one device answers to its identity: nothing was changed";
+            Err(subject.failure(Kind::CheckFailed, message).hint(ALONE))
+        }
+        told => Ok(Ok(told.and_then(|told| told.answers.first().copied()))),
+    }
+}
+
+/// The way out where one identity is that of several.
+const ALONE: &str = "connect the one you mean alone";
+
+/// Where SDO finds devices with this identity.
+fn alike(master: &mut Master<'_>, address: LssAddress) -> Result<Vec<NodeId>, Failure> {
     let found = everybody_described(master)?;
-    Ok(found
-        .iter()
-        .find(|found| {
-            let identity = &found.instrument.identity;
-            let parts = [identity.vendor, identity.product, identity.revision, identity.serial];
-            parts == address.parts().map(Some)
-        })
-        .map(|found| found.node))
+    let is_alike = |found: &&Found| {
+        let identity = &found.instrument.identity;
+        [identity.vendor, identity.product, identity.revision, identity.serial] == address.parts().map(Some)
+    };
+    Ok(found.iter().filter(is_alike).map(|found| found.node).collect())
+}
+
+/// Refuses an identity that another node has, too: whoever is addressed by it is more than one. There are makers who
+/// give every device the same serial number.
+fn nobody_alike(master: &mut Master<'_>, address: LssAddress, node: Option<NodeId>) -> Result<(), Failure> {
+    let Some(other) = alike(master, address)?.into_iter().find(|&other| Some(other) != node) else { return Ok(()) };
+    let message = format!("node {other} has the identity {address}, too: nothing was changed");
+    Err(Failure::new(Kind::CheckFailed, message).hint(ALONE))
 }
 
 /// Every node that shows itself to an SDO scan.

@@ -4,12 +4,14 @@
 //! entries 0, the entries, their number, the other parameters, the PDO on. What was asked for is read back, or
 //! the old settings are put back: nobody is left with half a mapping without being told.
 
+mod change;
 mod device;
 mod identifiers;
 mod map;
 mod mend;
 mod nmt;
 mod plan;
+mod report;
 mod settings;
 mod show;
 mod watch;

@@ -87,6 +87,22 @@ fn two_devices_with_one_node_id() {
 }
 
 #[test]
+fn one_of_two_with_one_node_id_that_tells_it() {
+    let twins = "device = [
+        { kind = 'mh4', node = 5, serial = 100, twin = true }, { kind = 'mh4', node = 5, serial = 200, twin = true },
+    ]";
+    let mut bus = bus(twins);
+    let mut expected = all_held(&bus);
+    let done = run(&mut bus, "0x47:1:0x10007:200", &id(12));
+    assert_eq!(done.failure().0, Kind::Unexpected);
+    assert!(done.failure().1.contains("another device has node-ID 5 too"), "{}", done.failure().1);
+    assert!(done.warns("it is not reset"), "{:?}", done.notes);
+    // Reset, it would be at 12 now, and the other one would have lost what it was doing.
+    expected[1].2 = Some(12);
+    assert_eq!(all_held(&bus), expected);
+}
+
+#[test]
 fn unconfigured_devices_one_after_the_other() {
     let mut bus =
         bus("device = [{ kind = 'mh4', serial = 9 }, { kind = 'mh4', node = 6 }, { kind = 'mh4', serial = 4 }]");
@@ -170,6 +186,24 @@ fn without_a_serial_number_it_cannot_be_told_from_another() {
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::CheckFailed);
     assert!(done.failure().1.contains("no serial number"), "{}", done.failure().1);
+}
+
+#[test]
+fn two_devices_with_one_identity() {
+    let mut bus = bus("device = [{ kind = 'mh4', node = 5, serial = 7 }, { kind = 'mh4', node = 6, serial = 7 }]");
+    let before = all_held(&bus);
+    for target in ["5", "6", "0x47:1:0x10007:7"] {
+        let done = run(&mut bus, target, &id(12));
+        assert_eq!(done.failure().0, Kind::CheckFailed, "{target}: {:?}", done.failure());
+        assert!(done.failure().1.ends_with("nothing was changed"), "{}", done.failure().1);
+    }
+    assert_eq!(all_held(&bus), before);
+    // One of them has no node-ID, so that SDO does not show it: both answer to their address.
+    let mut bus = super::bus("device = [{ kind = 'mh4', node = 5, serial = 7 }, { kind = 'mh4', serial = 7 }]");
+    let before = all_held(&bus);
+    let done = run(&mut bus, "5", &id(12));
+    assert_eq!(done.failure().0, Kind::CheckFailed, "{:?}", done.failure());
+    assert_eq!(all_held(&bus), before);
 }
 
 #[test]
