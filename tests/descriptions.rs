@@ -467,3 +467,25 @@ fn hydac_keeps_its_node_id_with_1010h_4_alone() {
         });
     }
 }
+
+/// The codes as the manuals print them: MH-4 3.3.4, D-20-9 page 7, DPS table 23.
+#[test]
+fn the_abort_codes_of_the_manuals() {
+    let cases: [(&str, u16, u8, &[u8], u32); 9] = [
+        ("mh4", 0x61a0, 1, &[3], TOO_HIGH),
+        ("mh4", 0x6131, 1, &[0, 0, 0x22, 3], VALUE),
+        ("mh4", 0x1010, 1, b"evas", NOT_STORED),
+        ("mh4", 0x6148, 1, &[0; 4], READ_ONLY),
+        ("d20", 0x1800, 2, &[250], VALUE),
+        ("d20", 0x1010, 1, b"evas", NOT_STORED),
+        ("dps", 0x6131, 1, &[0, 0, 0x22, 6], TOO_HIGH),
+        ("dps", 0x1010, 1, b"evas", GENERAL),
+        ("dps", 0x6132, 1, &[2], READ_ONLY),
+    ];
+    for (name, index, sub, bytes, code) in cases {
+        let model = cangauge::device::catalog::by_name(name).expect("built in");
+        with_desk(&model, |desk| {
+            assert_eq!(desk.write(ObjectId::new(index, sub), bytes), Err(code), "{name} {index:04X}h:{sub}");
+        });
+    }
+}

@@ -1,7 +1,9 @@
 //! Settings while single frames are lost, doubled and late: whatever is reported as done, the device holds.
 
 use cangauge::bus::faults::{FaultPlan, Faulty};
-use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
+use cangauge::bus::time::Mono;
+use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::value::{DataType, Value};
@@ -192,4 +194,70 @@ fn the_signature_of_a_reset_is_sent_once_and_its_silence_is_looked_into() {
         }
     }
     assert!((1..=2).contains(&lost), "one request a channel: {lost}");
+}
+
+/// A device that acknowledges every write and keeps nothing.
+struct Deaf;
+
+impl Station for Deaf {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+        let [command, low, high, sub, ..] = *frame.data() else { return };
+        let address = format!("{low:02X}{high:02X}{sub:02X}");
+        let answer = match (command, address.as_str()) {
+            (0x40, "001000") => format!("43{address}94010200"),
+            (0x40, "306100") => format!("4F{address}01000000"),
+            (0x40, "306101") => format!("43{address}0000803F"),
+            (0x40, "316101") => format!("43{address}00004E00"),
+            (0x40, "336101") => format!("43{address}00000000"),
+            (0x40, "A06101") => format!("4F{address}00000000"),
+            (0x40, "031000") => format!("4F{address}01000000"),
+            (0x40, "031001") => format!("43{address}01F00000"),
+            (0x40, _) => format!("80{address}00000206"),
+            (0x20..=0x2f, _) => format!("60{address}00000000"),
+            _ => return,
+        };
+        out.send(format!("585#{answer}").parse().expect("a frame"));
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn an_acknowledge_is_no_proof() {
+    let refused = |deed: fn(&mut Master<'_>, &mut settings::Device) -> Result<(), Failure>| {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(Deaf);
+        let mut master = Master::new(&mut bus, Timing::default());
+        let mut device = settings::Device::open(&mut master, node(), &BTreeMap::new()).expect("it answers");
+        let failure = deed(&mut master, &mut device).expect_err("nothing is kept");
+        assert_eq!(failure.kind, Kind::Unexpected, "{failure}");
+        failure.message
+    };
+    assert_eq!(
+        refused(|master, device| unit::set(master, device, None, PSI).map(|_| ())),
+        "node 5: 0x6131:1 was acknowledged and reads 5111808"
+    );
+    assert_eq!(
+        refused(|master, device| {
+            let wanted = Wanted { kind: Some(FilterType::Moving), ..Wanted::default() };
+            filter::set(master, device, None, wanted).map(|_| ())
+        }),
+        "node 5: 0x61A0:1 was acknowledged and reads 0"
+    );
+    assert_eq!(
+        refused(|master, device| limits::set(master, device, "ch1", &[(Limit::Delta, 0.5)]).map(|_| ())),
+        "node 5: 0x6133:1 was acknowledged and reads 0"
+    );
+    assert_eq!(
+        refused(|master, device| errors::clear(master, device).map(|_| ())),
+        "node 5: 0x1003:0 was acknowledged, and the history still holds 1"
+    );
 }
