@@ -107,7 +107,9 @@ impl LssCommand {
             Action::Set(args) => args.run(global),
             Action::Activate(args) => args.run(global),
             Action::Store(args) => {
-                with_named(global, |master, named, tell| Ok(store(master, &args.target, named, args.force, tell)?))
+                with_named(global, |master, named, tell| Ok(store(master, &args.target, named, args.force, tell)?))?;
+                global.console().note("stored: the device acknowledged it");
+                Ok(())
             }
             Action::Identify(args) => args.run(global),
         }

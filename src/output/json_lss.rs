@@ -101,7 +101,7 @@ pub fn report(out: &mut dyn Write, report: &Report) -> io::Result<()> {
         });
         stale.collect()
     });
-    let rate = report.rate.map(|(bit_rate, table_index)| Rate { bit_rate, table_index, retimed: report.retimed });
+    let rate = report.rate.map(|rate| Rate { bit_rate: rate.bits, table_index: rate.index, retimed: report.retimed });
     let done = Done {
         target: report.target.to_string(),
         old: report.old.map(NodeId::get),

@@ -1,7 +1,6 @@
 //! `cangauge lss set-id`, `set-bitrate` and `set`.
 
 use super::{Descriptions, say};
-use crate::bus::time::spoken;
 use crate::canopen::id::NodeId;
 use crate::cli::args::{BusSpec, Nodes, Rate as BitRate};
 use crate::cli::exit::{Several, stdout};
@@ -9,7 +8,7 @@ use crate::cli::{Format, Global};
 use crate::output::json_lss;
 use crate::tasks::failure::together;
 use crate::tasks::host::by_hand;
-use crate::tasks::lss::{Job, Rate, Report, Target, Via, assign, check_rate};
+use crate::tasks::lss::{Job, PlannedRate, Rate, Report, Target, Via, assign, check_rate};
 use crate::tasks::{Failure, Kind};
 use clap::{Args, ValueEnum};
 use std::io::{self, Write};
@@ -207,10 +206,7 @@ fn tell(global: &Global, report: &Report, bus: &str) -> anyhow::Result<()> {
     match global.format {
         Format::Json => json_lss::report(&mut out, report),
         Format::Csv | Format::Text => {
-            let rate = report.rate.map(|(bits, index)| match bits {
-                Some(bits) => bits.to_string(),
-                None => format!("index {index}"),
-            });
+            let rate = report.rate.map(PlannedRate::bare);
             let numbers: Vec<String> = report.new.map(|new| new.to_string()).into_iter().chain(rate).collect();
             writeln!(out, "{}", numbers.join(if global.format == Format::Csv { "," } else { " " }))
         }
@@ -220,7 +216,7 @@ fn tell(global: &Global, report: &Report, bus: &str) -> anyhow::Result<()> {
     let console = global.console();
     if let (Some(new), Some(ids)) = (report.new, &report.cob_ids) {
         let boot = match report.boot {
-            Some(after) => format!("boot-up from {new} after {}, identity confirmed", spoken(after)),
+            Some(after) => format!("boot-up from {new} after {:.2} s, identity confirmed", after.as_secs_f64()),
             None => format!("{new} answers, identity confirmed; no boot-up was seen"),
         };
         let tpdos = ids.tpdos.iter().map(|(number, id)| format!("TPDO{number} is at 0x{id}"));
@@ -241,11 +237,14 @@ fn tell(global: &Global, report: &Report, bus: &str) -> anyhow::Result<()> {
 
 /// What has to happen to the host's interface.
 fn host_has_to_follow(global: &Global, report: &Report, bus: &str, rate: &str) -> String {
-    let bits = report.rate.and_then(|(bits, _)| bits);
+    let bits = report.rate.and_then(|rate| rate.bits);
     let side = match (&global.bus, bits) {
         (Some(BusSpec::SocketCan(_)) | None, Some(bits)) => by_hand(bus, Some(bits)),
         _ => format!("this side to {rate}"),
     };
+    if report.rate.is_some_and(|rate| rate.is_auto) {
+        return "it finds out the bit rate of the bus once it has started again: power it off and on".to_owned();
+    }
     if report.stored {
         format!("bit rate {rate} is in force when the device starts again: power it off; {side}; power it on")
     } else {

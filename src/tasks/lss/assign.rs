@@ -12,7 +12,7 @@ use super::ways::{PlannedRate, Rate, plan_rate, way};
 use super::{Note, Target, Tell, Via};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
-use crate::device::assign::{AssignEntry, AssignWay, RateSource, RateTable, spoken_rate};
+use crate::device::assign::{AssignEntry, AssignWay, RateSource, RateTable};
 use crate::device::catalog::Model;
 use crate::master::{Lss, LssError, Master};
 use crate::measure::survey::Overrides;
@@ -67,7 +67,7 @@ pub struct Report {
     /// Its node-ID now.
     pub new: Option<NodeId>,
     /// The bit rate that was set, in bit/s where it is known, and its index.
-    pub rate: Option<(Option<u32>, u8)>,
+    pub rate: Option<PlannedRate>,
     /// Whether the host is at the new bit rate, too.
     pub retimed: bool,
     /// Whether it lasts.
@@ -102,7 +102,7 @@ pub fn assign(master: &mut Master<'_>, job: &Job<'_>, tell: Tell<'_>) -> Result<
     }
     check_free(master, job, &subject)?;
     tell(Note::Step(introduction(&subject, job)));
-    let mut done = Done::of(job.id, rate.map(|rate| (rate.bits, rate.index)));
+    let mut done = Done::of(job.id, rate);
     let result = carry_out(master, job, &subject, &way, rate, &mut done, tell);
     result.map_err(|failure| done.explain(failure, &subject))
 }
@@ -135,7 +135,7 @@ fn carry_out(
         target: job.target.clone(),
         old: subject.node,
         new: job.id,
-        rate: rate.map(|rate| (rate.bits, rate.index)),
+        rate,
         retimed: false,
         stored: job.store,
         confirmed: Confirmed::Acknowledge,
@@ -227,7 +227,7 @@ fn configure(lss: &mut Lss<'_, '_>, job: &Job<'_>, rate: Option<PlannedRate>, do
         *stage = stage_of(&result);
         result?;
     }
-    if let (Some(rate), Some((_, _, stage))) = (rate, &mut done.rate) {
+    if let (Some(rate), Some((_, stage))) = (rate, &mut done.rate) {
         let result = job.forced(lss.configure_bit_timing(0, rate.index));
         *stage = stage_of(&result);
         result?;
@@ -260,7 +260,7 @@ fn undo(lss: &mut Lss<'_, '_>, subject: &Subject, old_rate: Option<u8>, done: &m
     {
         *stage = Stage::Undone;
     }
-    if let (Some((_, _, stage)), Some(index)) = (&mut done.rate, old_rate)
+    if let (Some((_, stage)), Some(index)) = (&mut done.rate, old_rate)
         && is_open(*stage)
         && !done.retimed
         && lss.configure_bit_timing(0, index).is_ok()
@@ -277,7 +277,7 @@ impl Report {
 
     /// The bit rate that was set, in words.
     pub fn rate_spoken(&self) -> Option<String> {
-        self.rate.map(|(bits, index)| bits.map_or_else(|| format!("index {index}"), spoken_rate))
+        self.rate.map(|rate| rate.to_string())
     }
 
     /// The description's short name.

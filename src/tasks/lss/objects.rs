@@ -32,7 +32,7 @@ pub(super) fn by_objects(
     };
     let id = done.id.map(|(id, _)| place(subject, way.node_id, "node-ID").map(|at| (at, id.get()))).transpose()?;
     let rate =
-        done.rate.map(|(_, index, _)| place(subject, way.bit_rate, "bit rate").map(|at| (at, index))).transpose()?;
+        done.rate.map(|(rate, _)| place(subject, way.bit_rate, "bit rate").map(|at| (at, rate.index))).transpose()?;
     prepare(master, subject, way.state)?;
     let held = [id, rate].map(|place| place.map(|(at, _)| at));
     let held = [read(master, node, held[0])?, read(master, node, held[1])?];
@@ -56,7 +56,7 @@ fn write_all(
     if let (Some((at, number)), Some((_, stage))) = (id, &mut done.id) {
         write(master, subject, node, at, number, stage)?;
     }
-    if let (Some((at, number)), Some((_, _, stage))) = (rate, &mut done.rate) {
+    if let (Some((at, number)), Some((_, stage))) = (rate, &mut done.rate) {
         write(master, subject, node, at, number, stage)?;
     }
     let Some(object) = way.store else {
@@ -120,7 +120,7 @@ fn read(master: &mut Master<'_>, node: NodeId, at: Option<AssignPlace>) -> Resul
 fn undo(master: &mut Master<'_>, subject: &Subject, node: NodeId, id: Number, rate: Number, done: &mut Done) {
     let is_open = |stage: Stage| matches!(stage, Stage::Sent | Stage::Done);
     let id = id.zip(done.id.as_mut().map(|(_, stage)| stage));
-    let rate = rate.zip(done.rate.as_mut().map(|(_, _, stage)| stage));
+    let rate = rate.zip(done.rate.as_mut().map(|(_, stage)| stage));
     for ((at, number), stage) in id.into_iter().chain(rate) {
         let mut undone = *stage;
         if is_open(*stage) && write(master, subject, node, at, number, &mut undone).is_ok() {

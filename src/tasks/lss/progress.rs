@@ -1,8 +1,8 @@
 //! What has been done and what not, for whoever has to go on from there.
 
 use super::subject::Subject;
+use super::ways::PlannedRate;
 use crate::canopen::id::NodeId;
-use crate::device::assign::spoken_rate;
 use crate::tasks::{Failure, Kind};
 
 /// How far one step has come.
@@ -24,8 +24,8 @@ pub(super) enum Stage {
 pub(super) struct Done {
     /// The node-ID that is set, and how far that has come.
     pub id: Option<(NodeId, Stage)>,
-    /// The bit rate that is set: in bit/s where it is known, and its index.
-    pub rate: Option<(Option<u32>, u8, Stage)>,
+    /// The bit rate that is set.
+    pub rate: Option<(PlannedRate, Stage)>,
     /// Whether it lasts.
     pub stored: Stage,
     /// The host went to the new bit rate together with the device.
@@ -34,16 +34,12 @@ pub(super) struct Done {
 
 impl Done {
     /// Nothing yet of what is to be set.
-    pub(super) fn of(id: Option<NodeId>, rate: Option<(Option<u32>, u8)>) -> Done {
-        Done {
-            id: id.map(|id| (id, Stage::No)),
-            rate: rate.map(|(bits, index)| (bits, index, Stage::No)),
-            ..Done::default()
-        }
+    pub(super) fn of(id: Option<NodeId>, rate: Option<PlannedRate>) -> Done {
+        Done { id: id.map(|id| (id, Stage::No)), rate: rate.map(|rate| (rate, Stage::No)), ..Done::default() }
     }
 
     fn stages(&self) -> impl Iterator<Item = Stage> {
-        self.id.iter().map(|(_, stage)| *stage).chain(self.rate.iter().map(|(_, _, stage)| *stage))
+        self.id.iter().map(|(_, stage)| *stage).chain(self.rate.iter().map(|(_, stage)| *stage))
     }
 
     /// Whether the device may hold something new that does not last.
@@ -67,10 +63,7 @@ impl Done {
             Stage::Undone => format!("{what} put back"),
         };
         let id = self.id.map(|(id, stage)| word(format!("node-ID {id}"), stage));
-        let rate = self.rate.map(|(bits, index, stage)| {
-            let what = bits.map_or_else(|| format!("bit rate index {index}"), spoken_rate);
-            word(what, stage)
-        });
+        let rate = self.rate.map(|(rate, stage)| word(format!("bit rate {rate}"), stage));
         let stored = match self.stored {
             Stage::No | Stage::Undone => "not stored",
             Stage::Sent => "whether it is stored is not known",

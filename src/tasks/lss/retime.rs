@@ -108,7 +108,7 @@ impl<'a> Retiming<'a> {
         let mut activated = None;
         let session = prepared(master, subject, self.way, tell, |lss| {
             let result = lss.configure_bit_timing(0, self.index);
-            if let Some((_, _, stage)) = &mut done.rate {
+            if let Some((_, stage)) = &mut done.rate {
                 *stage = stage_of(&result);
             }
             result.map_err(|error| subject.lss_failure(error))?;
@@ -197,7 +197,7 @@ impl<'a> Retiming<'a> {
             undo.is_ok()
         });
         put_back(master, before, tell);
-        if let (true, Some((_, _, stage))) = (undone, &mut done.rate) {
+        if let (true, Some((_, stage))) = (undone, &mut done.rate) {
             *stage = Stage::Undone;
         }
         let message = format!("{}: it answers at {old} still, and this side is back there", failure.message);

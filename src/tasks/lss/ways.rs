@@ -7,6 +7,7 @@ use crate::device::assign::{AssignEntry, AssignPlace, AssignWay, RateSource, Rat
 use crate::device::description::Description;
 use crate::device::quirk::Quirk;
 use crate::tasks::{Failure, Kind};
+use std::fmt;
 
 /// A bit rate as the user names it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,11 +22,31 @@ pub enum Rate {
 
 /// A bit rate as the device takes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct PlannedRate {
+pub struct PlannedRate {
     /// The index in the device's table.
     pub index: u8,
     /// In bit/s, where it is known.
     pub bits: Option<u32>,
+    /// The device finds it out.
+    pub is_auto: bool,
+}
+
+impl PlannedRate {
+    /// In bit/s or, where that is not known, the index; `auto`.
+    pub fn bare(self) -> String {
+        self.bits.map_or_else(|| self.to_string(), |bits| bits.to_string())
+    }
+}
+
+/// `500k`, `auto`, `index 9`.
+impl fmt::Display for PlannedRate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.bits {
+            Some(bits) => f.write_str(&spoken_rate(bits)),
+            None if self.is_auto => f.write_str("auto"),
+            None => write!(f, "index {}", self.index),
+        }
+    }
 }
 
 const STORE_ALL: ObjectId = ObjectId::new(0x1010, 1);
@@ -90,13 +111,16 @@ pub(super) fn plan_rate(description: Option<&Description>, rate: Rate, way: Assi
         return Err(Failure::new(Kind::Usage, message).hint("look it up in its manual: --table-index N"));
     }
     match rate {
-        Rate::Index(index, bits) => Ok(PlannedRate { index, bits: bits.or_else(|| table.rate_of(index)) }),
-        Rate::Auto => {
-            table.auto().map(|index| PlannedRate { index, bits: None }).ok_or_else(|| refuse("auto".to_owned()))
+        Rate::Index(index, bits) => {
+            Ok(PlannedRate { index, bits: bits.or_else(|| table.rate_of(index)), is_auto: false })
         }
+        Rate::Auto => table
+            .auto()
+            .map(|index| PlannedRate { index, bits: None, is_auto: true })
+            .ok_or_else(|| refuse("auto".to_owned())),
         Rate::Bits(bits) => table
             .index_of(bits)
-            .map(|index| PlannedRate { index, bits: Some(bits) })
+            .map(|index| PlannedRate { index, bits: Some(bits), is_auto: false })
             .ok_or_else(|| refuse(spoken_rate(bits))),
     }
 }

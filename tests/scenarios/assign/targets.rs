@@ -267,7 +267,10 @@ fn a_bit_rate_that_the_device_does_not_have_is_refused_with_the_list() {
     // Its own table: 5 is 100k.
     let done = run(&mut bus, "127", &Wanted { rate: Some(Rate::Bits(100_000)), ..Wanted::default() });
     let report = done.result.unwrap();
-    assert_eq!((report.rate, report.confirmed), (Some((Some(100_000), 5)), Confirmed::Acknowledge));
+    assert_eq!(
+        (report.rate.map(|rate| (rate.bits, rate.index)), report.confirmed),
+        (Some((Some(100_000), 5)), Confirmed::Acknowledge)
+    );
     let stored = bus.stations::<Device>().map(|device| device.stored().1).collect::<Vec<_>>();
     assert_eq!(stored[3].map(spoken_rate).as_deref(), Some("100k"));
     assert_eq!(all_held(&bus)[..3], before[..3]);
