@@ -81,6 +81,10 @@ impl<B: Bus> Bus for Faulty<B> {
         self.bus.is_live()
     }
 
+    fn waits(&self) -> bool {
+        self.bus.waits()
+    }
+
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
         self.bus.can_set_bit_rate()
     }

@@ -37,6 +37,12 @@ pub trait Bus {
         true
     }
 
+    /// Whether it waits for who is slow: time passes only while somebody receives, as in a recording and on a
+    /// virtual clock.
+    fn waits(&self) -> bool {
+        !self.is_live()
+    }
+
     /// The present moment.
     fn now(&self) -> Stamp;
 
@@ -104,6 +110,10 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 
     fn is_live(&self) -> bool {
         (**self).is_live()
+    }
+
+    fn waits(&self) -> bool {
+        (**self).waits()
     }
 
     fn now(&self) -> Stamp {

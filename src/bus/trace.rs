@@ -82,6 +82,10 @@ impl<B: Bus> Bus for Traced<B> {
         self.bus.is_live()
     }
 
+    fn waits(&self) -> bool {
+        self.bus.waits()
+    }
+
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
         self.bus.can_set_bit_rate()
     }

@@ -283,6 +283,7 @@ pub(super) fn tell(console: &Console, note: &Note) {
             share * 100.0
         )),
         Note::Restarted(node) => console.warn(&format!("node {node} restarted")),
+        Note::Gap(node, length) => console.detail(&format!("node {node}: a gap of {}", spoken(*length))),
         Note::Silent(node, since) => console.warn(&format!("node {node}: silent for {}", spoken(*since))),
         Note::Back(node) => console.note(&format!("node {node} is back")),
         Note::WrongLength(node) => {

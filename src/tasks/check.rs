@@ -206,6 +206,23 @@ impl<'a> Expecting<'a> {
         }
     }
 
+    fn judge(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
+        let before = self.came.len();
+        if !self.is_bound {
+            self.came.extend(samples.iter().map(|sample| sample.source));
+        }
+        if self.came.len() > before {
+            let came: Vec<Source> = self.came.iter().filter_map(|&source| sources.get(source)).cloned().collect();
+            if let Err(error) = self.jury.bind_recorded(&came) {
+                self.failure = Some(error.into());
+                return ControlFlow::Break(());
+            }
+        }
+        self.begun = self.begun.or(samples.first().map(|sample| sample.at));
+        self.jury.take(samples, sources);
+        ControlFlow::Continue(())
+    }
+
     /// The verdicts at the end of a recording.
     ///
     /// # Errors
@@ -235,20 +252,21 @@ impl Observer for Expecting<'_> {
         self.observer.begin(instruments)
     }
 
+    fn sources(&mut self, sources: &[Source]) -> Result<(), Failure> {
+        self.observer.sources(sources)
+    }
+
+    fn cycle(&mut self, number: u64, at: Stamp) -> ControlFlow<()> {
+        self.observer.cycle(number, at)
+    }
+
+    fn polled(&mut self, cycle: u64, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
+        self.judge(samples, sources)?;
+        self.observer.polled(cycle, samples, sources)
+    }
+
     fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
-        let before = self.came.len();
-        if !self.is_bound {
-            self.came.extend(samples.iter().map(|sample| sample.source));
-        }
-        if self.came.len() > before {
-            let came: Vec<Source> = self.came.iter().filter_map(|&source| sources.get(source)).cloned().collect();
-            if let Err(error) = self.jury.bind_recorded(&came) {
-                self.failure = Some(error.into());
-                return ControlFlow::Break(());
-            }
-        }
-        self.begun = self.begun.or(samples.first().map(|sample| sample.at));
-        self.jury.take(samples, sources);
+        self.judge(samples, sources)?;
         self.observer.samples(samples, sources)
     }
 

@@ -72,6 +72,8 @@ pub enum Note {
     Share(Duration, f64),
     /// A node restarted.
     Restarted(NodeId),
+    /// Something of the node came after an interval longer than three times the usual one.
+    Gap(NodeId, Duration),
     /// Nothing has come from the node for a while.
     Silent(NodeId, Duration),
     /// The node is back.
@@ -94,6 +96,25 @@ pub trait Observer {
     /// Why nothing is to be recorded.
     fn begin(&mut self, _instruments: &[Instrument]) -> Result<(), Failure> {
         Ok(())
+    }
+
+    /// What will be recorded, in the order of the sources' numbers; more may come later. Nothing has been
+    /// switched yet. Who only listens is not told.
+    ///
+    /// # Errors
+    /// Why nothing is to be recorded.
+    fn sources(&mut self, _sources: &[Source]) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// The cycle `number` of SYNC or polling begins at `at`. Numbers may be left out.
+    fn cycle(&mut self, _number: u64, _at: Stamp) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    /// Samples of requests that were begun in this cycle; it need not be the last one.
+    fn polled(&mut self, _cycle: u64, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
+        self.samples(samples, sources)
     }
 
     /// Samples that came together, in the order of their bytes; at most as many as may be counted.
@@ -169,6 +190,7 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     };
     recording.expect_sources();
     recording.excuse(plan);
+    observer.sources(recording.decoder.sources())?;
     master.listen(&recording.filters(&instruments))?;
     if let Mode::Sync(period) = plan.mode {
         refuse_second_sync(master, &instruments, period)?;

@@ -225,6 +225,10 @@ impl Bus for MemoryBus {
         TimestampSource::Simulated
     }
 
+    fn waits(&self) -> bool {
+        self.time_line.host_now().is_none()
+    }
+
     fn now(&self) -> Stamp {
         self.stamp(self.time_line.host_now().unwrap_or(self.now).max(self.now))
     }

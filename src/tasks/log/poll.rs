@@ -30,6 +30,7 @@ enum Part {
 #[derive(Default)]
 struct Parts {
     under_way: usize,
+    cycle: u64,
     value: Option<Result<Answer, SdoError>>,
     status: Option<Result<Answer, SdoError>>,
 }
@@ -70,6 +71,16 @@ impl Poll {
         begin + nth(self.period, self.cycles)
     }
 
+    /// The number of the next cycle.
+    pub(super) fn next_cycle(&self) -> u64 {
+        self.cycles
+    }
+
+    /// The cycle in which the request of this ticket was begun.
+    pub(super) fn cycle_of(&self, ticket: Ticket) -> Option<u64> {
+        self.open.get(&ticket).map(|&(at, _)| self.answers[at].cycle)
+    }
+
     /// Begins the cycles that are due. What the cycle before has not finished is skipped, and counted.
     pub(super) fn start_due(&mut self, begin: Mono, now: Mono, master: &mut Master<'_>) -> u64 {
         let mut skipped = 0;
@@ -81,6 +92,7 @@ impl Poll {
                     skipped += 1;
                     continue;
                 }
+                parts.cycle = self.cycles - 1;
                 // The value last: when it comes the sample is complete, so that rows stand in order of time.
                 for (request, part) in requests(target).into_iter().zip([Part::Value, Part::Status]).rev() {
                     self.open.insert(master.start(request), (at, part));

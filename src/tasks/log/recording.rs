@@ -29,12 +29,12 @@ struct Pulse {
 }
 
 impl Pulse {
-    /// Something came: whether more than three of the usual intervals had passed.
-    fn beat(&mut self, now: Mono) -> bool {
-        let mut gap = false;
+    /// Something came: how long after the last time, if that is more than three of the usual intervals.
+    fn beat(&mut self, now: Mono) -> Option<Duration> {
+        let mut gap = None;
         if let Some(last) = self.last.filter(|&last| last < now) {
             let interval = now.since(last);
-            gap = self.interval.is_some_and(|usual| interval > usual * 3);
+            gap = self.interval.filter(|&usual| interval > usual * 3).map(|_| interval);
             self.interval = Some(self.interval.map_or(interval, |usual| (usual * 7 + interval) / 8));
         }
         self.last = Some(now);
@@ -184,10 +184,11 @@ impl Recording {
                 Happening::Sdo(ticket, result) => match &mut poll {
                     Some(poll) => {
                         self.samples.clear();
+                        let cycle = poll.cycle_of(ticket);
                         if let Some(note) = poll.answer(ticket, result, &mut self.samples) {
                             observer.note(&note, master.bus().now());
                         }
-                        self.take_samples(plan, observer)
+                        self.take_samples(plan, cycle, observer)
                     }
                     None => ControlFlow::Continue(()),
                 },
@@ -199,6 +200,9 @@ impl Recording {
                     if let Some((period, id)) = sync
                         && until >= begin + nth(period, slot)
                     {
+                        if observer.cycle(slot, master.bus().now()).is_break() {
+                            return Ok(());
+                        }
                         let is_sent = master.send_first(Frame::empty(id));
                         self.syncs += u64::from(is_sent);
                         let next = next_slot(begin, master.now(), period, slot);
@@ -206,6 +210,11 @@ impl Recording {
                         slot = next;
                     }
                     if let Some(poll) = &mut poll {
+                        if poll.due(begin) <= until
+                            && observer.cycle(poll.next_cycle(), master.bus().now()).is_break()
+                        {
+                            return Ok(());
+                        }
                         self.skipped += poll.start_due(begin, until, master);
                     }
                     self.watch_pulses(until, master, observer);
@@ -259,7 +268,7 @@ impl Recording {
             self.expect_sources();
         }
         match self.decoder.decode(received, &mut self.samples) {
-            Decoded::Tpdo(_) => return self.take_samples(plan, observer),
+            Decoded::Tpdo(_) => return self.take_samples(plan, None, observer),
             Decoded::WrongLength(node) => {
                 if self.wrong_length_said.insert(node) {
                     observer.note(&Note::WrongLength(node), received.at);
@@ -287,7 +296,8 @@ impl Recording {
         ControlFlow::Continue(())
     }
 
-    fn take_samples(&mut self, plan: &Plan, observer: &mut dyn Observer) -> ControlFlow<()> {
+    /// Hands the samples on; `cycle` is that of the poll which they answer.
+    fn take_samples(&mut self, plan: &Plan, cycle: Option<u64>, observer: &mut dyn Observer) -> ControlFlow<()> {
         let Some(last) = self.samples.last() else { return ControlFlow::Continue(()) };
         let at = last.at;
         if let Some(count) = plan.count {
@@ -300,9 +310,10 @@ impl Recording {
         let mut node = None;
         // A gap is one of a TPDO or a poll, and so of the first of the values that come together.
         if let Some(first) = self.samples.first()
-            && self.rhythms[first.source].beat(at.mono)
+            && let Some(length) = self.rhythms[first.source].beat(at.mono)
         {
             self.gaps += 1;
+            observer.note(&Note::Gap(sources[first.source].node, length), at);
         }
         for sample in &self.samples {
             self.statistics[sample.source].add(sample.value.map(|value| value.as_f64()), sample.at.mono.since_start());
@@ -316,7 +327,10 @@ impl Recording {
             }
         }
         self.rows += self.samples.len() as u64;
-        observer.samples(&self.samples, sources)?;
+        match cycle {
+            Some(cycle) => observer.polled(cycle, &self.samples, sources)?,
+            None => observer.samples(&self.samples, sources)?,
+        }
         match plan.count {
             Some(count) if self.rows >= count => ControlFlow::Break(()),
             _ => ControlFlow::Continue(()),
