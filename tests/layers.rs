@@ -45,7 +45,8 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("std::net", &["bus"]),
     ("std::os", &["bus"]),
     ("std::process", &["main"]),
-    ("std::thread", &["bus"]),
+    // A thread in output: writing must not keep the program from receiving.
+    ("std::thread", &["bus", "output"]),
     ("std::time::Instant", &["bus"]),
     ("toml", &["device", "sim"]),
 ];

@@ -12,6 +12,7 @@ use crate::measure::expression::judge::Jury;
 use crate::measure::expression::verdict::{Ruling, Verdict};
 use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
+use crate::output::events::words;
 use crate::output::limits::Limits;
 use crate::output::{junit, verdict};
 use crate::tasks::check::{Plan, Report, all_met, check};
@@ -195,7 +196,7 @@ impl Observer for Screen {
     }
 
     fn note(&mut self, note: &Note, _at: Stamp) {
-        tell(&self.console, note);
+        tell(&self.console, &words(note));
     }
 
     fn standing(&mut self, jury: &Jury, at: Stamp) {

@@ -1,10 +1,22 @@
 //! Files that a command writes: opened before the bus, and none overwritten unasked.
 
 use super::exit::FileError;
+use crate::output::rows::{Kept, look};
 use crate::tasks::{Failure, Kind};
 use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
+
+/// What is done with a file that exists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Existing {
+    /// It is not touched.
+    Refuse,
+    /// What stands in it goes.
+    Overwrite,
+    /// It is continued behind its last whole line.
+    Continue,
+}
 
 /// A file to be written. What stood in it stays until there is something to write; a new one in which
 /// nothing came to stand goes away again.
@@ -13,20 +25,29 @@ pub(super) struct OutFile {
     path: PathBuf,
     file: File,
     new: bool,
+    existing: Existing,
+    /// How many bytes stay.
+    keep: u64,
 }
 
 impl OutFile {
     pub(super) fn create(path: &Path, force: bool) -> anyhow::Result<OutFile> {
+        OutFile::open(path, if force { Existing::Overwrite } else { Existing::Refuse })
+    }
+
+    pub(super) fn open(path: &Path, existing: Existing) -> anyhow::Result<OutFile> {
         let mut options = OpenOptions::new();
         options.write(true);
         let there = path.metadata().ok();
         let new = there.is_none();
+        let regular = there.is_some_and(|metadata| metadata.is_file());
         // A FIFO and a device are opened as they are, as other programs do.
-        if new || !force && there.is_some_and(|metadata| metadata.is_file()) {
+        if new || existing == Existing::Refuse && regular {
             options.create_new(true);
         }
+        options.read(existing == Existing::Continue && regular);
         match options.open(path) {
-            Ok(file) => Ok(OutFile { path: path.to_owned(), file, new }),
+            Ok(file) => Ok(OutFile { path: path.to_owned(), file, new, existing, keep: 0 }),
             Err(source) if source.kind() == io::ErrorKind::AlreadyExists => {
                 let failure = Failure::new(Kind::Usage, format!("{} exists", path.display()));
                 Err(failure.hint("overwrite it with --force, or name another file").into())
@@ -35,15 +56,37 @@ impl OutFile {
         }
     }
 
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(super) fn is_regular(&self) -> bool {
+        self.file.metadata().is_ok_and(|metadata| metadata.is_file())
+    }
+
+    /// What stays of a file that is continued.
+    pub(super) fn look(&mut self) -> anyhow::Result<Option<Kept>> {
+        if self.existing != Existing::Continue || self.new || !self.is_regular() {
+            return Ok(None);
+        }
+        let what = || format!("read {}", self.path.display());
+        let kept = look(&mut self.file).map_err(|source| FileError { what: what(), source })?;
+        self.keep = kept.as_ref().map_or(0, |kept| kept.length);
+        Ok(kept)
+    }
+
     /// The file, for somebody else to empty and to write to.
     pub(super) fn handle(&self) -> anyhow::Result<File> {
         self.file.try_clone().map_err(|source| self.error(source))
     }
 
-    /// Writes all there is to write.
+    /// Writes all there is to write, behind what stays.
     pub(super) fn write(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
-        let regular = self.file.metadata().is_ok_and(|metadata| metadata.is_file());
-        let emptied = if regular { self.file.set_len(0) } else { Ok(()) };
+        let emptied = if self.is_regular() {
+            self.file.set_len(self.keep).and_then(|()| self.file.seek(io::SeekFrom::End(0)).map(drop))
+        } else {
+            Ok(())
+        };
         // An object of no bytes makes a file of no bytes, which stays.
         self.new = false;
         emptied.and_then(|()| self.file.write_all(bytes)).map_err(|source| self.error(source))

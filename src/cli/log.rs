@@ -1,28 +1,28 @@
 //! `cangauge log`.
 
+mod files;
+mod screen;
+
 use super::args::{BusSpec, Duration, Nodes, SignalArg};
 use super::exit::{Several, stdout};
-use super::file::OutFile;
 use super::{Format, Global, When, check, open};
-use crate::bus::Stamp;
-use crate::bus::time::spoken;
-use crate::canopen::emcy::Emergency;
+use crate::bus::interrupt::Interrupts;
 use crate::canopen::id::NodeId;
 use crate::measure::decode::Wanted;
 use crate::measure::expression::Expression;
 use crate::measure::expression::verdict::Verdict;
-use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
+use crate::output::events::{Weight, Words};
 use crate::output::progress::Progress;
-use crate::output::rows::{Form, Rows, Target};
-use crate::output::summary;
+use crate::output::rows::Form;
+use crate::output::summary::{self, Written};
 use crate::tasks::check::{Expecting, all_met};
-use crate::tasks::log::{Mode, Note, Observer, Outcome, Plan, log};
+use crate::tasks::log::{Mode, Outcome, Plan, log};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
+use files::{Files, Opened};
+use screen::{Screen, Unwritten};
 use std::io::{self, IsTerminal, Write};
-use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
 
 /// Record measurements as CSV or JSON Lines
 ///
@@ -61,18 +61,11 @@ pub(crate) struct Log {
     /// Leave the nodes' NMT states alone
     #[arg(long)]
     no_nmt: bool,
-    /// Write to a file instead of stdout
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
-    /// Overwrite files that exist
-    #[arg(long)]
-    force: bool,
-    /// Write the summary as JSON to a file; - for stdout
-    #[arg(long, value_name = "FILE")]
-    summary: Option<PathBuf>,
     /// Exit with 1 at the end unless this held: 'pressure in 9..11 bar', see cangauge check --help
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     expect: Vec<Expression>,
+    #[command(flatten)]
+    files: Files,
 }
 
 fn positive(text: &str) -> Result<u64, String> {
@@ -102,12 +95,12 @@ impl Log {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         refuse_to_send(global, self.sync.or(self.poll))?;
         self.refuse_at_once()?;
-        let create = |path: &Path| OutFile::create(path, self.force);
-        let file = self.output.as_deref().map(create).transpose()?;
-        let summary = self.summary.as_deref().filter(|path| *path != Path::new("-")).map(create).transpose()?;
-        let (outcome, verdicts) = self.record(global, file.as_ref())?;
-        check::say(&global.console(), &verdicts);
-        self.finish(&outcome, &verdicts, summary)
+        let form = if global.format == Format::Json { Form::Json } else { Form::Csv };
+        self.files.refuse(form, self.sync.or(self.poll).is_some())?;
+        let mut opened = self.files.open(form, self.count)?;
+        let recorded = self.record(global, &mut opened)?;
+        check::say(&global.console(), &recorded.verdicts);
+        self.finish(&recorded, &mut opened)
     }
 
     /// What is expected has to be recorded.
@@ -124,14 +117,13 @@ impl Log {
         Ok(())
     }
 
-    fn record(&self, global: &Global, file: Option<&OutFile>) -> anyhow::Result<(Outcome, Vec<Verdict>)> {
+    fn record(&self, global: &Global, opened: &mut Opened) -> anyhow::Result<Recorded> {
         // Rows and live lines on one terminal would tear each other.
-        let torn = global.progress == When::Auto && file.is_none() && io::stdout().is_terminal();
+        let torn = global.progress == When::Auto && opened.rows.is_none() && io::stdout().is_terminal();
         let show = global.shows_progress() && !torn;
         let duration = self.duration.map(|duration| duration.0);
         let progress = Progress::new(show, duration, self.count);
         let console = Console { progress: Some(progress.multi()), ..global.console() };
-        let form = if global.format == Format::Json { Form::Json } else { Form::Csv };
         let (outcome, verdicts, screen) = global.with_master(|master| {
             let nodes = match (&self.nodes, self.passive || !master.bus().is_live()) {
                 (Nodes::All, true) => NodeId::all().collect(),
@@ -144,14 +136,13 @@ impl Log {
                 wanted: self.signals.iter().map(|signal| signal.0.clone()).collect(),
                 mode,
                 duration,
-                count: self.count,
+                // In the wide layout it counts rows, which are made of many values.
+                count: self.count.filter(|_| !self.files.is_wide()),
                 nmt: !self.no_nmt,
             };
-            let target = match file {
-                Some(file) => Target::File(file.handle()?),
-                None => Target::Stream(Box::new(io::stdout())),
-            };
-            let mut screen = Screen { rows: Rows::new(target, form), progress, console, error: None, begun: None };
+            let waits = master.bus().waits();
+            let (rows, events) = (opened.rows(waits)?, opened.events(waits)?);
+            let mut screen = Screen::new(rows, events, progress, console);
             let mut expecting = Expecting::new(&self.expect, &plan.nodes, true, &mut screen);
             let outcome = log(master, &plan, &mut expecting);
             let verdicts = match &outcome {
@@ -165,24 +156,18 @@ impl Log {
             screen.progress.finish(interrupted);
             Ok((outcome, verdicts, screen))
         })?;
-        let Screen { mut rows, console, error, .. } = screen;
-        let flushed = rows.flush();
-        if let Some(error) = error.or(flushed.err()) {
-            if rows.lost() > 0 && error.kind() != io::ErrorKind::BrokenPipe {
-                let word = if rows.lost() == 1 { "row" } else { "rows" };
-                console.warn(&format!("{} {word} could not be written", rows.lost()));
-            }
-            return Err(match file {
-                Some(file) => file.error(error),
-                None => stdout(error),
-            });
+        if let Some(other) = &screen.other_head {
+            return Err(opened.other_head(other).into());
         }
+        let interrupted = outcome.as_ref().is_ok_and(|outcome| outcome.interrupted);
+        let written = end(screen, opened, interrupted)?;
         let outcome = outcome?;
         if let Some(failure) = outcome.nothing {
             return Err(failure.into());
         }
-        summary::lines(&outcome).iter().for_each(|line| console.note(line));
-        Ok((outcome, verdicts?))
+        let console = global.console();
+        summary::lines(&outcome, written).iter().for_each(|line| console.note(line));
+        Ok(Recorded { outcome, verdicts: verdicts?, written })
     }
 
     /// A recording (`replay:`) can only be listened to.
@@ -195,20 +180,25 @@ impl Log {
         }
     }
 
-    fn finish(&self, outcome: &Outcome, verdicts: &[Verdict], file: Option<OutFile>) -> anyhow::Result<()> {
-        if self.summary.is_some() {
+    fn finish(&self, recorded: &Recorded, opened: &mut Opened) -> anyhow::Result<()> {
+        let Recorded { outcome, verdicts, written } = recorded;
+        if self.files.summary.is_some() {
             let mut text = Vec::new();
-            summary::json(&mut text, outcome)?;
-            match file {
-                Some(mut file) => file.write(&text)?,
+            summary::json(&mut text, outcome, *written)?;
+            match &mut opened.summary {
+                Some(file) => file.write(&text)?,
                 None => io::stdout().lock().write_all(&text).map_err(stdout)?,
             }
         }
         // What was expected and is not so comes first: it gives the exit code.
         let (unmet, lost) = (all_met(verdicts, &[]).err(), self.lost(outcome));
+        let late = (written.lost > 0).then(|| {
+            let what = opened.rows.as_ref().map_or("stdout".to_owned(), |file| file.path().display().to_string());
+            Failure::new(Kind::Io, format!("{} were lost: {what} was too slow", rows(written.lost)))
+        });
         let failures = match unmet {
-            Some(unmet) if unmet.kind == Kind::CheckFailed => [Some(unmet), lost],
-            unmet => [lost, unmet],
+            Some(unmet) if unmet.kind == Kind::CheckFailed => [Some(unmet), late, lost],
+            unmet => [late, lost, unmet],
         };
         let failures: Vec<Failure> = failures.into_iter().flatten().collect();
         if failures.is_empty() { Ok(()) } else { Err(Several(failures).into()) }
@@ -227,79 +217,52 @@ impl Log {
     }
 }
 
-/// Everything a recording shows and writes.
-struct Screen {
-    rows: Rows,
-    progress: Progress,
-    console: Console,
-    error: Option<io::Error>,
-    begun: Option<Stamp>,
+/// What came of it.
+struct Recorded {
+    outcome: Outcome,
+    verdicts: Vec<Verdict>,
+    written: Written,
 }
 
-impl Screen {
-    fn or_break(&mut self, result: io::Result<()>) -> ControlFlow<()> {
-        match result {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(error) => {
-                self.error.get_or_insert(error);
-                ControlFlow::Break(())
+/// Who ended the recording waits for a reader that does not read only for so many tenths of a second.
+const HURRY: u32 = 20;
+
+/// Waits until everything is written, or the user does not want to wait.
+fn end(mut screen: Screen, opened: &Opened, interrupted: bool) -> anyhow::Result<Written> {
+    let mut interrupts = Interrupts::new().ok();
+    let mut waited = 0;
+    let mut give_up = || {
+        waited += 1;
+        interrupted && waited > HURRY || interrupts.as_mut().is_some_and(Interrupts::take)
+    };
+    let finished = screen.rows.finish(&mut give_up);
+    let told = screen.events.as_mut().map_or(Ok(()), |events| events.finish(&mut give_up));
+    let Screen { rows: writer, console, error, .. } = screen;
+    let error = error.or(finished.err().map(Unwritten::Rows)).or(told.err().map(Unwritten::Events));
+    match (error, &opened.rows, &opened.events) {
+        (None, _, _) => Ok(Written { rows: writer.count(), lost: writer.lost(), left_out: writer.left_out() }),
+        (Some(Unwritten::Events(error)), _, Some(file)) => Err(file.error(error)),
+        (Some(Unwritten::Rows(error) | Unwritten::Events(error)), file, _) => {
+            if writer.lost() > 0 && error.kind() != io::ErrorKind::BrokenPipe {
+                console.warn(&format!("{} could not be written", rows(writer.lost())));
             }
+            Err(match file {
+                Some(file) => file.error(error),
+                None => stdout(error),
+            })
         }
     }
 }
 
-impl Observer for Screen {
-    fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
-        self.progress.take(samples, sources);
-        let mut result = samples.iter().try_for_each(|sample| self.rows.add(sample, &sources[sample.source]));
-        if let (Ok(()), Some(last)) = (&result, samples.last()) {
-            result = self.rows.flush_if_due(last.at);
-        }
-        self.or_break(result)
-    }
-
-    fn note(&mut self, note: &Note, _at: Stamp) {
-        tell(&self.console, note);
-    }
-
-    fn tick(&mut self, at: Stamp, rows: u64) -> ControlFlow<()> {
-        let begun = self.begun.get_or_insert(at).mono;
-        self.progress.tick(at.mono.since(begun), rows);
-        let result = self.rows.flush_if_due(at);
-        self.or_break(result)
-    }
+fn rows(count: u64) -> String {
+    if count == 1 { "1 row".to_owned() } else { format!("{count} rows") }
 }
 
 /// Says what happens while it is recorded.
-pub(super) fn tell(console: &Console, note: &Note) {
-    match note {
-        Note::Remark(text) => console.warn(text),
-        Note::Emergency(node, emergency, meaning) => {
-            console.warn(&format!("node {node}: {}", emergency_text(emergency, meaning)));
-        }
-        Note::Share(period, share) => console.note(&format!(
-            "SYNC every {} and the answers take about {:.1} % of the bus",
-            spoken(*period),
-            share * 100.0
-        )),
-        Note::Restarted(node) => console.warn(&format!("node {node} restarted")),
-        Note::Gap(node, length) => console.detail(&format!("node {node}: a gap of {}", spoken(*length))),
-        Note::Silent(node, since) => console.warn(&format!("node {node}: silent for {}", spoken(*since))),
-        Note::Back(node) => console.note(&format!("node {node} is back")),
-        Note::WrongLength(node) => {
-            console.warn(&format!("node {node}: a TPDO has not the length of its mapping: no row is made of it"))
-        }
-        Note::Fault(fault) => console.detail(&fault.to_string()),
-        Note::Dropped(count) => console.warn(&format!("the kernel dropped {count} frames")),
-        Note::Link(true) => console.note("the interface is up again"),
-        Note::Link(false) => console.warn("the interface went down; waiting for it"),
+pub(super) fn tell(console: &Console, words: &Words) {
+    match words.weight {
+        Weight::Warning => console.warn(&words.text),
+        Weight::Note => console.note(&words.text),
+        Weight::Detail => console.detail(&words.text),
     }
-}
-
-fn emergency_text(emergency: &Emergency, meaning: &str) -> String {
-    if emergency.code == 0 {
-        return "emergency over (0000h)".to_owned();
-    }
-    let register = emergency.register.map(|register| format!(", {register}")).unwrap_or_default();
-    format!("emergency {:04X}h, {meaning}{register}", emergency.code)
 }

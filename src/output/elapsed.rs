@@ -35,6 +35,16 @@ impl Elapsed {
         let elapsed = u64::try_from(wall_us - self.begin_us).unwrap_or(0);
         Duration::from_micros(elapsed)
     }
+
+    /// The time of something else than a row, which may come out of order: by the last row.
+    pub(super) fn look(&self, at: Stamp) -> Duration {
+        let (last_us, last) = self.last.unwrap_or((self.begin_us, at.mono));
+        let since = micros(at.mono.since(last)) - micros(last.since(at.mono));
+        let shown = micros(at.wall.since_epoch()) - last_us;
+        // What stands beside it is a wall time, too.
+        let passed = if (shown - since).abs() > STEP_US { since } else { shown };
+        Duration::from_micros(u64::try_from(last_us + passed - self.begin_us).unwrap_or(0))
+    }
 }
 
 fn micros(duration: Duration) -> i128 {

@@ -8,7 +8,8 @@ use crate::tasks::nmt::Report;
 use crate::tasks::scan::Found;
 use crate::tasks::store::Done;
 use crate::tasks::{Failure, Kind};
-use serde::Serialize;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer as _};
 use std::io::{self, Write};
 
 pub(super) fn line<T: Serialize>(out: &mut dyn Write, object: &T) -> io::Result<()> {
@@ -222,10 +223,16 @@ pub fn reading(
 }
 
 /// A row of `log`.
-pub fn row(out: &mut dyn Write, time: &str, elapsed_s: f64, sample: &Sample, source: &Source) -> io::Result<()> {
+pub fn row(
+    out: &mut dyn Write,
+    time: &serde_json::Value,
+    elapsed_s: f64,
+    sample: &Sample,
+    source: &Source,
+) -> io::Result<()> {
     #[derive(Serialize)]
     struct Row<'a> {
-        time: &'a str,
+        time: &'a serde_json::Value,
         elapsed_s: f64,
         node: u8,
         signal: &'a str,
@@ -245,6 +252,25 @@ pub fn row(out: &mut dyn Write, time: &str, elapsed_s: f64, sample: &Sample, sou
         raw: sample.raw.to_string(),
     };
     line(out, &row)
+}
+
+/// A row of `log` in the wide layout: value and status under the names of their columns.
+pub fn wide_row(
+    out: &mut dyn Write,
+    time: &serde_json::Value,
+    elapsed_s: f64,
+    cells: impl Iterator<Item = ([String; 2], (Option<Number>, Option<Status>))>,
+) -> io::Result<()> {
+    let mut serializer = serde_json::Serializer::new(&mut *out);
+    let mut row = serializer.serialize_map(None)?;
+    row.serialize_entry("time", time)?;
+    row.serialize_entry("elapsed_s", &elapsed_s)?;
+    for ([name, status_name], (value, status)) in cells {
+        row.serialize_entry(&name, &JsonNumber(value))?;
+        row.serialize_entry(&status_name, &status.map(Status::as_str))?;
+    }
+    row.end()?;
+    out.write_all(b"\n")
 }
 
 /// A value of the object dictionary.

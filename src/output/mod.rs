@@ -3,6 +3,7 @@
 pub mod console;
 pub mod csv;
 mod elapsed;
+pub mod events;
 pub mod info;
 pub mod info_json;
 pub mod interfaces;

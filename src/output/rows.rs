@@ -1,308 +1,339 @@
 //! The rows of a log, as CSV or JSON Lines, written whole.
 
+mod cells;
+mod resume;
+mod series;
+mod setup;
+mod sink;
+mod wide;
+
 use super::elapsed::Elapsed;
 use super::json;
 use crate::bus::{Mono, Stamp};
-use crate::measure::sample::{Number, Sample, Source};
-use std::fmt::Write as _;
-use std::fs::File;
-use std::io::{self, Write};
+use crate::measure::sample::{Sample, Source, Status};
+pub use cells::{Dialect, TimeForm};
+pub(super) use cells::{Times, push_number, push_seconds, push_text, push_texts};
+use cells::{push_raw, push_value};
+pub use resume::{Kept, look};
+pub use series::Series;
+pub use setup::{Form, Layout, OtherHead, Rotation, Setup};
+pub use sink::{CAPACITY, Sink, Target};
+use std::io;
 use std::time::Duration;
-
-/// The header of layout `long`.
-pub const HEADER: &str = "time,elapsed_s,node,signal,value,unit,status,raw";
-
-/// The form of a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
-    /// CSV, layout `long`.
-    Csv,
-    /// JSON Lines.
-    Json,
-}
-
-/// Where rows go.
-#[derive(Debug)]
-pub enum Target {
-    /// A regular file: what stood in it goes with the first row, and a row that could not be written whole is
-    /// cut off again.
-    File(File),
-    /// stdout, a pipe, a device.
-    Stream(Box<dyn WriteDebug>),
-}
-
-/// A stream.
-pub trait WriteDebug: Write + std::fmt::Debug {}
-
-impl<T: Write + std::fmt::Debug> WriteDebug for T {}
+use wide::{Cycle, Wide};
 
 /// Rows wait here for at most this many bytes.
 const BLOCK: usize = 32 * 1024;
 
 /// Rows are handed to the kernel at the latest after this.
-const LATEST: Duration = Duration::from_millis(500);
+pub(super) const LATEST: Duration = Duration::from_millis(500);
 
 /// Writes the rows of a log.
 #[derive(Debug)]
 pub struct Rows {
-    target: Target,
-    form: Form,
+    sink: Sink,
+    setup: Setup,
+    times: Times,
+    wide: Option<Wide>,
     block: Vec<u8>,
     /// Rows in the block.
     waiting: u64,
     /// When the first of them was put there.
     since: Option<Mono>,
     elapsed: Option<Elapsed>,
-    lost: u64,
-    scratch: String,
-    header: bool,
+    rows: u64,
+    /// Of the present file: its bytes, its rows, and when the next one begins.
+    bytes: u64,
+    rows_here: u64,
+    until: Duration,
+    /// How often the columns have changed.
+    changes: u64,
+    /// Rows whose file could not be begun.
+    homeless: u64,
 }
 
 impl Rows {
-    /// Rows of `form` to `target`. A CSV file begins with a header, which comes with the first row: where
-    /// nothing was measured, nothing is written.
-    pub fn new(target: Target, form: Form) -> Rows {
+    /// Rows into `sink`. The header comes with the first row: where nothing was measured, nothing is written.
+    pub fn new(sink: Sink, setup: Setup) -> Rows {
         Rows {
-            target,
-            form,
+            sink,
+            times: Times::new(setup.time),
+            wide: (setup.layout == Layout::Wide).then(Wide::default),
+            setup,
             block: Vec::with_capacity(BLOCK + 4096),
             waiting: 0,
             since: None,
             elapsed: None,
-            lost: 0,
-            scratch: String::new(),
-            header: form == Form::Csv,
+            rows: 0,
+            bytes: 0,
+            rows_here: 0,
+            until: Duration::ZERO,
+            changes: 0,
+            homeless: 0,
         }
     }
 
-    /// Adds a row.
-    pub fn add(&mut self, sample: &Sample, source: &Source) -> io::Result<()> {
-        if self.elapsed.is_none()
-            && let Target::File(file) = &self.target
-            && file.metadata()?.is_file()
-        {
-            file.set_len(0)?;
-        }
-        let elapsed = self.elapsed.get_or_insert_default().take(sample.at);
-        if std::mem::take(&mut self.header) {
-            self.block.extend_from_slice(HEADER.as_bytes());
-            self.block.push(b'\n');
-        }
-        match self.form {
-            Form::Csv => self.csv(sample, source, elapsed)?,
-            Form::Json => {
-                let time = humantime::format_rfc3339_micros(sample.at.wall.system_time()).to_string();
-                let elapsed_s = elapsed.as_secs_f64();
-                json::row(&mut self.block, &time, elapsed_s, sample, source)?;
+    /// What will be measured: the columns of the wide layout.
+    ///
+    /// # Errors
+    /// The file that is to be continued has other ones.
+    pub fn columns(&mut self, sources: &[Source]) -> Result<(), OtherHead> {
+        match &mut self.wide {
+            None => Ok(()),
+            Some(wide) => {
+                wide.set(sources);
+                self.setup.fits_with(self.wide.as_ref())
             }
         }
+    }
+
+    /// A cycle begins.
+    pub fn cycle(&mut self, number: u64, at: Stamp) -> io::Result<()> {
+        if let Some(wide) = &mut self.wide {
+            wide.begin(number, at);
+        }
+        self.write_cycles(at.mono)
+    }
+
+    /// Takes samples that came together, of the cycle of this number if they were polled.
+    pub fn add(&mut self, cycle: Option<u64>, samples: &[Sample], sources: &[Source]) -> io::Result<()> {
+        if self.wide.is_none() {
+            return samples.iter().try_for_each(|sample| self.long(sample, &sources[sample.source]));
+        }
+        for sample in samples {
+            if self.wide.as_ref().is_some_and(|wide| !wide.knows(sample)) {
+                self.change_columns(sample, sources)?;
+            }
+            if let Some(wide) = &mut self.wide {
+                wide.put(cycle, sample);
+            }
+        }
+        samples.last().map_or(Ok(()), |last| self.write_cycles(last.at.mono))
+    }
+
+    fn long(&mut self, sample: &Sample, source: &Source) -> io::Result<()> {
+        if self.is_complete() {
+            return Ok(());
+        }
+        let elapsed = self.begin_row(sample.at)?;
+        let begin = self.block.len();
+        let Dialect { delimiter, decimal, .. } = self.setup.dialect;
+        let line = &mut self.block;
+        match self.setup.form {
+            Form::Csv => {
+                self.times.write(line, sample.at.wall, decimal)?;
+                line.push(delimiter);
+                push_seconds(line, elapsed, decimal);
+                line.push(delimiter);
+                push_number(line, u64::from(source.node.get()));
+                line.push(delimiter);
+                push_text(line, &source.signal, delimiter);
+                line.push(delimiter);
+                push_value(line, sample.value, decimal)?;
+                line.push(delimiter);
+                push_text(line, &source.unit, delimiter);
+                line.push(delimiter);
+                line.extend_from_slice(sample.status.map_or("", Status::as_str).as_bytes());
+                line.push(delimiter);
+                push_raw(line, &sample.raw);
+                line.push(b'\n');
+            }
+            Form::Json => {
+                let time = self.times.json(sample.at.wall)?;
+                json::row(line, &time, elapsed.as_secs_f64(), sample, source)?;
+            }
+        }
+        self.end_row(begin, sample.at.mono)
+    }
+
+    fn write_cycles(&mut self, now: Mono) -> io::Result<()> {
+        while let Some((at, cycle)) = self.wide.as_mut().and_then(|wide| wide.pop(now, false)) {
+            self.row_of_cycle(at, &cycle)?;
+        }
+        Ok(())
+    }
+
+    fn row_of_cycle(&mut self, at: Stamp, cycle: &Cycle) -> io::Result<()> {
+        if self.is_complete() {
+            return Ok(());
+        }
+        let Some(wide) = self.wide.take() else { return Ok(()) };
+        let result = self.wide_row(at, cycle, &wide);
+        self.wide = Some(wide);
+        result
+    }
+
+    fn wide_row(&mut self, at: Stamp, cycle: &Cycle, wide: &Wide) -> io::Result<()> {
+        let elapsed = self.begin_row_under(at, Some(wide))?;
+        let begin = self.block.len();
+        let Dialect { delimiter, decimal, .. } = self.setup.dialect;
+        let line = &mut self.block;
+        match self.setup.form {
+            Form::Csv => {
+                self.times.write(line, at.wall, decimal)?;
+                line.push(delimiter);
+                push_seconds(line, elapsed, decimal);
+                for cell in &cycle.cells {
+                    let (value, status) = cell.unwrap_or_default();
+                    line.push(delimiter);
+                    push_value(line, value, decimal)?;
+                    line.push(delimiter);
+                    line.extend_from_slice(status.map_or("", Status::as_str).as_bytes());
+                }
+                line.push(b'\n');
+            }
+            Form::Json => {
+                let time = self.times.json(at.wall)?;
+                let cells = cycle.cells.iter().map(|cell| cell.unwrap_or_default());
+                json::wide_row(line, &time, elapsed.as_secs_f64(), wide.names().zip(cells))?;
+            }
+        }
+        // What waits in a row that takes long has waited since its first value.
+        self.end_row_under(begin, at.mono, Some(wide))
+    }
+
+    fn change_columns(&mut self, sample: &Sample, sources: &[Source]) -> io::Result<()> {
+        while let Some((at, cycle)) = self.wide.as_mut().and_then(|wide| wide.pop(sample.at.mono, true)) {
+            self.row_of_cycle(at, &cycle)?;
+        }
+        if let Some(wide) = &mut self.wide {
+            wide.change(sample, sources);
+        }
+        self.changes += 1;
+        if self.rows > 0 || self.setup.continues {
+            self.flush()?;
+            let mut head = Vec::new();
+            match (self.setup.has_series, self.setup.form) {
+                (false, Form::Json) => return Ok(()),
+                (false, Form::Csv) => head.push(b'\n'),
+                (true, _) => {}
+            }
+            head.extend(self.setup.head(self.wide.as_ref()));
+            return self.begin_file(self.setup.has_series, head);
+        }
+        Ok(())
+    }
+
+    fn begin_row(&mut self, at: Stamp) -> io::Result<Duration> {
+        self.begin_row_under(at, None)
+    }
+
+    /// How long after the first row this one is; a new file where one is due.
+    fn begin_row_under(&mut self, at: Stamp, wide: Option<&Wide>) -> io::Result<Duration> {
+        let elapsed = self.elapsed.get_or_insert_default().take(at);
+        if self.rows == 0 {
+            if !self.setup.continues {
+                self.block.extend(self.setup.head(wide));
+                self.bytes = self.block.len() as u64;
+            }
+            self.set_end(elapsed);
+        } else if elapsed >= self.until && matches!(self.setup.rotation, Some(Rotation::Every(_))) {
+            let flushed = self.flush();
+            if let Err(error) = flushed.and_then(|()| self.begin_file(true, self.setup.head(wide))) {
+                // There is no place for this row.
+                self.homeless += 1;
+                return Err(error);
+            }
+            self.set_end(elapsed);
+        }
+        Ok(elapsed)
+    }
+
+    /// The end of the file that a row of this time begins: a whole multiple, so that nothing drifts.
+    fn set_end(&mut self, elapsed: Duration) {
+        if let Some(Rotation::Every(length)) = self.setup.rotation {
+            let past = elapsed.as_nanos() % length.as_nanos().max(1);
+            self.until = elapsed - Duration::from_nanos(u64::try_from(past).unwrap_or(0)) + length;
+        }
+    }
+
+    fn begin_file(&mut self, next: bool, head: Vec<u8>) -> io::Result<()> {
+        (self.bytes, self.rows_here) = (head.len() as u64, 0);
+        self.sink.head(next, head)
+    }
+
+    fn end_row(&mut self, begin: usize, since: Mono) -> io::Result<()> {
+        self.end_row_under(begin, since, None)
+    }
+
+    /// A row stands in the block from `begin` on.
+    fn end_row_under(&mut self, begin: usize, since: Mono, wide: Option<&Wide>) -> io::Result<()> {
+        let length = (self.block.len() - begin) as u64;
+        let mut result = Ok(());
+        self.rows += 1;
+        if let Some(Rotation::Size(most)) = self.setup.rotation
+            && self.rows_here > 0
+            && self.bytes + length > most
+        {
+            let row = self.block.split_off(begin);
+            result = self.flush().and_then(|()| self.begin_file(true, self.setup.head(wide)));
+            self.block = row;
+        }
+        self.bytes += length;
+        self.rows_here += 1;
         self.waiting += 1;
-        self.since.get_or_insert(sample.at.mono);
+        self.since.get_or_insert(since);
+        result?;
         if self.block.len() >= BLOCK { self.flush() } else { Ok(()) }
     }
 
-    fn csv(&mut self, sample: &Sample, source: &Source, elapsed: Duration) -> io::Result<()> {
-        let line = &mut self.scratch;
-        line.clear();
-        let time = humantime::format_rfc3339_micros(sample.at.wall.system_time());
-        let written = write!(line, "{time},{}.{:06},{},", elapsed.as_secs(), elapsed.subsec_micros(), source.node)
-            .and_then(|()| write_cell(line, &source.signal))
-            .and_then(|()| write_value(line, sample.value))
-            .and_then(|()| write_cell(line, &source.unit))
-            .and_then(|()| write!(line, "{},{}", sample.status.map_or("", |status| status.as_str()), sample.raw));
-        written.map_err(io::Error::other)?;
-        line.push('\n');
-        self.block.extend_from_slice(line.as_bytes());
-        Ok(())
+    /// Time passes: hands over what has waited long enough.
+    pub fn pass(&mut self, now: Stamp) -> io::Result<()> {
+        self.write_cycles(now.mono)?;
+        if self.since.is_some_and(|since| now.mono.since(since) >= LATEST) { self.flush() } else { self.sink.check() }
     }
 
-    /// Hands over what has waited long enough.
-    pub fn flush_if_due(&mut self, now: Stamp) -> io::Result<()> {
-        if self.since.is_some_and(|since| now.mono.since(since) >= LATEST) { self.flush() } else { Ok(()) }
-    }
-
-    /// Hands everything over. On failure the target ends with a whole row, and the rest is counted as lost.
-    pub fn flush(&mut self) -> io::Result<()> {
-        let result = write_whole(&mut self.target, &self.block);
-        if let Err((_, kept)) = &result {
-            let lines = |bytes: &[u8]| bytes.iter().filter(|&&byte| byte == b'\n').count() as u64;
-            // The header is no row.
-            self.lost += lines(&self.block[*kept..]).min(self.waiting);
-        }
-        self.block.clear();
-        self.waiting = 0;
+    fn flush(&mut self) -> io::Result<()> {
         self.since = None;
-        result.map_err(|(error, _)| error)
+        let rows = std::mem::take(&mut self.waiting);
+        self.sink.rows(&mut self.block, rows)
     }
 
-    /// Rows that could not be written.
+    /// Hands everything over at the end, and waits for it to be written; while that does not go on, `give_up` is
+    /// asked ten times a second.
+    pub fn finish(&mut self, give_up: &mut dyn FnMut() -> bool) -> io::Result<()> {
+        let mut result = Ok(());
+        while let Some((at, cycle)) = self.wide.as_mut().and_then(Wide::drain) {
+            result = result.and(self.row_of_cycle(at, &cycle));
+        }
+        result.and(self.flush()).and(self.sink.finish(give_up))
+    }
+
+    /// Whether there are as many rows as there may be.
+    pub fn is_complete(&self) -> bool {
+        self.setup.limit.is_some_and(|limit| self.rows >= limit)
+    }
+
+    /// Rows made so far.
+    pub fn count(&self) -> u64 {
+        self.rows
+    }
+
+    /// Rows that were lost: they came faster than they could be written, or could not be.
     pub fn lost(&self) -> u64 {
-        self.lost
+        self.sink.lost() + self.homeless
     }
-}
 
-/// Text that needs quotes gets them: a comma, a quote, or a line end inside.
-fn write_cell(line: &mut String, text: &str) -> std::fmt::Result {
-    if text.contains([',', '"', '\n', '\r']) {
-        write!(line, "\"{}\",", text.replace('"', "\"\""))
-    } else {
-        line.push_str(text);
-        line.push(',');
-        Ok(())
+    /// Those that came faster than they could be written.
+    pub fn late(&self) -> u64 {
+        self.sink.late()
     }
-}
 
-fn write_value(line: &mut String, value: Option<Number>) -> std::fmt::Result {
-    match value {
-        Some(number) => write!(line, "{number},"),
-        None => {
-            line.push(',');
-            Ok(())
-        }
+    /// Values that had no place in the wide layout: too late, or not the first ones in their cycle.
+    pub fn left_out(&self) -> u64 {
+        self.wide.as_ref().map_or(0, |wide| wide.left_out)
     }
-}
 
-/// Writes all of `bytes`, or up to a line end. Returns how many bytes of whole lines were kept.
-fn write_whole(target: &mut Target, bytes: &[u8]) -> Result<(), (io::Error, usize)> {
-    let mut done = 0;
-    while done < bytes.len() {
-        let result = match target {
-            Target::File(file) => file.write(&bytes[done..]),
-            Target::Stream(stream) => stream.write(&bytes[done..]),
-        };
-        match result {
-            Ok(0) => return Err((io::ErrorKind::WriteZero.into(), cut(target, bytes, done))),
-            Ok(count) => done += count,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err((error, cut(target, bytes, done))),
-        }
+    /// How often the columns of the wide layout have changed.
+    pub fn changes(&self) -> u64 {
+        self.changes
     }
-    if let Target::Stream(stream) = target {
-        stream.flush().map_err(|error| (error, bytes.len()))?;
-    }
-    Ok(())
-}
 
-/// Cuts a file back to the last whole line.
-fn cut(target: &mut Target, bytes: &[u8], done: usize) -> usize {
-    let whole = bytes[..done].iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
-    if let Target::File(file) = target {
-        let excess = (done - whole) as u64;
-        if let Ok(metadata) = file.metadata()
-            && metadata.is_file()
-            && excess > 0
-        {
-            // What the disk refuses here it has refused before; the cause is reported by the caller.
-            let _ = file.set_len(metadata.len().saturating_sub(excess));
-        }
+    /// How long after the first row `at` is; nothing before there is one.
+    pub fn elapsed(&self, at: Stamp) -> Option<Duration> {
+        self.elapsed.as_ref().map(|elapsed| elapsed.look(at))
     }
-    whole
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::bus::Wall;
-    use crate::canopen::id::NodeId;
-    use crate::measure::sample::{Raw, Status};
-    use std::sync::{Arc, Mutex};
-
-    #[derive(Clone, Debug, Default)]
-    struct Shared(Arc<Mutex<Vec<u8>>>);
-
-    impl Write for Shared {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            self.0.lock().expect("not poisoned").extend_from_slice(bytes);
-            Ok(bytes.len())
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
-
-    fn text(form: Form, samples: &[(Sample, Source)]) -> String {
-        let shared = Shared::default();
-        let mut rows = Rows::new(Target::Stream(Box::new(shared.clone())), form);
-        for (sample, source) in samples {
-            rows.add(sample, source).expect("memory");
-        }
-        rows.flush().expect("memory");
-        String::from_utf8(shared.0.lock().expect("not poisoned").clone()).expect("text")
-    }
-
-    fn sample(at_us: u64, value: Option<Number>, status: Option<Status>, raw: &[u8]) -> Sample {
-        let since = Duration::from_micros(at_us);
-        let at = Stamp { mono: Mono::at(since), wall: Wall::at(Duration::from_secs(1_700_000_000) + since) };
-        Sample { at, source: 0, value, status, raw: Raw::new(raw) }
-    }
-
-    fn source(signal: &str, unit: &str) -> Source {
-        Source { node: NodeId::new(5).expect("a node-ID"), signal: signal.into(), unit: unit.into() }
-    }
-
-    #[test]
-    fn csv_rows() {
-        let rows = [
-            (
-                sample(1_000_000, Some(Number::Decimal { mantissa: 50_000, digits: 3 }), None, &[0x50, 0xc3, 0, 0]),
-                source("pressure", "psi"),
-            ),
-            (
-                sample(1_010_001, Some(Number::Real32(1.1)), Some(Status::Ok), &[0xcd, 0xcc, 0x8c, 0x3f]),
-                source("pressure", "bar"),
-            ),
-            (sample(3_000_000, None, Some(Status::OverloadHigh), &[0, 0, 0xc0, 0x7f]), source("a,\"b", "")),
-        ];
-        assert_eq!(
-            text(Form::Csv, &rows),
-            "time,elapsed_s,node,signal,value,unit,status,raw\n\
-             2023-11-14T22:13:21.000000Z,0.000000,5,pressure,50.000,psi,,0x50C30000\n\
-             2023-11-14T22:13:21.010001Z,0.010001,5,pressure,1.1,bar,ok,0xCDCC8C3F\n\
-             2023-11-14T22:13:23.000000Z,2.000000,5,\"a,\"\"b\",,,overload-high,0x0000C07F\n"
-        );
-    }
-
-    #[test]
-    fn json_rows() {
-        let rows = [
-            (
-                sample(0, Some(Number::Decimal { mantissa: 17_898, digits: 3 }), None, &[0xea, 0x45, 0, 0]),
-                source("pressure", "psi"),
-            ),
-            (sample(10_000, Some(Number::Real32(1.1)), Some(Status::Ok), &[1]), source("pressure", "bar")),
-            (sample(20_000, None, Some(Status::Invalid), &[2]), source("ch1", "")),
-        ];
-        assert_eq!(
-            text(Form::Json, &rows),
-            "{\"time\":\"2023-11-14T22:13:20.000000Z\",\"elapsed_s\":0.0,\"node\":5,\"signal\":\"pressure\",\"value\":17.898,\"unit\":\"psi\",\"status\":null,\"raw\":\"0xEA450000\"}\n\
-             {\"time\":\"2023-11-14T22:13:20.010000Z\",\"elapsed_s\":0.01,\"node\":5,\"signal\":\"pressure\",\"value\":1.1,\"unit\":\"bar\",\"status\":\"ok\",\"raw\":\"0x01\"}\n\
-             {\"time\":\"2023-11-14T22:13:20.020000Z\",\"elapsed_s\":0.02,\"node\":5,\"signal\":\"ch1\",\"value\":null,\"unit\":null,\"status\":\"invalid\",\"raw\":\"0x02\"}\n"
-        );
-    }
-
-    #[test]
-    fn what_does_not_fit_is_counted_and_the_target_ends_with_a_whole_row() {
-        #[derive(Debug)]
-        struct Small(Shared, usize);
-        impl Write for Small {
-            fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-                let room = self.1.min(bytes.len());
-                self.1 -= room;
-                if room == 0 { Err(io::ErrorKind::StorageFull.into()) } else { self.0.write(&bytes[..room]) }
-            }
-            fn flush(&mut self) -> io::Result<()> {
-                Ok(())
-            }
-        }
-        let shared = Shared::default();
-        let target = Target::Stream(Box::new(Small(shared.clone(), 49 + 75 + 10)));
-        let mut rows = Rows::new(target, Form::Csv);
-        let row = sample(0, Some(Number::Real32(1.1)), Some(Status::Ok), &[0xcd, 0xcc, 0x8c, 0x3f]);
-        for _ in 0..3 {
-            rows.add(&row, &source("pressure", "bar")).expect("not written yet");
-        }
-        assert_eq!(rows.flush().map_err(|error| error.kind()), Err(io::ErrorKind::StorageFull));
-        assert_eq!(rows.lost(), 2);
-    }
-}
+mod tests;

@@ -8,19 +8,33 @@ use crate::tasks::log::Outcome;
 use serde::Serialize;
 use std::io::{self, Write};
 
+/// What became of the rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// Lines of either layout.
+    pub rows: u64,
+    /// Of which so many were lost: they came faster than they could be written.
+    pub lost: u64,
+    /// Values that had no place in the wide layout.
+    pub left_out: u64,
+}
+
 /// The summary in lines.
-pub fn lines(outcome: &Outcome) -> Vec<String> {
+pub fn lines(outcome: &Outcome, written: Written) -> Vec<String> {
     let mut head = format!(
         "{} rows in {}, {} timestamps, {} frames dropped, {} gaps",
-        grouped(outcome.rows),
+        grouped(written.rows),
         spoken(outcome.length),
         outcome.timestamps,
         grouped(outcome.dropped),
         grouped(outcome.gaps)
     );
-    for (count, what) in
-        [(outcome.emergencies, "emergency messages"), (outcome.skipped, "polls skipped"), (outcome.syncs, "SYNC sent")]
-    {
+    for (count, what) in [
+        (outcome.emergencies, "emergency messages"),
+        (outcome.skipped, "polls skipped"),
+        (outcome.syncs, "SYNC sent"),
+        (written.lost, "rows lost"),
+    ] {
         if count > 0 {
             head.push_str(&format!(", {} {what}", grouped(count)));
         }
@@ -28,6 +42,12 @@ pub fn lines(outcome: &Outcome) -> Vec<String> {
     let mut lines = vec![head];
     for (source, statistics) in &outcome.statistics {
         lines.push(signal(source, statistics));
+    }
+    if written.left_out > 0 {
+        lines.push(format!(
+            "{} values have no place in the wide layout: late, or not the first in their cycle; --layout long has all",
+            grouped(written.left_out)
+        ));
     }
     lines.extend(outcome.remarks.iter().cloned());
     lines
@@ -52,7 +72,7 @@ fn signal(source: &Source, statistics: &Statistics) -> String {
 }
 
 /// The summary as one JSON object.
-pub fn json(out: &mut dyn Write, outcome: &Outcome) -> io::Result<()> {
+pub fn json(out: &mut dyn Write, outcome: &Outcome, written: Written) -> io::Result<()> {
     #[derive(Serialize)]
     struct Signal<'a> {
         node: u8,
@@ -70,6 +90,8 @@ pub fn json(out: &mut dyn Write, outcome: &Outcome) -> io::Result<()> {
     #[derive(Serialize)]
     struct Summary<'a> {
         rows: u64,
+        rows_lost: u64,
+        values_left_out: u64,
         length_s: f64,
         timestamps: String,
         dropped: u64,
@@ -95,7 +117,9 @@ pub fn json(out: &mut dyn Write, outcome: &Outcome) -> io::Result<()> {
         longest_interval_s: statistics.longest_interval().as_secs_f64(),
     });
     let summary = Summary {
-        rows: outcome.rows,
+        rows: written.rows,
+        rows_lost: written.lost,
+        values_left_out: written.left_out,
         length_s: outcome.length.as_secs_f64(),
         timestamps: outcome.timestamps.to_string(),
         dropped: outcome.dropped,

@@ -210,8 +210,7 @@ impl Recording {
                         slot = next;
                     }
                     if let Some(poll) = &mut poll {
-                        if poll.due(begin) <= until
-                            && observer.cycle(poll.next_cycle(), master.bus().now()).is_break()
+                        if poll.due(begin) <= until && observer.cycle(poll.next_cycle(), master.bus().now()).is_break()
                         {
                             return Ok(());
                         }

@@ -1,0 +1,360 @@
+//! The files of `cangauge log`, and the form of what stands in them.
+
+use super::super::exit::FileError;
+use super::super::file::{Existing, OutFile};
+use crate::output::events::Events;
+use crate::output::rows::{
+    CAPACITY, Dialect, Form, Kept, Layout, OtherHead, Rotation, Rows, Series, Setup, Sink, Target, TimeForm, look,
+};
+use crate::tasks::{Failure, Kind};
+use clap::{Args, ValueEnum};
+use std::fs::OpenOptions;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Where rows and events go, and how they look.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Output options")]
+pub(super) struct Files {
+    /// Write to a file instead of stdout
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: Option<PathBuf>,
+    /// Overwrite files that exist
+    #[arg(long, conflicts_with = "append")]
+    force: bool,
+    /// Continue files that exist and have the same columns; a last line that was cut off goes
+    #[arg(long, requires = "output")]
+    append: bool,
+    /// One line per value, or one per cycle of --sync or --poll
+    #[arg(long, value_name = "LAYOUT", default_value = "long")]
+    layout: LayoutArg,
+    /// Begin a new file after this time or before this size: 10m, 1h, 100MB, 1GiB. For run.csv they are
+    /// run-0001.csv and so on
+    #[arg(long, value_name = "DUR|SIZE", requires = "output")]
+    rotate: Option<RotationArg>,
+    /// Write what happens on the way, with its time, as CSV: emergencies, gaps, losses, reboots
+    #[arg(long, value_name = "FILE")]
+    events: Option<PathBuf>,
+    /// Write the summary as JSON to a file; - for stdout
+    #[arg(long, value_name = "FILE")]
+    pub(super) summary: Option<PathBuf>,
+    /// Between the columns of CSV: , ; | or tab [default: ,]
+    #[arg(long, value_name = "CHAR")]
+    delimiter: Option<Delimiter>,
+    /// Decimal sign of CSV: . or , [default: .]
+    #[arg(long, value_name = "CHAR")]
+    decimal: Option<Decimal>,
+    /// Begin CSV with a byte order mark, which some spreadsheets ask for
+    #[arg(long)]
+    bom: bool,
+    /// Times as text (RFC 3339), as seconds since 1970, or as the days that spreadsheets count; all UTC
+    #[arg(long, value_name = "FORM", default_value = "rfc3339")]
+    time: TimeArg,
+}
+
+// No doc comments on the variants: clap would spread each over lines of its own in every help text.
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum LayoutArg {
+    Long,
+    Wide,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum TimeArg {
+    Rfc3339,
+    Unix,
+    Excel,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Delimiter(u8);
+
+impl FromStr for Delimiter {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Delimiter, String> {
+        match text {
+            "," | ";" | "|" | "\t" => Ok(Delimiter(text.as_bytes()[0])),
+            "tab" | "\\t" => Ok(Delimiter(b'\t')),
+            _ => Err(format!("\"{text}\" is no delimiter (, ; | or tab)")),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Decimal(u8);
+
+impl FromStr for Decimal {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Decimal, String> {
+        match text {
+            "." | "," => Ok(Decimal(text.as_bytes()[0])),
+            _ => Err(format!("\"{text}\" is no decimal sign (. or ,)")),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct RotationArg(Rotation);
+
+/// A file for every second is short enough.
+const SHORTEST: std::time::Duration = std::time::Duration::from_secs(1);
+
+/// A file has room for some rows.
+const SMALLEST: u64 = 1000;
+
+impl FromStr for RotationArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<RotationArg, String> {
+        let wrong = || format!("\"{text}\" is neither a time nor a size (10m, 1h30m, 100MB, 1GiB)");
+        if let Some(size) = text.strip_suffix('B') {
+            let digits = size.bytes().take_while(u8::is_ascii_digit).count();
+            let (number, prefix) = size.split_at(digits);
+            let factors = [("", 1), ("k", 1000), ("M", 1_000_000), ("G", 1_000_000_000), ("T", 1_000_000_000_000)];
+            let binary = [("Ki", 1 << 10), ("Mi", 1 << 20), ("Gi", 1 << 30), ("Ti", 1 << 40)];
+            let mut factors = factors.into_iter().chain(binary);
+            let factor: u64 = factors.find(|(name, _)| *name == prefix).map(|(_, factor)| factor).ok_or_else(wrong)?;
+            let size = number.parse::<u64>().ok().and_then(|number| number.checked_mul(factor)).ok_or_else(wrong)?;
+            return match size {
+                SMALLEST.. => Ok(RotationArg(Rotation::Size(size))),
+                _ => Err(format!("\"{text}\" is too small for a file (1kB or more)")),
+            };
+        }
+        match humantime::parse_duration(text) {
+            // Ten months to one, ten megabytes to the other.
+            Ok(_) if text.contains('M') => Err(wrong()),
+            Ok(length) if length >= SHORTEST => Ok(RotationArg(Rotation::Every(length))),
+            Ok(_) => Err(format!("\"{text}\" is too short for a file (1s or more)")),
+            Err(_) => Err(wrong()),
+        }
+    }
+}
+
+/// The files, open, and what is to stand in them.
+pub(super) struct Opened {
+    pub(super) rows: Option<OutFile>,
+    pub(super) events: Option<OutFile>,
+    pub(super) summary: Option<OutFile>,
+    series: Option<Series>,
+    setup: Setup,
+    /// The length of what stays.
+    keep: u64,
+    events_kept: Option<Kept>,
+}
+
+impl Files {
+    /// Whether a row is a cycle.
+    pub(super) fn is_wide(&self) -> bool {
+        self.layout == LayoutArg::Wide
+    }
+
+    /// What can be known to be wrong before anything is opened.
+    pub(super) fn refuse(&self, form: Form, has_cycles: bool) -> Result<(), Failure> {
+        let refuse = |message: &str, hint: &str| Err(Failure::new(Kind::Usage, message).hint(hint));
+        if self.is_wide() && !has_cycles {
+            return refuse(
+                "--layout wide needs --sync or --poll: a row is one of their cycles",
+                "add --sync 100ms or --poll 100ms, or leave --layout wide out",
+            );
+        }
+        let of_csv = self.delimiter.is_some() || self.decimal.is_some() || self.bom;
+        if form == Form::Json && of_csv {
+            return refuse("--delimiter, --decimal and --bom are for CSV", "leave --format json out, or them");
+        }
+        let Dialect { delimiter, decimal, .. } = self.dialect();
+        if delimiter == decimal {
+            return refuse("the decimal sign cannot be the delimiter, too", "add --delimiter ';'");
+        }
+        let files = [&self.output, &self.events, &self.summary].into_iter().flatten();
+        let files: Vec<&PathBuf> = files.filter(|path| path.as_path() != Path::new("-")).collect();
+        for (at, path) in files.iter().enumerate() {
+            if files[..at].contains(path) {
+                return refuse(&format!("{} is named twice", path.display()), "each output needs a file of its own");
+            }
+        }
+        Ok(())
+    }
+
+    fn dialect(&self) -> Dialect {
+        let delimiter = self.delimiter.map_or(b',', |delimiter| delimiter.0);
+        Dialect { delimiter, decimal: self.decimal.map_or(b'.', |decimal| decimal.0), bom: self.bom }
+    }
+
+    fn time(&self) -> TimeForm {
+        match self.time {
+            TimeArg::Rfc3339 => TimeForm::Rfc3339,
+            TimeArg::Unix => TimeForm::Unix,
+            TimeArg::Excel => TimeForm::Excel,
+        }
+    }
+
+    fn existing(&self) -> Existing {
+        match (self.force, self.append) {
+            (true, _) => Existing::Overwrite,
+            (_, true) => Existing::Continue,
+            _ => Existing::Refuse,
+        }
+    }
+
+    /// Opens everything, before the bus.
+    pub(super) fn open(&self, form: Form, count: Option<u64>) -> anyhow::Result<Opened> {
+        let setup = Setup {
+            form,
+            layout: if self.is_wide() { Layout::Wide } else { Layout::Long },
+            dialect: self.dialect(),
+            time: self.time(),
+            rotation: self.rotate.map(|rotation| rotation.0),
+            limit: count.filter(|_| self.is_wide()),
+            ..Setup::default()
+        };
+        let open = |path: &PathBuf| OutFile::open(path, self.existing());
+        let mut opened =
+            Opened { rows: None, events: None, summary: None, series: None, setup, keep: 0, events_kept: None };
+        match &self.output {
+            Some(base) if self.rotate.is_some() => self.open_first(base, &mut opened)?,
+            Some(path) => {
+                let mut file = open(path)?;
+                if let Some(kept) = file.look()? {
+                    opened.keep = kept.length;
+                    opened.setup.continues = true;
+                    opened.setup.before = Some(kept.head);
+                }
+                if file.is_regular() {
+                    opened.series = Some(Series::new(path, 2, self.force));
+                    opened.setup.has_series = true;
+                }
+                opened.rows = Some(file);
+            }
+            None => {}
+        }
+        if let (false, Some(file)) = (self.is_wide(), &opened.rows) {
+            opened.setup.fits().map_err(|other| other_head(file.path(), &other))?;
+        }
+        opened.events = self.events.as_ref().map(open).transpose()?;
+        if let Some(file) = &mut opened.events {
+            opened.events_kept = file.look()?;
+            let wanted = Events::header(self.dialect());
+            if let Some(kept) = opened.events_kept.as_ref().filter(|kept| kept.head != wanted) {
+                return Err(other_head(file.path(), &OtherHead { found: kept.head.clone(), wanted }).into());
+            }
+        }
+        let summary = self.summary.as_ref().filter(|path| path.as_path() != Path::new("-"));
+        opened.summary = summary.map(open).transpose()?;
+        if let Some(file) = &mut opened.summary {
+            file.look()?;
+        }
+        Ok(opened)
+    }
+
+    /// The first file of many.
+    fn open_first(&self, base: &Path, opened: &mut Opened) -> anyhow::Result<()> {
+        let numbers = Series::existing(base)
+            .map_err(|source| FileError { what: format!("create {}", Series::name(base, 1).display()), source })?;
+        let mut first = 1;
+        let mut mending = None;
+        match (numbers.last(), self.existing()) {
+            (Some(_), Existing::Refuse) => {
+                let name = Series::name(base, *numbers.first().unwrap_or(&1));
+                let failure = Failure::new(Kind::Usage, format!("{} exists", name.display()));
+                return Err(failure.hint("overwrite with --force, go on with --append, or name another file").into());
+            }
+            (Some(last), Existing::Continue) => {
+                let path = Series::name(base, *last);
+                let read = |path: &Path| -> io::Result<_> {
+                    let mut file = OpenOptions::new().read(true).write(true).open(path)?;
+                    let kept = look(&mut file)?;
+                    Ok((file, kept))
+                };
+                let (file, kept) =
+                    read(&path).map_err(|source| FileError { what: format!("read {}", path.display()), source })?;
+                first = last.saturating_add(1);
+                opened.setup.before = kept.as_ref().map(|kept| kept.head.clone());
+                mending = Some((file, kept.map_or(0, |kept| kept.length)));
+            }
+            _ => {}
+        }
+        let existing = if self.force { Existing::Overwrite } else { Existing::Refuse };
+        opened.rows = Some(OutFile::open(&Series::name(base, first), existing)?);
+        opened.setup.has_series = true;
+        let series = Series::new(base, first.saturating_add(1), self.force);
+        opened.series = Some(match mending {
+            Some((file, length)) => series.mending(file, length),
+            None => series,
+        });
+        Ok(())
+    }
+}
+
+impl Opened {
+    /// The rows' writer; where the bus does not wait for who is slow, a thread writes.
+    pub(super) fn rows(&mut self, waits: bool) -> anyhow::Result<Rows> {
+        let target = match &self.rows {
+            Some(file) => Target::File { file: file.handle()?, keep: self.keep },
+            None => Target::Stream(Box::new(io::stdout())),
+        };
+        Ok(Rows::new(sink(target, self.series.take(), waits)?, self.setup.clone()))
+    }
+
+    /// The events' writer, if events are wanted.
+    pub(super) fn events(&self, waits: bool) -> anyhow::Result<Option<Events>> {
+        let Some(file) = &self.events else { return Ok(None) };
+        let (dialect, kept) = (self.setup.dialect, self.events_kept.as_ref());
+        let target = Target::File { file: file.handle()?, keep: kept.map_or(0, |kept| kept.length) };
+        let sink = sink(target, None, waits)?;
+        Ok(Some(Events::new(sink, dialect, self.setup.time, kept.is_some())))
+    }
+
+    /// That the file which was to be continued has other columns.
+    pub(super) fn other_head(&self, other: &OtherHead) -> Failure {
+        other_head(self.rows.as_ref().map_or(Path::new("stdout"), OutFile::path), other)
+    }
+}
+
+fn sink(target: Target, series: Option<Series>, waits: bool) -> anyhow::Result<Sink> {
+    if waits {
+        return Ok(Sink::direct(target, series));
+    }
+    let sink = Sink::queued(target, series, CAPACITY);
+    Ok(sink.map_err(|source| FileError { what: "start a thread".to_owned(), source })?)
+}
+
+fn other_head(path: &Path, other: &OtherHead) -> Failure {
+    let message = format!("{} has other columns: \"{}\", not \"{}\"", path.display(), other.found, other.wanted);
+    Failure::new(Kind::Usage, message).hint("name another file, or overwrite it with --force")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn rotations() {
+        let rotation = |text: &str| text.parse::<RotationArg>().map(|rotation| rotation.0);
+        assert_eq!(rotation("10m"), Ok(Rotation::Every(Duration::from_secs(600))));
+        assert_eq!(rotation("1h30m"), Ok(Rotation::Every(Duration::from_secs(5400))));
+        assert_eq!(rotation("100MB"), Ok(Rotation::Size(100_000_000)));
+        assert_eq!(rotation("1GiB"), Ok(Rotation::Size(1 << 30)));
+        assert_eq!(rotation("1500B"), Ok(Rotation::Size(1500)));
+        for wrong in ["", "B", "10", "10M", "MB", "1.5MB", "-1MB", "10mB", "10 MB", "99999999999TB", "10KB", "1é0MB"] {
+            let neither = format!("\"{wrong}\" is neither a time nor a size (10m, 1h30m, 100MB, 1GiB)");
+            assert_eq!(rotation(wrong), Err(neither), "{wrong}");
+        }
+        assert_eq!(rotation("10ms"), Err("\"10ms\" is too short for a file (1s or more)".to_owned()));
+        assert_eq!(rotation("999B"), Err("\"999B\" is too small for a file (1kB or more)".to_owned()));
+    }
+
+    #[test]
+    fn delimiters_and_decimal_signs() {
+        assert_eq!(("tab".parse(), "\\t".parse()), (Ok(Delimiter(b'\t')), Ok(Delimiter(b'\t'))));
+        assert_eq!((";".parse(), ",".parse()), (Ok(Delimiter(b';')), Ok(Decimal(b','))));
+        for wrong in ["", ".", "a", ";;", ":", "é"] {
+            assert!(wrong.parse::<Delimiter>().is_err(), "{wrong}");
+        }
+        assert!(";".parse::<Decimal>().is_err());
+    }
+}

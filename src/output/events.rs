@@ -1,0 +1,151 @@
+//! What happens on the way of a recording: in words for people, and as CSV for later.
+
+use super::rows::{Dialect, Sink, TimeForm, Times, push_number, push_seconds, push_text, push_texts};
+use crate::bus::Stamp;
+use crate::bus::time::spoken;
+use crate::canopen::id::NodeId;
+use crate::tasks::log::Note;
+use std::io;
+use std::time::Duration;
+
+/// The columns.
+pub const COLUMNS: [&str; 5] = ["time", "elapsed_s", "node", "event", "text"];
+
+/// How much something matters to who watches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weight {
+    /// It is not as it should be.
+    Warning,
+    /// It is worth knowing.
+    Note,
+    /// It is said when more is asked for.
+    Detail,
+}
+
+/// Something that happened, in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Words {
+    /// What stands in the column `event`; nothing for what is no event.
+    pub event: Option<&'static str>,
+    /// Whom it concerns.
+    pub node: Option<NodeId>,
+    /// One line.
+    pub text: String,
+    /// How much it matters.
+    pub weight: Weight,
+}
+
+impl Words {
+    /// An event that concerns no node.
+    pub fn of_all(event: &'static str, weight: Weight, text: String) -> Words {
+        Words { event: Some(event), node: None, text, weight }
+    }
+}
+
+/// What a recording tells, in words.
+pub fn words(note: &Note) -> Words {
+    use Weight::{Detail, Note as Remark, Warning};
+    let of_node = |node: NodeId, event, weight, text| Words { event: Some(event), node: Some(node), text, weight };
+    match note {
+        Note::Remark(text) => Words::of_all("remark", Warning, text.clone()),
+        Note::Emergency(node, emergency, meaning) => {
+            let text = if emergency.code == 0 {
+                "emergency over (0000h)".to_owned()
+            } else {
+                let register = emergency.register.map(|register| format!(", {register}")).unwrap_or_default();
+                format!("emergency {:04X}h, {meaning}{register}", emergency.code)
+            };
+            of_node(*node, "emcy", Warning, format!("node {node}: {text}"))
+        }
+        Note::Share(period, share) => Words {
+            event: None,
+            node: None,
+            text: format!(
+                "SYNC every {} and the answers take about {:.1} % of the bus",
+                spoken(*period),
+                share * 100.0
+            ),
+            weight: Remark,
+        },
+        Note::Restarted(node) => of_node(*node, "reboot", Warning, format!("node {node} restarted")),
+        Note::Gap(node, length) => of_node(*node, "gap", Detail, format!("node {node}: a gap of {}", spoken(*length))),
+        Note::Silent(node, since) => {
+            of_node(*node, "lost", Warning, format!("node {node}: silent for {}", spoken(*since)))
+        }
+        Note::Back(node) => of_node(*node, "back", Remark, format!("node {node} is back")),
+        Note::WrongLength(node) => {
+            let text = "a TPDO has not the length of its mapping: no row is made of it";
+            of_node(*node, "length", Warning, format!("node {node}: {text}"))
+        }
+        Note::Fault(fault) => Words::of_all("fault", Detail, fault.to_string()),
+        Note::Dropped(count) => Words::of_all("dropped", Warning, format!("the kernel dropped {count} frames")),
+        Note::Link(true) => Words::of_all("link-up", Remark, "the interface is up again".to_owned()),
+        Note::Link(false) => Words::of_all("link-down", Warning, "the interface went down; waiting for it".to_owned()),
+    }
+}
+
+/// Writes events.
+#[derive(Debug)]
+pub struct Events {
+    sink: Sink,
+    dialect: Dialect,
+    times: Times,
+    /// Whether the header is still to be written.
+    is_new: bool,
+}
+
+impl Events {
+    /// Events into `sink`; one that continues has its header already.
+    pub fn new(sink: Sink, dialect: Dialect, time: TimeForm, continues: bool) -> Events {
+        Events { sink, dialect, times: Times::new(time), is_new: !continues }
+    }
+
+    /// The header, as it stands in a file without byte order mark.
+    pub fn header(dialect: Dialect) -> String {
+        let mut head = Vec::new();
+        push_texts(&mut head, COLUMNS, dialect.delimiter);
+        String::from_utf8_lossy(&head).trim_end().to_owned()
+    }
+
+    /// The recording has begun: a file without events has a header.
+    pub fn begin(&mut self) -> io::Result<()> {
+        if !std::mem::take(&mut self.is_new) {
+            return self.sink.check();
+        }
+        let mark = if self.dialect.bom { "\u{feff}" } else { "" };
+        self.sink.head(false, format!("{mark}{}\n", Events::header(self.dialect)).into_bytes())
+    }
+
+    /// Writes an event at once; `elapsed` is since the first row.
+    pub fn add(&mut self, at: Stamp, elapsed: Option<Duration>, words: &Words) -> io::Result<()> {
+        let Some(event) = words.event else { return Ok(()) };
+        self.begin()?;
+        let Dialect { delimiter, decimal, .. } = self.dialect;
+        let mut line = Vec::new();
+        self.times.write(&mut line, at.wall, decimal)?;
+        line.push(delimiter);
+        if let Some(elapsed) = elapsed {
+            push_seconds(&mut line, elapsed, decimal);
+        }
+        line.push(delimiter);
+        if let Some(node) = words.node {
+            push_number(&mut line, u64::from(node.get()));
+        }
+        line.push(delimiter);
+        line.extend_from_slice(event.as_bytes());
+        line.push(delimiter);
+        push_text(&mut line, &words.text, delimiter);
+        line.push(b'\n');
+        self.sink.rows(&mut line, 1)
+    }
+
+    /// Waits until everything is written, or `give_up` says so, as [`super::rows::Rows::finish`] does.
+    pub fn finish(&mut self, give_up: &mut dyn FnMut() -> bool) -> io::Result<()> {
+        self.sink.finish(give_up)
+    }
+
+    /// Events that were lost.
+    pub fn lost(&self) -> u64 {
+        self.sink.lost()
+    }
+}

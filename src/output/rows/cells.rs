@@ -1,0 +1,271 @@
+//! The cells of a row: times, numbers and text, each written without an allocation.
+
+use crate::bus::time::Wall;
+use crate::measure::sample::{Number, Raw};
+use std::io::{self, Write};
+use std::time::Duration;
+
+/// How CSV is written, for the spreadsheets of different countries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dialect {
+    /// Between two cells: one ASCII character.
+    pub delimiter: u8,
+    /// Between a number's digits: `.` or `,`.
+    pub decimal: u8,
+    /// Whether a file begins with a byte order mark.
+    pub bom: bool,
+}
+
+impl Default for Dialect {
+    fn default() -> Dialect {
+        Dialect { delimiter: b',', decimal: b'.', bom: false }
+    }
+}
+
+/// How a time is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TimeForm {
+    /// `2023-11-14T22:13:21.010001Z`.
+    #[default]
+    Rfc3339,
+    /// Seconds since 1970-01-01 UTC, with microseconds.
+    Unix,
+    /// Days since 1899-12-30 UTC, as spreadsheets count them.
+    Excel,
+}
+
+/// The UTF-8 byte order mark.
+pub(super) const BOM: &[u8] = b"\xef\xbb\xbf";
+
+/// From 1899-12-30 to 1970-01-01.
+const DAYS_BEFORE_1970: u64 = 25_569;
+
+/// Microseconds of a day.
+const DAY_US: u128 = 86_400_000_000;
+
+/// Digits behind the point of a day: finer than a microsecond.
+const DAY_DIGITS: usize = 11;
+
+/// Writes times; the text of a second is made once.
+#[derive(Debug, Default)]
+pub(in crate::output) struct Times {
+    form: TimeForm,
+    second: Option<u64>,
+    /// `2023-11-14T22:13:21`.
+    text: String,
+}
+
+impl Times {
+    pub(in crate::output) fn new(form: TimeForm) -> Times {
+        Times { form, ..Times::default() }
+    }
+
+    /// A time as JSON has it: in quotes, or a number.
+    pub(in crate::output) fn json(&mut self, wall: Wall) -> io::Result<serde_json::Value> {
+        let mut text = Vec::new();
+        self.write(&mut text, wall, b'.')?;
+        let text = String::from_utf8_lossy(&text);
+        match self.form {
+            TimeForm::Rfc3339 => Ok(text.into()),
+            TimeForm::Unix | TimeForm::Excel => Ok(text.parse::<f64>().map_err(io::Error::other)?.into()),
+        }
+    }
+
+    /// Writes a time.
+    pub(in crate::output) fn write(&mut self, out: &mut Vec<u8>, wall: Wall, decimal: u8) -> io::Result<()> {
+        let since = wall.since_epoch();
+        match self.form {
+            TimeForm::Rfc3339 => {
+                if self.second != Some(since.as_secs()) {
+                    use std::fmt::Write as _;
+                    self.text.clear();
+                    self.second = None;
+                    let whole = Wall::at(Duration::from_secs(since.as_secs())).system_time();
+                    // Years beyond 9999 have no such text.
+                    write!(self.text, "{}", humantime::format_rfc3339_seconds(whole)).map_err(io::Error::other)?;
+                    self.text.pop();
+                    self.second = Some(since.as_secs());
+                }
+                out.extend_from_slice(self.text.as_bytes());
+                out.push(b'.');
+                push_padded(out, u64::from(since.subsec_micros()), 6);
+                out.push(b'Z');
+            }
+            TimeForm::Unix => push_seconds(out, since, decimal),
+            TimeForm::Excel => {
+                let rest = since.as_micros() % DAY_US;
+                let scale = 10u128.pow(11);
+                // Half a unit is added to round; what rounds up to a whole day is the next one.
+                let fraction = (rest * scale + DAY_US / 2) / DAY_US;
+                let days = u64::try_from(since.as_micros() / DAY_US + fraction / scale).unwrap_or(u64::MAX);
+                push_number(out, days.saturating_add(DAYS_BEFORE_1970));
+                out.push(decimal);
+                push_padded(out, u64::try_from(fraction % scale).unwrap_or(0), DAY_DIGITS);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Seconds with six decimals.
+pub(in crate::output) fn push_seconds(out: &mut Vec<u8>, length: Duration, decimal: u8) {
+    push_number(out, length.as_secs());
+    out.push(decimal);
+    push_padded(out, u64::from(length.subsec_micros()), 6);
+}
+
+/// An integer.
+pub(in crate::output) fn push_number(out: &mut Vec<u8>, number: u64) {
+    push_padded(out, number, 1);
+}
+
+/// An integer with zeros in front, up to `width` digits.
+fn push_padded(out: &mut Vec<u8>, mut number: u64, width: usize) {
+    let mut digits = [b'0'; 20];
+    let mut at = digits.len();
+    while number > 0 || digits.len() - at < width.min(digits.len()) {
+        at -= 1;
+        digits[at] = b'0' + (number % 10) as u8;
+        number /= 10;
+    }
+    out.extend_from_slice(&digits[at..]);
+}
+
+/// A measured number; nothing where there is none.
+pub(super) fn push_value(out: &mut Vec<u8>, value: Option<Number>, decimal: u8) -> io::Result<()> {
+    match value {
+        None => {}
+        Some(Number::Decimal { mantissa, digits: digits @ 0..=18 }) if mantissa.unsigned_abs() < 1 << 63 => {
+            if mantissa < 0 {
+                out.push(b'-');
+            }
+            let size = u64::try_from(mantissa.unsigned_abs()).unwrap_or(0);
+            let power = 10u64.pow(u32::from(digits));
+            push_number(out, size / power);
+            if digits > 0 {
+                out.push(decimal);
+                push_padded(out, size % power, usize::from(digits));
+            }
+        }
+        Some(number) => {
+            let begin = out.len();
+            write!(out, "{number}")?;
+            if decimal != b'.' {
+                out[begin..].iter_mut().filter(|byte| **byte == b'.').for_each(|byte| *byte = decimal);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The bytes on the wire.
+pub(super) fn push_raw(out: &mut Vec<u8>, raw: &Raw) {
+    const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
+    out.extend_from_slice(b"0x");
+    for byte in raw.bytes() {
+        out.extend_from_slice(&[DIGITS[usize::from(byte >> 4)], DIGITS[usize::from(byte & 15)]]);
+    }
+}
+
+/// Text; in quotes where it needs them: a delimiter, a quote, or a line end inside.
+pub(in crate::output) fn push_text(out: &mut Vec<u8>, text: &str, delimiter: u8) {
+    if text.bytes().any(|byte| byte == delimiter || matches!(byte, b'"' | b'\n' | b'\r')) {
+        out.push(b'"');
+        for byte in text.bytes() {
+            out.extend_from_slice(if byte == b'"' { b"\"\"" } else { std::slice::from_ref(&byte) });
+        }
+        out.push(b'"');
+    } else {
+        out.extend_from_slice(text.as_bytes());
+    }
+}
+
+/// A line of texts.
+pub(in crate::output) fn push_texts<'a>(out: &mut Vec<u8>, texts: impl IntoIterator<Item = &'a str>, delimiter: u8) {
+    for (at, text) in texts.into_iter().enumerate() {
+        if at > 0 {
+            out.push(delimiter);
+        }
+        push_text(out, text, delimiter);
+    }
+    out.push(b'\n');
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn time(form: TimeForm, since: Duration) -> String {
+        let mut out = Vec::new();
+        Times::new(form).write(&mut out, Wall::at(since), b'.').expect("a time");
+        String::from_utf8(out).expect("text")
+    }
+
+    fn value(number: Number, decimal: u8) -> String {
+        let mut out = Vec::new();
+        push_value(&mut out, Some(number), decimal).expect("memory");
+        String::from_utf8(out).expect("text")
+    }
+
+    #[test]
+    fn times_in_three_forms() {
+        let since = Duration::from_micros(1_700_000_001_010_001);
+        assert_eq!(time(TimeForm::Rfc3339, since), "2023-11-14T22:13:21.010001Z");
+        assert_eq!(time(TimeForm::Unix, since), "1700000001.010001");
+        // 45244 is 2023-11-14; 22:13:21.010001 of 24 hours is 0.92593761575.
+        assert_eq!(time(TimeForm::Excel, since), "45244.92593761575");
+        assert_eq!(time(TimeForm::Excel, Duration::ZERO), "25569.00000000000");
+        // Half a day, and the last microsecond of one.
+        assert_eq!(time(TimeForm::Excel, Duration::from_secs(43_200)), "25569.50000000000");
+        assert_eq!(time(TimeForm::Excel, Duration::from_micros(86_399_999_999)), "25569.99999999999");
+    }
+
+    #[test]
+    fn the_text_of_a_second_is_that_of_the_next_one_only_once() {
+        let mut times = Times::default();
+        let mut out = Vec::new();
+        for micros in [1_999_999, 2_000_000, 1_000_000] {
+            times.write(&mut out, Wall::at(Duration::from_micros(micros)), b'.').expect("a time");
+            out.push(b' ');
+        }
+        assert_eq!(
+            String::from_utf8_lossy(&out),
+            "1970-01-01T00:00:01.999999Z 1970-01-01T00:00:02.000000Z 1970-01-01T00:00:01.000000Z "
+        );
+        assert!(times.write(&mut out, Wall::at(Duration::from_secs(1 << 40)), b'.').is_err(), "the year 36812");
+    }
+
+    #[test]
+    fn decimal_commas() {
+        assert_eq!(value(Number::Decimal { mantissa: -50_001, digits: 3 }, b','), "-50,001");
+        assert_eq!(value(Number::Real32(-1.5), b','), "-1,5");
+        assert_eq!(value(Number::Real64(1.5e-300), b','), "1,5e-300");
+    }
+
+    #[test]
+    fn quotes_where_needed() {
+        let line = |delimiter| {
+            let mut out = Vec::new();
+            push_texts(&mut out, ["a,b", "c;d", "e\"f", ""], delimiter);
+            String::from_utf8(out).expect("text")
+        };
+        assert_eq!(line(b','), "\"a,b\",c;d,\"e\"\"f\",\n");
+        assert_eq!(line(b';'), "a,b;\"c;d\";\"e\"\"f\";\n");
+    }
+
+    proptest! {
+        #[test]
+        fn numbers_and_times_are_those_of_their_own_display(
+            mantissa in any::<i128>(), small in any::<i64>(), digits in 0u8..=38, since in 0u64..250_000_000_000_000_000,
+        ) {
+            for mantissa in [mantissa, i128::from(small), i128::from(small % 1000)] {
+                let number = Number::Decimal { mantissa, digits };
+                prop_assert_eq!(value(number, b'.'), number.to_string());
+            }
+            let since = Duration::from_micros(since);
+            let own = humantime::format_rfc3339_micros(Wall::at(since).system_time()).to_string();
+            prop_assert_eq!(time(TimeForm::Rfc3339, since), own);
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! The files of one recording: `run-0001.csv`, `run-0002.csv` and so on.
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Names that follow each other.
+#[derive(Debug)]
+pub struct Series {
+    base: PathBuf,
+    next: u32,
+    force: bool,
+    mend: Option<(File, u64)>,
+}
+
+impl Series {
+    /// The files beside `base`, `run.csv`, from this number on. What exists is overwritten only with `force`,
+    /// otherwise its number is passed over.
+    pub fn new(base: &Path, next: u32, force: bool) -> Series {
+        Series { base: base.to_owned(), next, force, mend: None }
+    }
+
+    /// Cuts the file before the first one back to so many bytes, once there is something to write.
+    #[must_use]
+    pub fn mending(self, file: File, length: u64) -> Series {
+        Series { mend: Some((file, length)), ..self }
+    }
+
+    pub(super) fn mend(&mut self) -> io::Result<()> {
+        self.mend.take().map_or(Ok(()), |(file, length)| file.set_len(length))
+    }
+
+    /// The file with this number.
+    pub fn name(base: &Path, number: u32) -> PathBuf {
+        let mut name = base.file_stem().map_or_else(OsString::new, OsString::from);
+        name.push(format!("-{number:04}"));
+        if let Some(extension) = base.extension() {
+            name.push(".");
+            name.push(extension);
+        }
+        base.with_file_name(name)
+    }
+
+    /// The numbers that exist, in ascending order.
+    ///
+    /// # Errors
+    /// The folder cannot be read.
+    pub fn existing(base: &Path) -> io::Result<Vec<u32>> {
+        let folder = base.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut numbers = Vec::new();
+        for entry in fs::read_dir(folder)? {
+            let name = entry?.file_name();
+            let number = Path::new(&name).file_stem().and_then(|stem| stem.to_str()?.rsplit_once('-')?.1.parse().ok());
+            // `run-1.csv` and `run-+0001.csv` are not ours.
+            numbers.extend(number.filter(|&number| Series::name(base, number).file_name() == Some(&name)));
+        }
+        numbers.sort_unstable();
+        Ok(numbers)
+    }
+
+    /// Creates the next file.
+    pub(super) fn create(&mut self) -> io::Result<File> {
+        loop {
+            let path = Series::name(&self.base, self.next);
+            self.next += 1;
+            let mut options = OpenOptions::new();
+            options.write(true);
+            let file = if self.force {
+                options.create(true).truncate(true).open(path)
+            } else {
+                options.create_new(true).open(path)
+            };
+            match file {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists && self.next < u32::MAX => {}
+                file => return file,
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names() {
+        let name = |base: &str, number| Series::name(Path::new(base), number).display().to_string();
+        assert_eq!(name("run.csv", 1), "run-0001.csv");
+        assert_eq!(name("a.b/run.tar.gz", 12), "a.b/run.tar-0012.gz");
+        assert_eq!(name("a.b/run", 12345), "a.b/run-12345");
+    }
+
+    #[test]
+    fn what_exists_is_found_and_passed_over() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for name in ["run-0002.csv", "run-0010.csv", "run-1.csv", "run-0003.txt", "other-0004.csv", "run.csv"] {
+            fs::write(folder.path().join(name), name).expect("written");
+        }
+        let base = folder.path().join("run.csv");
+        assert_eq!(Series::existing(&base).expect("read"), [2, 10]);
+        let mut series = Series::new(&base, 1, false);
+        let created: Vec<bool> = (0..2).map(|_| series.create().is_ok()).collect();
+        assert_eq!((created, Series::existing(&base).expect("read")), (vec![true, true], vec![1, 2, 3, 10]));
+        assert_eq!(fs::read_to_string(folder.path().join("run-0002.csv")).expect("read"), "run-0002.csv");
+        Series::new(&base, 2, true).create().expect("overwritten");
+        assert_eq!(fs::read_to_string(folder.path().join("run-0002.csv")).expect("read"), "");
+    }
+}

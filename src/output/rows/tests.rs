@@ -1,0 +1,203 @@
+//! Rows as they stand in files and streams.
+
+use super::*;
+use crate::bus::Wall;
+use crate::canopen::id::NodeId;
+use crate::measure::sample::{Number, Raw};
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+#[derive(Clone, Debug, Default)]
+struct Shared(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Shared {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().expect("not poisoned").extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Shared {
+    fn text(&self) -> String {
+        String::from_utf8(self.0.lock().expect("not poisoned").clone()).expect("text")
+    }
+}
+
+fn stream(setup: Setup) -> (Shared, Rows) {
+    let shared = Shared::default();
+    let sink = Sink::direct(Target::Stream(Box::new(shared.clone())), None);
+    (shared, Rows::new(sink, setup))
+}
+
+fn text(setup: Setup, samples: &[(Sample, Source)]) -> String {
+    let (shared, mut rows) = stream(setup);
+    for (sample, source) in samples {
+        rows.add(None, std::slice::from_ref(sample), std::slice::from_ref(source)).expect("memory");
+    }
+    rows.finish(&mut || false).expect("memory");
+    shared.text()
+}
+
+fn at(us: u64) -> Stamp {
+    let since = Duration::from_micros(us);
+    Stamp { mono: Mono::at(since), wall: Wall::at(Duration::from_secs(1_700_000_000) + since) }
+}
+
+fn sample(at_us: u64, value: Option<Number>, status: Option<Status>, raw: &[u8]) -> Sample {
+    Sample { at: at(at_us), source: 0, value, status, raw: Raw::new(raw) }
+}
+
+fn source(signal: &str, unit: &str) -> Source {
+    Source { node: NodeId::new(5).expect("a node-ID"), signal: signal.into(), unit: unit.into() }
+}
+
+fn three() -> [(Sample, Source); 3] {
+    [
+        (
+            sample(1_000_000, Some(Number::Decimal { mantissa: 50_000, digits: 3 }), None, &[0x50, 0xc3, 0, 0]),
+            source("pressure", "psi"),
+        ),
+        (
+            sample(1_010_001, Some(Number::Real32(1.1)), Some(Status::Ok), &[0xcd, 0xcc, 0x8c, 0x3f]),
+            source("pressure", "bar"),
+        ),
+        (sample(3_000_000, None, Some(Status::OverloadHigh), &[0, 0, 0xc0, 0x7f]), source("a,\"b", "")),
+    ]
+}
+
+#[test]
+fn csv_rows() {
+    assert_eq!(
+        text(Setup::default(), &three()),
+        "time,elapsed_s,node,signal,value,unit,status,raw\n\
+         2023-11-14T22:13:21.000000Z,0.000000,5,pressure,50.000,psi,,0x50C30000\n\
+         2023-11-14T22:13:21.010001Z,0.010001,5,pressure,1.1,bar,ok,0xCDCC8C3F\n\
+         2023-11-14T22:13:23.000000Z,2.000000,5,\"a,\"\"b\",,,overload-high,0x0000C07F\n"
+    );
+}
+
+#[test]
+fn csv_rows_for_other_countries() {
+    let dialect = Dialect { delimiter: b';', decimal: b',', bom: true };
+    let setup = Setup { dialect, time: TimeForm::Unix, ..Setup::default() };
+    assert_eq!(
+        text(setup, &three()),
+        "\u{feff}time;elapsed_s;node;signal;value;unit;status;raw\n\
+         1700000001,000000;0,000000;5;pressure;50,000;psi;;0x50C30000\n\
+         1700000001,010001;0,010001;5;pressure;1,1;bar;ok;0xCDCC8C3F\n\
+         1700000003,000000;2,000000;5;\"a,\"\"b\";;;overload-high;0x0000C07F\n"
+    );
+}
+
+#[test]
+fn json_rows() {
+    let rows = [
+        (
+            sample(0, Some(Number::Decimal { mantissa: 17_898, digits: 3 }), None, &[0xea, 0x45, 0, 0]),
+            source("pressure", "psi"),
+        ),
+        (sample(10_000, Some(Number::Real32(1.1)), Some(Status::Ok), &[1]), source("pressure", "bar")),
+        (sample(20_000, None, Some(Status::Invalid), &[2]), source("ch1", "")),
+    ];
+    let json = |time| text(Setup { form: Form::Json, time, ..Setup::default() }, &rows);
+    assert_eq!(
+        json(TimeForm::Rfc3339),
+        "{\"time\":\"2023-11-14T22:13:20.000000Z\",\"elapsed_s\":0.0,\"node\":5,\"signal\":\"pressure\",\"value\":17.898,\"unit\":\"psi\",\"status\":null,\"raw\":\"0xEA450000\"}\n\
+         {\"time\":\"2023-11-14T22:13:20.010000Z\",\"elapsed_s\":0.01,\"node\":5,\"signal\":\"pressure\",\"value\":1.1,\"unit\":\"bar\",\"status\":\"ok\",\"raw\":\"0x01\"}\n\
+         {\"time\":\"2023-11-14T22:13:20.020000Z\",\"elapsed_s\":0.02,\"node\":5,\"signal\":\"ch1\",\"value\":null,\"unit\":null,\"status\":\"invalid\",\"raw\":\"0x02\"}\n"
+    );
+    assert!(json(TimeForm::Unix).contains("{\"time\":1700000000.01,\"elapsed_s\":0.01,"), "numbers");
+}
+
+#[test]
+fn wide_rows_and_columns_that_change() {
+    for form in [Form::Csv, Form::Json] {
+        let (shared, mut rows) = stream(Setup { form, layout: Layout::Wide, ..Setup::default() });
+        let sources = [source("pressure", "bar"), source("ch1", ""), source("pressure", "psi")];
+        rows.columns(&sources[..2]).expect("a new file");
+        let value = |us, source, status| Sample { source, ..sample(us, Some(Number::Real32(1.5)), status, &[]) };
+        rows.cycle(0, at(0)).expect("memory");
+        rows.add(None, &[value(10, 0, Some(Status::Ok))], &sources).expect("memory");
+        rows.add(None, &[value(20, 1, None)], &sources).expect("memory");
+        rows.cycle(1, at(1000)).expect("memory");
+        rows.add(None, &[value(1010, 2, None)], &sources).expect("memory");
+        assert_eq!(rows.elapsed(at(510)), Some(Duration::from_micros(500)));
+        rows.finish(&mut || false).expect("memory");
+        assert_eq!((rows.count(), rows.changes(), rows.left_out()), (2, 1, 0));
+        let csv = "time,elapsed_s,5.pressure [bar],5.pressure.status,5.ch1,5.ch1.status\n\
+                   2023-11-14T22:13:20.000010Z,0.000000,1.5,ok,1.5,\n\
+                   \n\
+                   time,elapsed_s,5.pressure [psi],5.pressure.status,5.ch1,5.ch1.status\n\
+                   2023-11-14T22:13:20.001010Z,0.001000,1.5,,,\n";
+        let json = "{\"time\":\"2023-11-14T22:13:20.000010Z\",\"elapsed_s\":0.0,\"5.pressure [bar]\":1.5,\"5.pressure.status\":\"ok\",\"5.ch1\":1.5,\"5.ch1.status\":null}\n\
+                    {\"time\":\"2023-11-14T22:13:20.001010Z\",\"elapsed_s\":0.001,\"5.pressure [psi]\":1.5,\"5.pressure.status\":null,\"5.ch1\":null,\"5.ch1.status\":null}\n";
+        assert_eq!(shared.text(), if form == Form::Csv { csv } else { json });
+    }
+}
+
+/// Rows into `run-0001.csv` and so on, one every 250 ms; what stands in each file.
+fn rotated(rotation: Rotation, count: u64) -> Vec<String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let base = folder.path().join("run.csv");
+    let file = fs::File::create(Series::name(&base, 1)).expect("created");
+    let sink = Sink::direct(Target::File { file, keep: 0 }, Some(Series::new(&base, 2, false)));
+    let mut rows = Rows::new(sink, Setup { rotation: Some(rotation), has_series: true, ..Setup::default() });
+    for number in 0..count {
+        let row = sample(number * 250_000, Some(Number::Decimal { mantissa: number.into(), digits: 0 }), None, &[]);
+        rows.add(None, &[row], &[source("ch1", "")]).expect("written");
+    }
+    rows.finish(&mut || false).expect("written");
+    let read = |number| fs::read_to_string(Series::name(Path::new(&base), number)).expect("a file");
+    Series::existing(&base).expect("the folder").into_iter().map(read).collect()
+}
+
+/// The values in the files, each of which begins with the header.
+fn values(files: &[String]) -> Vec<Vec<u64>> {
+    let values = |text: &String| {
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some("time,elapsed_s,node,signal,value,unit,status,raw"));
+        lines.map(|line| line.split(',').nth(4).and_then(|cell| cell.parse().ok()).expect(line)).collect()
+    };
+    files.iter().map(values).collect()
+}
+
+#[test]
+fn a_new_file_every_second_with_no_row_lost_at_the_seam() {
+    let files = values(&rotated(Rotation::Every(Duration::from_secs(1)), 10));
+    assert_eq!(files, [vec![0, 1, 2, 3], vec![4, 5, 6, 7], vec![8, 9]]);
+}
+
+#[test]
+fn a_new_file_when_a_row_no_longer_fits() {
+    let files = rotated(Rotation::Size(49 + 3 * 50), 2000);
+    assert!(files.iter().all(|file| file.len() <= 49 + 3 * 50));
+    let values = values(&files);
+    assert!(values[..values.len() - 1].iter().all(|values| (2..=3).contains(&values.len())), "as many as fit");
+    assert_eq!(values.concat(), (0..2000).collect::<Vec<_>>());
+    let each = self::values(&rotated(Rotation::Size(1), 3));
+    assert_eq!(each, [[0], [1], [2]], "a row that never fits has a file of its own");
+}
+
+#[test]
+fn what_does_not_fit_is_counted_and_a_file_that_is_continued_keeps_its_header() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.csv");
+    let head = "time,elapsed_s,node,signal,value,unit,status,raw";
+    fs::write(&path, format!("{head}\n1,2\n3,4")).expect("written");
+    let mut file = fs::OpenOptions::new().read(true).write(true).open(&path).expect("opened");
+    let kept = look(&mut file).expect("read").expect("lines");
+    let setup = Setup { before: Some(kept.head), continues: true, ..Setup::default() };
+    assert_eq!(setup.fits(), Ok(()));
+    let mut rows = Rows::new(Sink::direct(Target::File { file, keep: kept.length }, None), setup);
+    assert_eq!(fs::read_to_string(&path).expect("read").len(), 48 + 1 + 4 + 3, "nothing before the first row");
+    rows.add(None, &[three()[1].0.clone()], &[source("pressure", "bar")]).expect("written");
+    rows.finish(&mut || false).expect("written");
+    let row = "2023-11-14T22:13:21.010001Z,0.000000,5,pressure,1.1,bar,ok,0xCDCC8C3F";
+    assert_eq!(fs::read_to_string(&path).expect("read"), format!("{head}\n1,2\n{row}\n"));
+}

@@ -1,0 +1,60 @@
+//! Readers that are slow, stop reading, or go: the recording does not wait for them, and nobody hangs.
+
+use super::Bench;
+use std::io::{BufRead, BufReader, Read};
+use std::process::Stdio;
+
+#[test]
+fn on_the_virtual_clock_a_slow_reader_gets_every_row() {
+    // Far more than a pipe holds, and nobody reads at first.
+    let bench = Bench::of("mh4@1");
+    let whole = bench.run("log 1 --sync 10ms --duration 60s").exit(0).stdout;
+    let mut command = bench.traced(&["log", "1", "--sync", "10ms", "--duration", "60s"]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
+    let mut reader = BufReader::with_capacity(100, child.stdout.take().expect("stdout"));
+    let mut text = String::new();
+    reader.read_to_string(&mut text).expect("rows");
+    assert!(text == whole, "{} bytes of {}", text.len(), whole.len());
+    bench.end(child).exit(0);
+}
+
+#[cfg(unix)]
+fn signal(child: &std::process::Child, name: &str) {
+    let status = std::process::Command::new("kill").args([format!("-{name}"), child.id().to_string()]).status();
+    assert!(status.expect("kill").success());
+}
+
+/// On the real clock: rows wait for a reader that has stopped reading, and Ctrl-C ends it all the same.
+#[test]
+#[cfg(unix)]
+fn a_pipe_that_nobody_reads_does_not_keep_ctrl_c_from_ending_it() {
+    let bench = Bench::real("mc1609@3,mh4@1");
+    // Three hundred kilobytes a second fill the pipe's 64 within a moment.
+    let mut command = bench.traced(&["log", "1", "--sync", "1ms", "--summary", "sum.json"]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
+    let mut reader = BufReader::new(child.stdout.take().expect("stdout"));
+    let mut line = String::new();
+    reader.read_line(&mut line).expect("a line");
+    assert_eq!(line, "time,elapsed_s,node,signal,value,unit,status,raw\n");
+    // SYNC goes on while the pipe is full: that is to be seen in the trace, far beyond what the pipe holds.
+    let mut syncs = 0;
+    while syncs < 3000 {
+        let trace = std::fs::read_to_string(bench.path("trace")).unwrap_or_default();
+        syncs = trace.matches(" 080#").count();
+        assert!(child.try_wait().expect("a child").is_none(), "it ended");
+        std::thread::yield_now();
+    }
+    signal(&child, "INT");
+    let status = child.wait().expect("its end");
+    let mut stderr = String::new();
+    child.stderr.take().expect("stderr").read_to_string(&mut stderr).expect("text");
+    assert_eq!(status.code(), Some(8), "{stderr}");
+    assert!(stderr.contains("rows lost") && stderr.contains("were lost: stdout was too slow"), "{stderr}");
+    let summary: serde_json::Value = serde_json::from_str(&bench.text("sum.json")).expect("JSON");
+    let (rows, lost) = (summary["rows"].as_u64().expect("rows"), summary["rows_lost"].as_u64().expect("rows_lost"));
+    assert!(0 < lost && lost < rows, "{lost} of {rows}");
+    // What was not counted as lost is there, whole or cut in its last line.
+    let mut rest = String::new();
+    reader.read_to_string(&mut rest).expect("rows");
+    assert!(rest.matches('\n').count() as u64 >= rows - lost, "{lost} of {rows} were lost");
+}
