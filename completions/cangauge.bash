@@ -1587,7 +1587,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__log)
-            opts="-b -t -f -q -v -d -n -o -h -V --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --duration --count --sync --poll --passive --no-nmt --output --force --summary --expect --help --version"
+            opts="-b -t -f -q -v -d -n -o -h -V --bus --timeout --retries --device --eds --format --trace --quiet --verbose --progress --color --duration --count --sync --poll --passive --no-nmt --expect --output --force --append --layout --rotate --events --summary --delimiter --decimal --bom --time --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1665,6 +1665,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --expect)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --output)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
@@ -1673,12 +1677,32 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --layout)
+                    COMPREPLY=($(compgen -W "long wide" -- "${cur}"))
+                    return 0
+                    ;;
+                --rotate)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --events)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --summary)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
-                --expect)
+                --delimiter)
                     COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --decimal)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --time)
+                    COMPREPLY=($(compgen -W "rfc3339 unix excel" -- "${cur}"))
                     return 0
                     ;;
                 *)

@@ -5,6 +5,7 @@ mod screen;
 
 use super::args::{BusSpec, Duration, Nodes, SignalArg};
 use super::exit::{Several, stdout};
+use super::file::OutFile;
 use super::{Format, Global, When, check, open};
 use crate::bus::interrupt::Interrupts;
 use crate::canopen::id::NodeId;
@@ -12,7 +13,7 @@ use crate::measure::decode::Wanted;
 use crate::measure::expression::Expression;
 use crate::measure::expression::verdict::Verdict;
 use crate::output::console::Console;
-use crate::output::events::{Weight, Words};
+use crate::output::events::{Events, Weight, Words};
 use crate::output::progress::Progress;
 use crate::output::rows::Form;
 use crate::output::summary::{self, Written};
@@ -32,12 +33,18 @@ use std::io::{self, IsTerminal, Write};
 #[command(after_help = "\
 Columns: time (UTC), elapsed_s, node, signal, value, unit, status (ok, invalid, overload-high,
 overload-low, or empty where the device tells none), raw (the bytes on the wire).
+Layout wide: time, elapsed_s, then 5.pressure [bar] and 5.pressure.status for every signal; a row per
+cycle, its time that of its first value, its cells empty where nothing came. New columns begin a new file.
+
+What takes the rows may be slow: 12 MiB wait for it, what is more is counted as lost (exit code 8).
 
 Examples:
   cangauge -b sim log 1 --sync 100ms --count 20
   cangauge -b sim log 127 --duration 5s -o dps.csv
   cangauge -b sim log 1-3,127 pressure --poll 200ms --duration 5s --format json
-  cangauge log 5 --passive --device mh4 -o run.csv")]
+  cangauge -b sim log 1,127 --sync 10ms --layout wide --duration 5s -o wide.csv
+  cangauge log 1 --sync 10ms -o run.csv --rotate 1h --events events.csv
+  cangauge log 5 --passive --device mh4 -o run.csv --append")]
 pub(crate) struct Log {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
@@ -192,10 +199,13 @@ impl Log {
         }
         // What was expected and is not so comes first: it gives the exit code.
         let (unmet, lost) = (all_met(verdicts, &[]).err(), self.lost(outcome));
-        let late = (written.lost > 0).then(|| {
-            let what = opened.rows.as_ref().map_or("stdout".to_owned(), |file| file.path().display().to_string());
-            Failure::new(Kind::Io, format!("{} were lost: {what} was too slow", rows(written.lost)))
-        });
+        let name = |file: &Option<OutFile>| {
+            file.as_ref().map_or_else(|| "stdout".to_owned(), |file| file.path().display().to_string())
+        };
+        let too_slow =
+            |what: String, file| Failure::new(Kind::Io, format!("{what} were lost: {} was too slow", name(file)));
+        let late = (written.lost > 0).then(|| too_slow(rows(written.lost), &opened.rows));
+        let late = late.or((written.events_lost > 0).then(|| too_slow("events".to_owned(), &opened.events)));
         let failures = match unmet {
             Some(unmet) if unmet.kind == Kind::CheckFailed => [Some(unmet), late, lost],
             unmet => [late, lost, unmet],
@@ -237,10 +247,15 @@ fn end(mut screen: Screen, opened: &Opened, interrupted: bool) -> anyhow::Result
     };
     let finished = screen.rows.finish(&mut give_up);
     let told = screen.events.as_mut().map_or(Ok(()), |events| events.finish(&mut give_up));
-    let Screen { rows: writer, console, error, .. } = screen;
+    let Screen { rows: writer, console, error, events, .. } = screen;
     let error = error.or(finished.err().map(Unwritten::Rows)).or(told.err().map(Unwritten::Events));
     match (error, &opened.rows, &opened.events) {
-        (None, _, _) => Ok(Written { rows: writer.count(), lost: writer.lost(), left_out: writer.left_out() }),
+        (None, _, _) => Ok(Written {
+            rows: writer.count(),
+            lost: writer.lost(),
+            events_lost: events.as_ref().map_or(0, Events::lost),
+            left_out: writer.left_out(),
+        }),
         (Some(Unwritten::Events(error)), _, Some(file)) => Err(file.error(error)),
         (Some(Unwritten::Rows(error) | Unwritten::Events(error)), file, _) => {
             if writer.lost() > 0 && error.kind() != io::ErrorKind::BrokenPipe {

@@ -15,6 +15,8 @@ pub struct Written {
     pub rows: u64,
     /// Of which so many were lost: they came faster than they could be written.
     pub lost: u64,
+    /// Events that were lost in the same way.
+    pub events_lost: u64,
     /// Values that had no place in the wide layout.
     pub left_out: u64,
 }
@@ -34,6 +36,7 @@ pub fn lines(outcome: &Outcome, written: Written) -> Vec<String> {
         (outcome.skipped, "polls skipped"),
         (outcome.syncs, "SYNC sent"),
         (written.lost, "rows lost"),
+        (written.events_lost, "events lost"),
     ] {
         if count > 0 {
             head.push_str(&format!(", {} {what}", grouped(count)));
@@ -91,6 +94,7 @@ pub fn json(out: &mut dyn Write, outcome: &Outcome, written: Written) -> io::Res
     struct Summary<'a> {
         rows: u64,
         rows_lost: u64,
+        events_lost: u64,
         values_left_out: u64,
         length_s: f64,
         timestamps: String,
@@ -119,6 +123,7 @@ pub fn json(out: &mut dyn Write, outcome: &Outcome, written: Written) -> io::Res
     let summary = Summary {
         rows: written.rows,
         rows_lost: written.lost,
+        events_lost: written.events_lost,
         values_left_out: written.left_out,
         length_s: outcome.length.as_secs_f64(),
         timestamps: outcome.timestamps.to_string(),

@@ -58,3 +58,31 @@ fn a_pipe_that_nobody_reads_does_not_keep_ctrl_c_from_ending_it() {
     reader.read_to_string(&mut rest).expect("rows");
     assert!(rest.matches('\n').count() as u64 >= rows - lost, "{lost} of {rows} were lost");
 }
+
+/// On the real clock: rows reach the file while it is recorded, and after `kill -9` every one of them is whole.
+#[test]
+#[cfg(unix)]
+fn a_kill_leaves_whole_rows() {
+    let bench = Bench::real("mh4@1");
+    let mut child = bench
+        .traced(&["log", "1", "--sync", "1ms", "-o", "run.csv"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the binary");
+    let text = || std::fs::read_to_string(bench.path("run.csv")).unwrap_or_default();
+    // A file grows while it is recorded, in steps of half a second.
+    let mut sizes = std::collections::BTreeSet::new();
+    while sizes.len() < 4 {
+        sizes.insert(text().len());
+        assert!(child.try_wait().expect("a child").is_none(), "it ended");
+        std::thread::yield_now();
+    }
+    child.kill().expect("SIGKILL");
+    child.wait().expect("its end");
+    let text = text();
+    let whole = text.rsplit_once('\n').expect("lines").0;
+    let mut lines = whole.lines();
+    assert_eq!(lines.next(), Some("time,elapsed_s,node,signal,value,unit,status,raw"));
+    assert!(lines.all(|line| line.split(',').count() == 8), "{text}");
+}

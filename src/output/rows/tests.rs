@@ -201,3 +201,23 @@ fn what_does_not_fit_is_counted_and_a_file_that_is_continued_keeps_its_header() 
     let row = "2023-11-14T22:13:21.010001Z,0.000000,5,pressure,1.1,bar,ok,0xCDCC8C3F";
     assert_eq!(fs::read_to_string(&path).expect("read"), format!("{head}\n1,2\n{row}\n"));
 }
+
+#[test]
+fn no_row_waits_for_longer_than_half_a_second() {
+    for layout in [Layout::Long, Layout::Wide] {
+        let (shared, mut rows) = stream(Setup { layout, ..Setup::default() });
+        let sources = [source("ch1", "")];
+        rows.columns(&sources).expect("a new file");
+        for number in 0..200u64 {
+            let us = number * 10_000;
+            rows.cycle(number, at(us)).expect("memory");
+            rows.add(None, &[sample(us, Some(Number::Real32(1.5)), None, &[])], &sources).expect("memory");
+            rows.pass(at(us)).expect("memory");
+            let handed_over = shared.text().lines().skip(1).count() as u64;
+            assert!(number + 1 - handed_over <= 50, "{handed_over} of {}", number + 1);
+        }
+        // And when nothing follows.
+        rows.pass(at(199 * 10_000 + 500_000)).expect("memory");
+        assert_eq!(shared.text().lines().count(), 201);
+    }
+}
