@@ -4,6 +4,7 @@
 
 pub mod decode;
 pub mod expression;
+pub mod histogram;
 pub mod instrument;
 pub mod sample;
 pub mod statistics;

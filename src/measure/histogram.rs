@@ -1,0 +1,174 @@
+//! How times are distributed, in memory that does not grow with their number.
+//!
+//! Times are counted in buckets whose width is a 1024th of a power of two: up to 2.048 us a bucket is one
+//! nanosecond, above it is less than 0.1 % of the time. A quantile is the middle of its bucket, and so off by
+//! 0.05 % at most; the shortest and the longest time are exact. Buckets come in pages that are made when they are
+//! first needed: times that lie close together, as intervals do, touch some ten of them.
+
+use std::time::Duration;
+
+/// Powers of two from one bucket's width to the next.
+const FINE_BITS: u32 = 10;
+/// Buckets in a page.
+const PAGE: usize = 64;
+/// The longest time that has a bucket of its own: 39 hours. Longer ones are counted there.
+const LONGEST: u64 = (1 << 47) - 1;
+
+/// Counts of times.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Histogram {
+    pages: Vec<Option<Box<[u64; PAGE]>>>,
+    count: u64,
+    shortest: Option<Duration>,
+    longest: Option<Duration>,
+}
+
+impl Histogram {
+    /// Counts a time.
+    pub fn add(&mut self, time: Duration) {
+        let bucket = bucket(nanoseconds(time));
+        let (page, place) = (bucket / PAGE, bucket % PAGE);
+        if self.pages.len() <= page {
+            self.pages.resize(page + 1, None);
+        }
+        self.pages[page].get_or_insert_with(|| Box::new([0; PAGE]))[place] += 1;
+        self.count += 1;
+        self.shortest = Some(self.shortest.map_or(time, |shortest| shortest.min(time)));
+        self.longest = Some(self.longest.map_or(time, |longest| longest.max(time)));
+    }
+
+    /// Times counted.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The shortest time, exact.
+    pub fn shortest(&self) -> Option<Duration> {
+        self.shortest
+    }
+
+    /// The longest time, exact.
+    pub fn longest(&self) -> Option<Duration> {
+        self.longest
+    }
+
+    /// The time that `share` (0 to 1) of all are not longer than, off by 0.05 % at most.
+    pub fn quantile(&self, share: f64) -> Option<Duration> {
+        self.place(share, self.buckets())
+    }
+
+    /// The distance to `centre` that `share` (0 to 1) of all times keep, either way; off by 0.05 % of the time.
+    pub fn distance(&self, centre: Duration, share: f64) -> Option<Duration> {
+        let centre = nanoseconds(centre);
+        let mut distances: Vec<(u64, u64)> =
+            self.buckets().map(|(time, count)| (time.abs_diff(centre), count)).collect();
+        distances.sort_unstable();
+        self.rank(share, distances.into_iter())
+    }
+
+    /// The greatest distance to `centre`, exact.
+    pub fn farthest(&self, centre: Duration) -> Option<Duration> {
+        Some(centre.abs_diff(self.shortest?).max(centre.abs_diff(self.longest?)))
+    }
+
+    /// The middles of the buckets in nanoseconds, with what is in them, in rising order.
+    fn buckets(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
+        let pages = self.pages.iter().enumerate().filter_map(|(at, page)| Some((at, page.as_deref()?)));
+        pages.flat_map(|(at, page)| {
+            let places = page.iter().enumerate().filter(|(_, count)| **count > 0);
+            places.map(move |(place, &count)| (middle(at * PAGE + place), count))
+        })
+    }
+
+    fn place(&self, share: f64, buckets: impl Iterator<Item = (u64, u64)>) -> Option<Duration> {
+        let time = self.rank(share, buckets)?;
+        // The middle of a bucket may lie beyond what was ever counted in it.
+        Some(time.clamp(self.shortest?, self.longest?))
+    }
+
+    fn rank(&self, share: f64, buckets: impl Iterator<Item = (u64, u64)>) -> Option<Duration> {
+        let wanted = share.clamp(0.0, 1.0) * self.count as f64;
+        let mut passed = 0;
+        for (time, count) in buckets {
+            passed += count;
+            if passed as f64 >= wanted {
+                return Some(Duration::from_nanos(time));
+            }
+        }
+        None
+    }
+}
+
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(LONGEST).min(LONGEST)
+}
+
+/// The bucket of a time: its power of two above 2^11 ns, and the ten bits behind the leading one.
+fn bucket(time: u64) -> usize {
+    let power = (u64::BITS - time.leading_zeros()).saturating_sub(FINE_BITS + 1);
+    usize::try_from((u64::from(power) << FINE_BITS) + (time >> power)).unwrap_or(usize::MAX)
+}
+
+/// The time in the middle of a bucket.
+fn middle(bucket: usize) -> u64 {
+    let bucket = bucket as u64;
+    let power = (bucket >> FINE_BITS).saturating_sub(1);
+    let low = (bucket - (power << FINE_BITS)) << power;
+    low + (1 << power) / 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_time_lies_in_its_bucket() {
+        let mut time = 0;
+        while time < LONGEST {
+            for time in [time, time + 1, time.saturating_sub(1)] {
+                let middle = middle(bucket(time));
+                assert!(middle.abs_diff(time) * 2000 <= time, "{time} became {middle}");
+            }
+            time = time * 33 / 32 + 1;
+        }
+        assert_eq!((bucket(2047), bucket(2048), bucket(2049), bucket(2050)), (2047, 2048, 2048, 2049));
+    }
+
+    #[test]
+    fn quantiles_of_what_is_known() {
+        let mut histogram = Histogram::default();
+        assert_eq!((histogram.quantile(0.5), histogram.distance(Duration::ZERO, 0.5)), (None, None));
+        for n in 1..=10_000 {
+            histogram.add(Duration::from_micros(n));
+        }
+        let near = |time: Option<Duration>, micros: f64| {
+            let time = time.expect("a time").as_secs_f64() * 1e6;
+            assert!((time - micros).abs() <= micros * 0.0006, "{time} for {micros}");
+        };
+        near(histogram.quantile(0.5), 5000.0);
+        near(histogram.quantile(0.99), 9900.0);
+        near(histogram.quantile(0.0), 1.0);
+        near(histogram.quantile(1.0), 10_000.0);
+        assert!(histogram.quantile(1.0) <= histogram.longest());
+        assert_eq!(histogram.longest(), Some(Duration::from_millis(10)));
+        let centre = Duration::from_millis(5);
+        let distance = histogram.distance(centre, 0.5).expect("a distance").as_secs_f64();
+        assert!((distance - 0.0025).abs() < 0.000_01, "{distance}");
+        assert_eq!(histogram.farthest(centre), Some(Duration::from_millis(5)));
+    }
+
+    #[test]
+    fn memory_is_bounded_by_the_spread_and_not_by_the_number() {
+        let mut histogram = Histogram::default();
+        for n in 0..1_000_000u64 {
+            histogram.add(Duration::from_nanos(10_000_000 + n * 7919 % 200_000));
+        }
+        assert!(histogram.pages.iter().flatten().count() <= 2);
+        for power in 0..64 {
+            histogram.add(Duration::from_nanos(1 << power));
+        }
+        histogram.add(Duration::MAX);
+        assert!(histogram.pages.len() <= 38 * (1 << FINE_BITS) / PAGE);
+        assert_eq!((histogram.count(), histogram.longest()), (1_000_065, Some(Duration::MAX)));
+    }
+}
