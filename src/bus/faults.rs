@@ -1,6 +1,6 @@
 //! A wrapper around any bus that goes wrong on purpose, for tests.
 
-use super::{Bus, BusError, Event, Filters, Mode, Mono, Received, Stamp, TimestampSource};
+use super::{Bus, BusError, Event, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource};
 use crate::canopen::frame::Frame;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
@@ -83,6 +83,14 @@ impl<B: Bus> Bus for Faulty<B> {
 
     fn waits(&self) -> bool {
         self.bus.waits()
+    }
+
+    fn receive_buffer(&self) -> Option<ReceiveBuffer> {
+        self.bus.receive_buffer()
+    }
+
+    fn late_drops(&mut self) -> u32 {
+        self.bus.late_drops()
     }
 
     fn can_set_bit_rate(&self) -> Result<(), BusError> {

@@ -62,6 +62,18 @@ pub trait Bus {
     /// With a deadline in the past it returns what is there already, without waiting.
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError>;
 
+    /// How much is held back of what was received and not yet asked for; `None` where that has no bound, or
+    /// nobody knows it.
+    fn receive_buffer(&self) -> Option<ReceiveBuffer> {
+        None
+    }
+
+    /// How many frames the kernel had to drop that no [`Event::Dropped`] has told of: the event comes with the next
+    /// frame, and after these there was none. Each is told once.
+    fn late_drops(&mut self) -> u32 {
+        0
+    }
+
     /// Whether [`Bus::set_bit_rate`] can be expected to work: asked before anything is changed that depends on it.
     ///
     /// # Errors
@@ -136,6 +148,14 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
         (**self).receive(deadline)
     }
 
+    fn receive_buffer(&self) -> Option<ReceiveBuffer> {
+        (**self).receive_buffer()
+    }
+
+    fn late_drops(&mut self) -> u32 {
+        (**self).late_drops()
+    }
+
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
         (**self).can_set_bit_rate()
     }
@@ -150,6 +170,22 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 
     fn finish(&mut self) -> Result<(), BusError> {
         (**self).finish()
+    }
+}
+
+/// Room for what was received and not yet asked for. A frame takes some 800 bytes of it on Linux.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReceiveBuffer {
+    /// What there is, in bytes.
+    pub bytes: usize,
+    /// What was asked for: the system may allow less (`net.core.rmem_max`).
+    pub wanted: usize,
+}
+
+impl ReceiveBuffer {
+    /// Whether the system did not allow what was asked for.
+    pub fn is_small(self) -> bool {
+        self.bytes < self.wanted
     }
 }
 

@@ -1,6 +1,6 @@
 //! A wrapper around any bus that writes every frame sent and received, as `candump -L` does.
 
-use super::{Bus, BusError, Event, Filters, Mode, Mono, Received, Stamp, TimestampSource, Wall};
+use super::{Bus, BusError, Event, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource, Wall};
 use crate::canopen::frame::Frame;
 use std::io::{self, BufWriter, Write};
 use std::time::Duration;
@@ -84,6 +84,14 @@ impl<B: Bus> Bus for Traced<B> {
 
     fn waits(&self) -> bool {
         self.bus.waits()
+    }
+
+    fn receive_buffer(&self) -> Option<ReceiveBuffer> {
+        self.bus.receive_buffer()
+    }
+
+    fn late_drops(&mut self) -> u32 {
+        self.bus.late_drops()
     }
 
     fn can_set_bit_rate(&self) -> Result<(), BusError> {

@@ -114,7 +114,7 @@ impl Outgoing {
                     self.full_since = None;
                     return Ok(None);
                 }
-                Err(BusError::Down(_)) if self.rides_out => {}
+                Err(BusError::Down(_) | BusError::NoInterface(_)) if self.rides_out => {}
                 Err(error) => return Err(error),
             }
             if let Some(ticket) = ticket {

@@ -10,9 +10,12 @@ mod interfaces;
 mod netlink;
 mod receive;
 mod setup;
+mod socket;
 
 use super::interrupt::Interrupts;
-use super::{Bus, BusError, Event, Filters, Mode, Mono, Received, Stamp, TimestampSource, Wall, poll};
+use super::{
+    Bus, BusError, Event, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource, Wall, poll,
+};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 use clocks::Clocks;
@@ -20,17 +23,14 @@ pub use interfaces::{Interface, interfaces};
 pub use netlink::{BitTiming, Link, State};
 use receive::{Batch, Message};
 pub use setup::{Change, bring_down, bring_up, link};
-use socketcan::{CanAddr, CanFrame, CanSocket, Socket, SocketOptions};
+use socket::Bound;
+use socketcan::{CanFrame, CanSocket, Socket};
 use std::cell::Cell;
 use std::collections::{HashSet, VecDeque};
 use std::io;
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::AsFd;
 use std::time::{Duration, Instant};
 
-/// More filters than this the kernel does not take (`CAN_RAW_FILTER_MAX`).
-const MAX_FILTERS: usize = 512;
-/// The receive buffer asked for: some ten thousand frames, seconds of a full bus.
-const RECEIVE_BUFFER: i32 = 8 << 20;
 /// How often an interface that went down is looked at; the kernel does not tell when it is back.
 const LINK_CHECK: Duration = Duration::from_millis(200);
 /// How long the first wait after a send goes without looking at the clock or for a signal: an answer that
@@ -55,8 +55,12 @@ pub struct SocketCan {
     ready: VecDeque<Event>,
     /// The interface is up, as far as the user of this bus has been told.
     up: bool,
+    /// The interface has been removed, and the socket with it is of no use any more.
+    gone: bool,
     /// The kernel's count of lost frames when it was last reported.
     lost: u32,
+    /// What is wanted, for another socket.
+    filters: Filters,
     /// The identifiers wanted, where they are too many for the kernel.
     wanted: Option<HashSet<CanId>>,
     timestamps: TimestampSource,
@@ -96,20 +100,8 @@ impl SocketCan {
     fn bound(name: &str, filters: &Filters) -> Result<SocketCan, BusError> {
         let interrupts =
             Interrupts::new().map_err(|source| BusError::Io { what: "watch for signals".into(), source })?;
-        let socket = new_socket()?;
-        let failed = |what: &str, source| BusError::Io { what: format!("{what} {name}"), source };
-        let address = CanAddr::from_iface(name).map_err(|_| BusError::NoInterface(name.to_owned()))?;
-        socket.set_error_filter_accept_all().map_err(|error| failed("set the error filter of", error))?;
-        // Each of these only improves what is measured; a kernel that lacks one still delivers frames.
-        let timestamps = match socket.set_recv_timestamp(true) {
-            Ok(()) => TimestampSource::Kernel,
-            Err(_) => TimestampSource::Program,
-        };
-        let _ = socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RXQ_OVFL, 1);
-        if socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUFFORCE, RECEIVE_BUFFER).is_err() {
-            let _ = socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUF, RECEIVE_BUFFER);
-        }
-        let mut bus = SocketCan {
+        let Bound { socket, wanted, timestamps } = socket::bind(name, filters, ANSWER)?;
+        Ok(SocketCan {
             name: name.to_owned(),
             socket,
             interrupts,
@@ -121,19 +113,14 @@ impl SocketCan {
             looked: Cell::new(Mono::START),
             ready: VecDeque::new(),
             up: true,
+            gone: false,
             lost: 0,
-            wanted: None,
+            filters: filters.clone(),
+            wanted,
             timestamps,
             bit_rate: Cell::new(None),
             before: None,
-        };
-        bus.listen(filters)?;
-        let socket = bus.socket.as_raw_socket();
-        socket.bind(&address.into_sock_addr()).map_err(|error| match error.raw_os_error() {
-            Some(libc::ENODEV) => BusError::NotCan(name.to_owned()),
-            _ => failed("open", error),
-        })?;
-        Ok(bus)
+        })
     }
 
     fn error(&self, doing: &str, source: io::Error) -> BusError {
@@ -199,6 +186,10 @@ impl SocketCan {
                     self.link(false);
                     Ok(())
                 }
+                Some(libc::ENODEV | libc::ENXIO) => {
+                    self.lose_interface();
+                    Ok(())
+                }
                 _ => Err(self.error("receive from", error)),
             },
         }
@@ -209,24 +200,74 @@ impl SocketCan {
     fn wait(&mut self, deadline: Mono) -> Result<bool, BusError> {
         let left = deadline.since(self.mono());
         let limit = if self.up { left } else { left.min(LINK_CHECK) };
-        let ready = poll::readable([self.socket.as_fd(), self.interrupts.fd()], limit);
+        // A socket without an interface has nothing more to say.
+        let ready = if self.gone {
+            poll::readable([self.interrupts.fd()], limit).map(|[signal]| [false, signal])
+        } else {
+            poll::readable([self.socket.as_fd(), self.interrupts.fd()], limit)
+        };
         let [frames, signal] = ready.map_err(|error| self.error("wait for", error))?;
         if signal {
             self.interrupts.collect();
         }
         if frames {
             self.drained = false;
-        } else if !self.up && interfaces::is_up(&self.name) == Some(true) {
+        } else if self.gone {
+            self.find_again()?;
+        } else if self.is_back() {
             self.link(true);
         }
         Ok(!frames && !signal && self.ready.is_empty() && self.mono() >= deadline)
     }
 
+    /// Whether the interface, which was down, is up.
+    fn is_back(&self) -> bool {
+        !self.up && !self.gone && interfaces::is_up(&self.name) == Some(true)
+    }
+
+    fn lose_interface(&mut self) {
+        self.gone = true;
+        self.link(false);
+    }
+
+    /// Opens the interface again where it has been removed and there is one of that name once more: an adapter
+    /// that was pulled out and put in.
+    ///
+    /// # Errors
+    /// Why it cannot be opened although it is there.
+    fn find_again(&mut self) -> Result<(), BusError> {
+        let bound = match socket::bind(&self.name, &self.filters, ANSWER) {
+            Ok(bound) => bound,
+            // Not yet, or not yet ready: it is made, renamed and set up step by step.
+            Err(BusError::NoInterface(_) | BusError::NotCan(_)) => return Ok(()),
+            Err(error) => return Err(error),
+        };
+        let more = self.late_drops();
+        if more > 0 {
+            self.ready.push_back(Event::Dropped(more));
+        }
+        (self.socket, self.wanted, self.timestamps) = (bound.socket, bound.wanted, bound.timestamps);
+        (self.gone, self.lost, self.drained) = (false, 0, false);
+        // What says that it is down is the socket's first error; where there is none it is up.
+        match self.socket.as_raw_socket().take_error() {
+            Ok(None) => self.link(true),
+            Ok(Some(error)) | Err(error) => match error.raw_os_error() {
+                Some(libc::ENETDOWN) => {}
+                Some(libc::ENODEV | libc::ENXIO) => self.gone = true,
+                _ => return Err(self.error("open", error)),
+            },
+        }
+        Ok(())
+    }
+
     /// The frame of a message, if nothing comes before it. Otherwise what the message tells is ready,
     /// in order.
     fn take_in(&mut self, message: Message) -> Option<Event> {
-        // Told by whatever comes through, sooner than by the next look at the interface.
-        self.link(true);
+        // Told by whatever comes through, sooner than by the next look at the interface; but what had been
+        // received before it went down comes through, too.
+        if self.is_back() {
+            self.link(true);
+        }
         if let Some(lost) = message.lost {
             let more = lost.wrapping_sub(self.lost);
             self.lost = lost;
@@ -285,21 +326,21 @@ impl Bus for SocketCan {
     }
 
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        let ids: Option<HashSet<CanId>> = match filters {
-            Filters::All => None,
-            Filters::Only(ids) => Some(ids.iter().copied().collect()),
-        };
-        let set = match &ids {
-            Some(ids) if ids.is_empty() => self.socket.set_filter_drop_all(),
-            Some(ids) if ids.len() <= MAX_FILTERS => {
-                let filters: Vec<(u32, u32)> = ids.iter().map(|&id| filter(id)).collect();
-                self.socket.set_filters(&filters)
-            }
-            _ => self.socket.set_filter_accept_all(),
-        };
-        set.map_err(|error| self.error("set the filters of", error))?;
-        self.wanted = ids.filter(|ids| ids.len() > MAX_FILTERS);
+        let set = socket::set_filters(&self.socket, filters);
+        self.wanted = set.map_err(|error| self.error("set the filters of", error))?;
+        self.filters = filters.clone();
         Ok(())
+    }
+
+    fn receive_buffer(&self) -> Option<ReceiveBuffer> {
+        socket::receive_buffer(&self.socket)
+    }
+
+    fn late_drops(&mut self) -> u32 {
+        let Some(lost) = socket::lost(&self.socket) else { return 0 };
+        let more = lost.wrapping_sub(self.lost);
+        self.lost = lost;
+        more
     }
 
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
@@ -323,8 +364,10 @@ impl Bus for SocketCan {
         self.sent = true;
         self.socket.write_frame(&to_kernel(frame)).map_err(|error| {
             // The kernel gives the news to whichever call comes first, and only once.
-            if error.raw_os_error() == Some(libc::ENETDOWN) {
-                self.link(false);
+            match error.raw_os_error() {
+                Some(libc::ENETDOWN) => self.link(false),
+                Some(libc::ENODEV | libc::ENXIO) => self.lose_interface(),
+                _ => {}
             }
             self.error("send on", error)
         })
@@ -360,34 +403,6 @@ impl Bus for SocketCan {
 
 fn now(opened: Instant) -> Stamp {
     Stamp { mono: Mono::at(opened.elapsed()), wall: Wall::now() }
-}
-
-/// A raw CAN socket that blocks for [`ANSWER`] at most, not yet bound.
-fn new_socket() -> Result<CanSocket, BusError> {
-    let domain = socket2::Domain::from(libc::AF_CAN);
-    let protocol = socket2::Protocol::from(libc::CAN_RAW);
-    let socket = socket2::Socket::new(domain, socket2::Type::RAW, Some(protocol))
-        .and_then(|socket| socket.set_read_timeout(Some(ANSWER)).map(|()| socket))
-        .and_then(|socket| socket.set_write_timeout(Some(Duration::from_millis(1))).map(|()| socket));
-    match socket {
-        Ok(socket) => Ok(CanSocket::from(OwnedFd::from(socket))),
-        Err(source) => Err(match source.raw_os_error() {
-            Some(libc::EAFNOSUPPORT | libc::EPROTONOSUPPORT) => {
-                BusError::Unsupported("this kernel has no CAN support".to_owned())
-            }
-            Some(libc::EPERM | libc::EACCES) => BusError::Permission("open a CAN socket".to_owned()),
-            _ => BusError::Io { what: "open a CAN socket".to_owned(), source },
-        }),
-    }
-}
-
-/// Identifier and mask that let through data frames with exactly this identifier.
-fn filter(id: CanId) -> (u32, u32) {
-    const EXACT: u32 = libc::CAN_EFF_FLAG | libc::CAN_RTR_FLAG;
-    match id {
-        CanId::Standard(id) => (u32::from(id), libc::CAN_SFF_MASK | EXACT),
-        CanId::Extended(id) => (id | libc::CAN_EFF_FLAG, libc::CAN_EFF_MASK | EXACT),
-    }
 }
 
 fn to_kernel(frame: &Frame) -> CanFrame {
