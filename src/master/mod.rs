@@ -152,6 +152,17 @@ impl<'bus> Master<'bus> {
         self.outgoing.push_first(frame)
     }
 
+    /// When the bus took the frame that was last put before all others, told once; nothing while it waits, and
+    /// where it was lost.
+    pub fn take_first_at(&mut self) -> Option<Mono> {
+        self.outgoing.take_first_at()
+    }
+
+    /// How many frames the kernel dropped that nothing has told of yet.
+    pub fn late_drops(&mut self) -> u32 {
+        self.bus.late_drops()
+    }
+
     /// From now on an interface that is down, and a bus on which nobody acknowledges, are ridden out: what
     /// cannot be sent is lost, as any frame may be, and the work goes on. Otherwise they are errors.
     pub fn ride_out(&mut self, rides_out: bool) {

@@ -26,12 +26,24 @@ pub(super) struct Outgoing {
     full_since: Option<Mono>,
     /// What cannot be sent is lost, as on the wire, and no error.
     rides_out: bool,
+    /// What was put before all others, while it waits.
+    first: Option<Frame>,
+    /// When it was handed to the bus.
+    first_at: Option<Mono>,
 }
 
 impl Outgoing {
     pub(super) fn new() -> Outgoing {
         let wire_free_at = Mono::START;
-        Outgoing { queue: VecDeque::new(), bit_rate: None, wire_free_at, full_since: None, rides_out: false }
+        Outgoing {
+            queue: VecDeque::new(),
+            bit_rate: None,
+            wire_free_at,
+            full_since: None,
+            rides_out: false,
+            first: None,
+            first_at: None,
+        }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -47,6 +59,7 @@ impl Outgoing {
         let is_new = self.queue.front() != Some(&(frame, None));
         if is_new {
             self.queue.push_front((frame, None));
+            (self.first, self.first_at) = (Some(frame), None);
         }
         is_new
     }
@@ -54,6 +67,12 @@ impl Outgoing {
     /// Forgets everything, and what it knew of the bus: that is at another bit rate now.
     pub(super) fn begin_anew(&mut self) {
         *self = Outgoing { rides_out: self.rides_out, ..Outgoing::new() };
+    }
+
+    /// When the bus took the frame that was last put before all others; told once. Nothing where it still waits or
+    /// was lost.
+    pub(super) fn take_first_at(&mut self) -> Option<Mono> {
+        self.first_at.take()
     }
 
     pub(super) fn ride_out(&mut self, rides_out: bool) {
@@ -99,6 +118,7 @@ impl Outgoing {
                     return Ok(Some(now + longest));
                 }
             }
+            let mut is_taken = true;
             match bus.send(frame) {
                 Ok(()) => {}
                 Err(BusError::QueueFull) => {
@@ -110,12 +130,17 @@ impl Outgoing {
                         return Err(BusError::QueueFull);
                     }
                     // Nobody takes anything. What waits would be too late when somebody does again.
+                    self.first = None;
                     self.queue.drain(..).filter_map(|(_, ticket)| ticket).for_each(|ticket| sent(ticket, now));
                     self.full_since = None;
                     return Ok(None);
                 }
-                Err(BusError::Down(_) | BusError::NoInterface(_)) if self.rides_out => {}
+                Err(BusError::Down(_) | BusError::NoInterface(_)) if self.rides_out => is_taken = false,
                 Err(error) => return Err(error),
+            }
+            if ticket.is_none() && self.first == Some(*frame) {
+                self.first = None;
+                self.first_at = is_taken.then_some(now);
             }
             if let Some(ticket) = ticket {
                 sent(*ticket, now);

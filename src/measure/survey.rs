@@ -1,6 +1,9 @@
 //! Reads what is needed to understand a device's measurements: identity, TPDOs, units, digits.
 //!
-//! Many nodes are read side by side, in the same steps.
+//! Many nodes are read side by side, in the same steps. What they are read with is an [`Ask`]: the master, which
+//! waits for the answers, or an [`Again`], which does not.
+
+mod again;
 
 use super::instrument::{Identity, Instrument, PROCESS_VALUES, Signal, Tpdo};
 use crate::canopen::id::NodeId;
@@ -10,7 +13,9 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::catalog::{Model, Traits, recognise, to_ask};
 use crate::device::description::SignalEntry;
 use crate::device::unit::Unit;
-use crate::master::{Error, Master, Request, SdoError, SdoFailure};
+pub use again::Again;
+use crate::device::quirk::Quirk;
+use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -27,13 +32,41 @@ pub type Overrides = BTreeMap<NodeId, Arc<Model>>;
 /// Something to be read from a node.
 pub type Item = (NodeId, ObjectId, DataType);
 
+/// What a survey reads with.
+pub trait Ask {
+    /// Why no more can be asked at the moment.
+    type Stop: From<Error>;
+
+    /// Reads objects, and returns what became of each, in their order.
+    ///
+    /// # Errors
+    /// What stops everything. What one device does is in its result.
+    fn ask(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, Self::Stop>;
+
+    /// Learns how a node's SDO server deviates from the standard.
+    fn set_quirks(&mut self, node: NodeId, quirks: &[Quirk]);
+}
+
+impl Ask for Master<'_> {
+    type Stop = Error;
+
+    fn ask(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, Error> {
+        let requests = objects.iter().map(|&(node, object)| Request::read(node, object)).collect();
+        self.transfer(requests, &mut |_| {})
+    }
+
+    fn set_quirks(&mut self, node: NodeId, quirks: &[Quirk]) {
+        Master::set_quirks(self, node, quirks);
+    }
+}
+
 /// Reads many values side by side.
 ///
 /// # Errors
 /// What stops everything. What one device refuses is in its result.
-pub fn read_all(master: &mut Master<'_>, items: &[Item]) -> Result<Vec<Result<Value, SdoError>>, Error> {
-    let requests = items.iter().map(|&(node, object, _)| Request::read(node, object)).collect();
-    let answers = master.transfer(requests, &mut |_| {})?;
+pub fn read_all<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Result<Value, SdoError>>, A::Stop> {
+    let objects: Vec<(NodeId, ObjectId)> = items.iter().map(|&(node, object, _)| (node, object)).collect();
+    let answers = master.ask(&objects)?;
     let values = answers.into_iter().zip(items).map(|(answer, &(node, object, data_type))| {
         answer.and_then(|answer| answer.value(node, object, Some(data_type))).map(|(value, _)| value)
     });
@@ -45,14 +78,14 @@ pub fn read_all(master: &mut Master<'_>, items: &[Item]) -> Result<Vec<Result<Va
 /// # Errors
 /// Silence and breaches of the protocol too: a device that stops answering in the middle is not read
 /// half.
-fn read_known(master: &mut Master<'_>, items: &[Item]) -> Result<Vec<Option<Value>>, Error> {
+fn read_known<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Option<Value>>, A::Stop> {
     read_all(master, items)?
         .into_iter()
         .map(|result| match result {
             Ok(value) => Ok(Some(value)),
             Err(error) => match error.failure {
                 SdoFailure::Refused(_) | SdoFailure::Fit(_) => Ok(None),
-                _ => Err(Error::Sdo(error)),
+                _ => Err(Error::Sdo(error).into()),
             },
         })
         .collect()
@@ -67,7 +100,7 @@ fn small<T: TryFrom<u64>>(value: Option<&Value>) -> Option<T> {
 }
 
 /// Reads the identity of nodes that are there.
-pub fn identities(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<Vec<Identity>, Error> {
+pub fn identities<A: Ask>(master: &mut A, nodes: &[NodeId]) -> Result<Vec<Identity>, A::Stop> {
     let objects = [
         (ObjectId::new(0x1000, 0), U32),
         (ObjectId::new(0x1018, 1), U32),
@@ -99,7 +132,7 @@ pub fn identities(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<Vec<Ident
 ///
 /// # Errors
 /// A node that does not answer, and what stops everything.
-pub fn instruments(master: &mut Master<'_>, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Instrument>, Error> {
+pub fn instruments<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Instrument>, A::Stop> {
     let mut instruments = recognised(master, nodes, overrides)?;
     read_services(master, &mut instruments)?;
     read_tpdos(master, &mut instruments)?;
@@ -112,7 +145,7 @@ pub fn instruments(master: &mut Master<'_>, nodes: &[NodeId], overrides: &Overri
 ///
 /// # Errors
 /// A node that does not answer, and what stops everything.
-pub fn recognised(master: &mut Master<'_>, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Instrument>, Error> {
+pub fn recognised<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Instrument>, A::Stop> {
     // A device whose reads need a quirk can only be read once the user has named its description.
     for (node, model) in overrides {
         master.set_quirks(*node, &model.description.quirks);
@@ -125,14 +158,14 @@ pub fn recognised(master: &mut Master<'_>, nodes: &[NodeId], overrides: &Overrid
         .filter(|(_, node)| !overrides.contains_key(node))
         .flat_map(|(at, _)| to_ask(&traits[at]).into_iter().map(move |object| (at, object)))
         .collect();
-    let requests = questions.iter().map(|&(at, object)| Request::read(nodes[at], object)).collect();
-    for (&(at, object), answer) in questions.iter().zip(master.transfer(requests, &mut |_| {})?) {
+    let objects: Vec<(NodeId, ObjectId)> = questions.iter().map(|&(at, object)| (nodes[at], object)).collect();
+    for (&(at, object), answer) in questions.iter().zip(master.ask(&objects)?) {
         match answer {
             Ok(answer) => {
                 traits[at].answers.extend(answer.uploaded.map(|uploaded| (object, uploaded.bytes)));
             }
             Err(SdoError { failure: SdoFailure::Refused(_), .. }) => {}
-            Err(error) => return Err(Error::Sdo(error)),
+            Err(error) => return Err(Error::Sdo(error).into()),
         }
     }
     let mut instruments: Vec<Instrument> = nodes.iter().map(|&node| Instrument::new(node)).collect();
@@ -147,7 +180,7 @@ pub fn recognised(master: &mut Master<'_>, nodes: &[NodeId], overrides: &Overrid
     Ok(instruments)
 }
 
-fn read_services(master: &mut Master<'_>, instruments: &mut [Instrument]) -> Result<(), Error> {
+fn read_services<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Result<(), A::Stop> {
     let objects = [(ObjectId::new(0x1017, 0), U16), (ObjectId::new(0x1014, 0), U32), (ObjectId::new(0x1005, 0), U32)];
     let items: Vec<Item> = instruments
         .iter()
@@ -166,7 +199,7 @@ fn read_services(master: &mut Master<'_>, instruments: &mut [Instrument]) -> Res
     Ok(())
 }
 
-fn read_tpdos(master: &mut Master<'_>, instruments: &mut [Instrument]) -> Result<(), Error> {
+fn read_tpdos<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Result<(), A::Stop> {
     let numbers = |instrument: &Instrument| -> Vec<TpdoNumber> {
         let described = |number: &TpdoNumber| match &instrument.model {
             Some(model) => model.dictionary.has_index(number.communication(0).index),
@@ -225,7 +258,7 @@ fn read_tpdos(master: &mut Master<'_>, instruments: &mut [Instrument]) -> Result
 }
 
 /// The signals of a description, or those that the objects of CiA 404 tell.
-fn find_signals(master: &mut Master<'_>, instruments: &mut [Instrument]) -> Result<(), Error> {
+fn find_signals<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Result<(), A::Stop> {
     let mut unknown = Vec::new();
     for (at, instrument) in instruments.iter_mut().enumerate() {
         match instrument.model.clone().filter(|model| !model.description.signals.is_empty()) {
@@ -298,7 +331,7 @@ fn described(instrument: &Instrument, entry: &SignalEntry) -> Signal {
     }
 }
 
-fn read_units(master: &mut Master<'_>, instruments: &mut [Instrument]) -> Result<(), Error> {
+fn read_units<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Result<(), A::Stop> {
     let items: Vec<Item> = instruments
         .iter()
         .flat_map(|instrument| {

@@ -269,9 +269,10 @@ impl SocketCan {
             self.link(true);
         }
         if let Some(lost) = message.lost {
+            // The count when this frame was queued; it may have been told of later ones already.
             let more = lost.wrapping_sub(self.lost);
-            self.lost = lost;
-            if more > 0 {
+            if more > 0 && more <= u32::MAX / 2 {
+                self.lost = lost;
                 self.ready.push_back(Event::Dropped(more));
             }
         }
