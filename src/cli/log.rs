@@ -68,6 +68,9 @@ pub(crate) struct Log {
     /// Leave the nodes' NMT states alone
     #[arg(long)]
     no_nmt: bool,
+    /// The longest interval that is no gap; three usual ones where nothing is said
+    #[arg(long, value_name = "DUR")]
+    max_gap: Option<Duration>,
     /// Exit with 1 at the end unless this held: 'pressure in 9..11 bar', see cangauge check --help
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     expect: Vec<Expression>,
@@ -146,6 +149,7 @@ impl Log {
                 // In the wide layout it counts rows, which are made of many values.
                 count: self.count.filter(|_| !self.files.is_wide()),
                 nmt: !self.no_nmt,
+                max_gap: self.max_gap.map(|longest| longest.0),
             };
             let waits = master.bus().waits();
             let (rows, events) = (opened.rows(waits)?, opened.events(waits)?);

@@ -158,6 +158,11 @@ impl<'bus> Master<'bus> {
         self.outgoing.take_first_at()
     }
 
+    /// Takes back the frame that was last put before all others; `true` if it had not been sent.
+    pub fn take_back_first(&mut self) -> bool {
+        self.outgoing.take_back_first()
+    }
+
     /// How many frames the kernel dropped that nothing has told of yet.
     pub fn late_drops(&mut self) -> u32 {
         self.bus.late_drops()

@@ -75,6 +75,15 @@ impl Outgoing {
         self.first_at.take()
     }
 
+    /// Takes back what was put before all others, if it still waits.
+    pub(super) fn take_back_first(&mut self) -> bool {
+        self.first.take().is_some_and(|frame| {
+            let before = self.queue.len();
+            self.take_back(&frame);
+            self.queue.len() < before
+        })
+    }
+
     pub(super) fn ride_out(&mut self, rides_out: bool) {
         self.rides_out = rides_out;
     }

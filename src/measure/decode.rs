@@ -7,7 +7,7 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{Field, lay_out};
 use crate::canopen::value::{DataType, Value};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 /// What the user wants of a node: a signal, its status, or any object.
@@ -88,6 +88,7 @@ struct Plan {
     /// Bytes that the mapping fills.
     length: usize,
     parts: Vec<Part>,
+    held: bool,
     wrong_length: u64,
 }
 
@@ -96,6 +97,7 @@ struct Plan {
 pub struct Decoder {
     plans: HashMap<CanId, Plan>,
     sources: Vec<Source>,
+    contested: BTreeMap<CanId, (NodeId, NodeId)>,
 }
 
 /// What a frame was to a decoder.
@@ -105,6 +107,8 @@ pub enum Decoded {
     NotOurs,
     /// A TPDO of this node; its samples have been handed over.
     Tpdo(NodeId),
+    /// A TPDO of this node, of which no samples are made at the moment.
+    Held(NodeId),
     /// A TPDO of this node whose length is not that of its mapping: no sample was made.
     WrongLength(NodeId),
 }
@@ -122,9 +126,31 @@ impl Decoder {
     /// Plans for every valid TPDO of an instrument; with `wanted`, only for what was asked for.
     pub fn add(&mut self, instrument: &Instrument, wanted: &[Wanted]) {
         for tpdo in instrument.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()) {
-            let plan = self.plan(instrument, tpdo, wanted);
-            self.plans.insert(tpdo.cob_id.can_id(), plan);
+            let mut plan = self.plan(instrument, tpdo, wanted);
+            let id = tpdo.cob_id.can_id();
+            // Two nodes that send with one identifier: nothing tells whose values come.
+            if let Some(other) = self.plans.get(&id).filter(|other| other.node != instrument.node) {
+                plan.held = true;
+                self.contested.insert(id, (other.node, instrument.node));
+            }
+            self.plans.insert(id, plan);
         }
+    }
+
+    /// The plans of an instrument that has been read again, in place of those that it had.
+    pub fn renew(&mut self, instrument: &Instrument, wanted: &[Wanted]) {
+        self.remove(instrument.node);
+        self.add(instrument, wanted);
+    }
+
+    /// Decodes nothing of a node any more: its TPDOs are nobody's.
+    pub fn remove(&mut self, node: NodeId) {
+        self.plans.retain(|_, plan| plan.node != node);
+    }
+
+    /// Makes no samples of a node's TPDOs until it is renewed: what they mean may have changed.
+    pub fn hold(&mut self, node: NodeId) {
+        self.plans.values_mut().filter(|plan| plan.node == node).for_each(|plan| plan.held = true);
     }
 
     fn plan(&mut self, instrument: &Instrument, tpdo: &Tpdo, wanted: &[Wanted]) -> Plan {
@@ -157,12 +183,17 @@ impl Decoder {
                 add(&object.to_string(), String::new(), &|source| Reading::plain(data_type, source), None);
             }
         }
-        Plan { node: instrument.node, length: bits.div_ceil(8), parts, wrong_length: 0 }
+        Plan { node: instrument.node, length: bits.div_ceil(8), parts, held: false, wrong_length: 0 }
     }
 
     /// Every source, in the order of their numbers.
     pub fn sources(&self) -> &[Source] {
         &self.sources
+    }
+
+    /// Identifiers that two nodes send with, since they were last asked for: no samples are made of these TPDOs.
+    pub fn take_contested(&mut self) -> BTreeMap<CanId, (NodeId, NodeId)> {
+        std::mem::take(&mut self.contested)
     }
 
     /// The identifiers that TPDOs come with.
@@ -184,6 +215,9 @@ impl Decoder {
         let Some(plan) = self.plans.get_mut(&frame.id()).filter(|_| !frame.is_remote()) else {
             return Decoded::NotOurs;
         };
+        if plan.held {
+            return Decoded::Held(plan.node);
+        }
         let data = frame.data();
         if data.len() != plan.length {
             plan.wrong_length += 1;

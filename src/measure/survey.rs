@@ -12,10 +12,10 @@ use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
 use crate::canopen::value::{DataType, Value};
 use crate::device::catalog::{Model, Traits, recognise, to_ask};
 use crate::device::description::SignalEntry;
-use crate::device::unit::Unit;
-pub use again::Again;
 use crate::device::quirk::Quirk;
+use crate::device::unit::Unit;
 use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
+pub use again::Again;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -132,7 +132,11 @@ pub fn identities<A: Ask>(master: &mut A, nodes: &[NodeId]) -> Result<Vec<Identi
 ///
 /// # Errors
 /// A node that does not answer, and what stops everything.
-pub fn instruments<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Instrument>, A::Stop> {
+pub fn instruments<A: Ask>(
+    master: &mut A,
+    nodes: &[NodeId],
+    overrides: &Overrides,
+) -> Result<Vec<Instrument>, A::Stop> {
     let mut instruments = recognised(master, nodes, overrides)?;
     read_services(master, &mut instruments)?;
     read_tpdos(master, &mut instruments)?;

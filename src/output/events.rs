@@ -1,8 +1,8 @@
 //! What happens on the way of a recording: in words for people, and as CSV for later.
 
 use super::rows::{Dialect, Sink, TimeForm, Times, push_number, push_seconds, push_text, push_texts};
-use crate::bus::Stamp;
 use crate::bus::time::spoken;
+use crate::bus::{Fault, ReceiveBuffer, Stamp};
 use crate::canopen::id::NodeId;
 use crate::tasks::log::Note;
 use std::io;
@@ -68,6 +68,26 @@ pub fn words(note: &Note) -> Words {
             weight: Remark,
         },
         Note::Restarted(node) => of_node(*node, "reboot", Warning, format!("node {node} restarted")),
+        Note::ReadAgain(node, changes) if changes.is_empty() => {
+            of_node(*node, "read-again", Remark, format!("node {node} was read again: it is set up as before"))
+        }
+        Note::ReadAgain(node, changes) => {
+            let changes = changes.join("; ");
+            let text = format!("node {node} has changed, and is recorded as it is now: {changes}");
+            of_node(*node, "changed", Warning, text)
+        }
+        Note::Unreadable(node, why) => {
+            let text = format!("{why}: what node {node} sends is not recorded until it can be read again");
+            of_node(*node, "unreadable", Warning, text)
+        }
+        Note::HeartbeatLost(node, since) => {
+            let text = format!("node {node}: heartbeat lost, none for {}", spoken(*since));
+            of_node(*node, "heartbeat-lost", Warning, text)
+        }
+        Note::HeartbeatBack(node) => {
+            of_node(*node, "heartbeat-back", Remark, format!("node {node}: heartbeat is back"))
+        }
+        Note::State(node, state) => of_node(*node, "state", Warning, format!("node {node} is {state} now")),
         Note::Gap(node, length) => of_node(*node, "gap", Detail, format!("node {node}: a gap of {}", spoken(*length))),
         Note::Silent(node, since) => {
             of_node(*node, "lost", Warning, format!("node {node}: silent for {}", spoken(*since)))
@@ -77,11 +97,28 @@ pub fn words(note: &Note) -> Words {
             let text = "a TPDO has not the length of its mapping: no row is made of it";
             of_node(*node, "length", Warning, format!("node {node}: {text}"))
         }
-        Note::Fault(fault) => Words::of_all("fault", Detail, fault.to_string()),
+        Note::Fault(fault) => {
+            let weight = match fault {
+                Fault::BusOff | Fault::ControllerOverflow => Warning,
+                Fault::Restarted => Remark,
+                _ => Detail,
+            };
+            Words::of_all("fault", weight, fault.to_string())
+        }
+        Note::Buffer(buffer) => Words { event: None, node: None, text: buffer_text(*buffer), weight: Detail },
         Note::Dropped(count) => Words::of_all("dropped", Warning, format!("the kernel dropped {count} frames")),
         Note::Link(true) => Words::of_all("link-up", Remark, "the interface is up again".to_owned()),
         Note::Link(false) => Words::of_all("link-down", Warning, "the interface went down; waiting for it".to_owned()),
     }
+}
+
+fn buffer_text(buffer: ReceiveBuffer) -> String {
+    let ReceiveBuffer { bytes, wanted } = buffer;
+    if buffer.is_small() {
+        let more = format!("sudo sysctl net.core.rmem_max={}", wanted / 2);
+        return format!("the receive buffer has {bytes} bytes; the kernel allows no more until: {more}");
+    }
+    format!("the receive buffer has {bytes} bytes")
 }
 
 /// Writes events.

@@ -2,11 +2,13 @@
 
 use super::text::{grouped, significant};
 use crate::bus::time::spoken;
+use crate::measure::histogram::Histogram;
 use crate::measure::sample::Source;
-use crate::measure::statistics::Statistics;
-use crate::tasks::log::Outcome;
+use crate::measure::statistics::{Jitter, Statistics};
+use crate::tasks::log::{Outcome, Syncs};
 use serde::Serialize;
 use std::io::{self, Write};
+use std::time::Duration;
 
 /// What became of the rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,18 +33,31 @@ pub fn lines(outcome: &Outcome, written: Written) -> Vec<String> {
         grouped(outcome.dropped),
         grouped(outcome.gaps)
     );
+    let events = &outcome.events;
     for (count, what) in [
-        (outcome.emergencies, "emergency messages"),
-        (outcome.skipped, "polls skipped"),
-        (outcome.syncs, "SYNC sent"),
-        (written.lost, "rows lost"),
-        (written.events_lost, "events lost"),
+        (outcome.emergencies, ["emergency message", "emergency messages"]),
+        (events.restarts, ["restart", "restarts"]),
+        (events.silences, ["time that a node was silent", "times that a node was silent"]),
+        (events.heartbeat_losses, ["heartbeat lost", "heartbeats lost"]),
+        (events.changes, ["changed mapping or unit", "changed mappings or units"]),
+        (events.wrong_lengths, ["TPDO of a wrong length", "TPDOs of a wrong length"]),
+        (events.link_losses, ["time that the interface went down", "times that the interface went down"]),
+        (events.bus_offs, ["bus-off", "bus-offs"]),
+        (outcome.skipped, ["poll skipped", "polls skipped"]),
+        (written.lost, ["row lost", "rows lost"]),
+        (written.events_lost, ["event lost", "events lost"]),
     ] {
         if count > 0 {
-            head.push_str(&format!(", {} {what}", grouped(count)));
+            let [one, several] = what;
+            head.push_str(&format!(", {} {}", grouped(count), if count == 1 { one } else { several }));
         }
     }
     let mut lines = vec![head];
+    if events.not_recorded > 0 {
+        let count = grouped(events.not_recorded);
+        lines.push(format!("{count} not recorded: it had to be read again first what the values mean"));
+    }
+    lines.extend(syncs(&outcome.syncs));
     for (source, statistics) in &outcome.statistics {
         lines.push(signal(source, statistics));
     }
@@ -54,6 +69,14 @@ pub fn lines(outcome: &Outcome, written: Written) -> Vec<String> {
     }
     lines.extend(outcome.remarks.iter().cloned());
     lines
+}
+
+fn syncs(syncs: &Syncs) -> Option<String> {
+    let delays = &syncs.delays;
+    let quantile = |share| delays.quantile(share).map(spoken);
+    let (p50, p99) = (quantile(0.5)?, quantile(0.99)?);
+    let (min, max) = (spoken(delays.shortest()?), spoken(delays.longest()?));
+    Some(format!("{} SYNC sent, after their time by min {min}  p50 {p50}  p99 {p99}  max {max}", grouped(syncs.sent)))
 }
 
 fn signal(source: &Source, statistics: &Statistics) -> String {
@@ -68,10 +91,39 @@ fn signal(source: &Source, statistics: &Statistics) -> String {
     if let Some(rate) = statistics.rate() {
         line = format!("{}  {}/s", line.trim_end(), significant(rate, 4));
     }
+    if let Some(Jitter { median, p99, max, .. }) = statistics.jitter() {
+        let (median, p99, max) = (spoken(median), spoken(p99), spoken(max));
+        line.push_str(&format!("  every {median}, jitter p99 {p99}  max {max}"));
+    }
+    if statistics.gaps() > 0 {
+        line.push_str(&format!("  {} gaps", grouped(statistics.gaps())));
+    }
     if statistics.invalid() > 0 {
         line.push_str(&format!("  {} invalid", grouped(statistics.invalid())));
     }
     line.trim_end().to_owned()
+}
+
+/// How times are distributed, in seconds.
+#[derive(Serialize)]
+struct Spread {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    min: Option<f64>,
+    p50: f64,
+    p99: f64,
+    max: f64,
+}
+
+impl Spread {
+    fn of(times: &Histogram) -> Option<Spread> {
+        let seconds = |time: Duration| time.as_secs_f64();
+        Some(Spread {
+            min: times.shortest().map(seconds),
+            p50: times.quantile(0.5).map(seconds)?,
+            p99: times.quantile(0.99).map(seconds)?,
+            max: times.longest().map(seconds)?,
+        })
+    }
 }
 
 /// The summary as one JSON object.
@@ -89,6 +141,9 @@ pub fn json(out: &mut dyn Write, outcome: &Outcome, written: Written) -> io::Res
         mean: Option<f64>,
         sd: Option<f64>,
         longest_interval_s: f64,
+        gaps: u64,
+        interval_s: Option<Spread>,
+        jitter_s: Option<Spread>,
     }
     #[derive(Serialize)]
     struct Summary<'a> {
@@ -103,6 +158,17 @@ pub fn json(out: &mut dyn Write, outcome: &Outcome, written: Written) -> io::Res
         emergencies: u64,
         skipped_polls: u64,
         syncs: u64,
+        syncs_left_out: u64,
+        sync_delay_s: Option<Spread>,
+        restarts: u64,
+        node_losses: u64,
+        heartbeat_losses: u64,
+        changes: u64,
+        not_recorded: u64,
+        wrong_lengths: u64,
+        link_losses: u64,
+        bus_offs: u64,
+        receive_buffer_bytes: Option<usize>,
         lost_nodes: Vec<u8>,
         remarks: &'a [String],
         signals: Vec<Signal<'a>>,
@@ -119,7 +185,16 @@ pub fn json(out: &mut dyn Write, outcome: &Outcome, written: Written) -> io::Res
         mean: statistics.mean(),
         sd: statistics.deviation(),
         longest_interval_s: statistics.longest_interval().as_secs_f64(),
+        gaps: statistics.gaps(),
+        interval_s: Spread::of(statistics.intervals()),
+        jitter_s: statistics.jitter().map(|jitter| Spread {
+            min: None,
+            p50: jitter.p50.as_secs_f64(),
+            p99: jitter.p99.as_secs_f64(),
+            max: jitter.max.as_secs_f64(),
+        }),
     });
+    let events = &outcome.events;
     let summary = Summary {
         rows: written.rows,
         rows_lost: written.lost,
@@ -131,7 +206,18 @@ pub fn json(out: &mut dyn Write, outcome: &Outcome, written: Written) -> io::Res
         gaps: outcome.gaps,
         emergencies: outcome.emergencies,
         skipped_polls: outcome.skipped,
-        syncs: outcome.syncs,
+        syncs: outcome.syncs.sent,
+        syncs_left_out: outcome.syncs.left_out,
+        sync_delay_s: Spread::of(&outcome.syncs.delays),
+        restarts: events.restarts,
+        node_losses: events.silences,
+        heartbeat_losses: events.heartbeat_losses,
+        changes: events.changes,
+        not_recorded: events.not_recorded,
+        wrong_lengths: events.wrong_lengths,
+        link_losses: events.link_losses,
+        bus_offs: events.bus_offs,
+        receive_buffer_bytes: outcome.receive_buffer.map(|buffer| buffer.bytes),
         lost_nodes: outcome.lost.iter().map(|node| node.get()).collect(),
         remarks: &outcome.remarks,
         signals: signals.collect(),

@@ -157,6 +157,7 @@ fn record(
         duration,
         count: None,
         nmt: true,
+        max_gap: None,
         overrides: plan.overrides.clone(),
     };
     let mut expecting = Expecting::new(&plan.expressions, &plan.nodes, plan.excuse, observer);

@@ -3,16 +3,23 @@
 //! What is recorded goes to an [`Observer`]; nothing is printed or written here. What the recording
 //! switched on the way is put back at its end, on every way out.
 
+mod changes;
 mod checks;
+mod events;
+mod hearts;
 mod passive;
 mod poll;
+mod producer;
 mod recording;
+mod renewal;
+mod rhythm;
 mod silence;
 mod states;
 
-use crate::bus::{Fault, Filters, Stamp, TimestampSource};
+use crate::bus::{Fault, Filters, ReceiveBuffer, Stamp, TimestampSource};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
+use crate::canopen::nmt::NmtState;
 use crate::master::{Error, Master};
 use crate::measure::decode::Wanted;
 use crate::measure::expression::judge::Jury;
@@ -22,10 +29,11 @@ use crate::measure::statistics::Statistics;
 use crate::measure::survey::{Overrides, instruments};
 use crate::tasks::Failure;
 use checks::{check_wanted, refuse_second_sync, sync_share};
+pub use events::Events;
 use passive::Learner;
 use poll::Poll;
+pub use producer::Syncs;
 use recording::Recording;
-use states::States;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -44,6 +52,8 @@ pub struct Plan {
     pub count: Option<u64>,
     /// Whether NMT may be used.
     pub nmt: bool,
+    /// The longest interval that is no gap; three usual ones where nothing is said.
+    pub max_gap: Option<Duration>,
     /// Descriptions named by the user.
     pub overrides: Overrides,
 }
@@ -72,7 +82,18 @@ pub enum Note {
     Share(Duration, f64),
     /// A node restarted.
     Restarted(NodeId),
-    /// Something of the node came after an interval longer than three times the usual one.
+    /// A node was read again, and this has changed; nothing where it is set up as before. From here on its
+    /// measurements are read by what it is now.
+    ReadAgain(NodeId, Vec<String>),
+    /// A node should be read again and could not; it is tried on. What it sends meanwhile is not recorded.
+    Unreadable(NodeId, String),
+    /// The heartbeat of a node has stopped for so long.
+    HeartbeatLost(NodeId, Duration),
+    /// The heartbeat of a node is back.
+    HeartbeatBack(NodeId),
+    /// The heartbeat of a node tells that it is not operational any more.
+    State(NodeId, NmtState),
+    /// Something of the node came after an interval longer than [`Plan::max_gap`].
     Gap(NodeId, Duration),
     /// Nothing has come from the node for a while.
     Silent(NodeId, Duration),
@@ -82,6 +103,8 @@ pub enum Note {
     WrongLength(NodeId),
     /// The controller reports trouble.
     Fault(Fault),
+    /// The kernel holds back so much of what is received.
+    Buffer(ReceiveBuffer),
     /// The kernel dropped frames.
     Dropped(u32),
     /// The interface went down or came back.
@@ -147,12 +170,16 @@ pub struct Outcome {
     pub dropped: u64,
     /// Emergency messages.
     pub emergencies: u64,
-    /// Intervals longer than three times the usual one.
+    /// Intervals longer than [`Plan::max_gap`].
     pub gaps: u64,
     /// Polls that could not be sent because the one before was not finished.
     pub skipped: u64,
+    /// What else happened.
+    pub events: Events,
     /// SYNC messages sent.
-    pub syncs: u64,
+    pub syncs: Syncs,
+    /// How much of what was received the kernel could hold back, where that is known.
+    pub receive_buffer: Option<ReceiveBuffer>,
     /// Where the time stamps come from.
     pub timestamps: TimestampSource,
     /// What was switched and not put back, in words.
@@ -179,32 +206,32 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     let instruments = instruments(master, &plan.nodes, &plan.overrides)?;
     observer.begin(&instruments)?;
     check_wanted(&instruments, plan)?;
-    let mut recording = Recording::new(&instruments, plan, master.bus().timestamps());
-    let mut states = States::default();
-    let mut poll = match plan.mode {
-        Mode::Poll(period) => Some(Poll::new(&instruments, &plan.wanted, &mut recording.decoder, period)?),
-        _ => {
-            instruments.iter().for_each(|instrument| recording.decoder.add(instrument, &plan.wanted));
-            None
+    let mut recording = Recording::new(instruments, plan, master.bus());
+    match plan.mode {
+        Mode::Poll(period) => {
+            let poll = Poll::new(&recording.instruments, &plan.wanted, &mut recording.decoder, period)?;
+            recording.poll = Some(poll);
         }
-    };
+        _ => recording.instruments.iter().for_each(|instrument| recording.decoder.add(instrument, &plan.wanted)),
+    }
     recording.expect_sources();
     recording.excuse(plan);
     observer.sources(recording.decoder.sources())?;
-    master.listen(&recording.filters(&instruments))?;
+    recording.tell_contested(master.bus().now(), observer);
+    master.listen(&recording.filters())?;
     if let Mode::Sync(period) = plan.mode {
-        refuse_second_sync(master, &instruments, period)?;
-        if let Some(share) = sync_share(master, &instruments, period) {
+        refuse_second_sync(master, &recording.instruments, period)?;
+        if let Some(share) = sync_share(master, &recording.instruments, period) {
             observer.note(&Note::Share(period, share), master.bus().now());
         }
     }
-    let result = states.start(master, &instruments, plan).and_then(|()| {
+    let result = recording.states.start(master, &recording.instruments, plan).and_then(|()| {
         master.ride_out(true);
-        recording.run(master, plan, &instruments, &mut states, poll.as_mut(), observer)
+        recording.run(master, plan, observer)
     });
     master.ride_out(false);
-    let restored = states.restore(master);
-    recording.remarks.extend(states.remarks());
+    let restored = recording.states.restore(master);
+    recording.remarks.extend(recording.states.remarks());
     match result {
         Ok(()) => {}
         Err(Error::Interrupted) if recording.rows > 0 => recording.interrupted = true,
@@ -213,22 +240,22 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     if let Err(error) = restored {
         recording.remarks.push(format!("the nodes' states were not put back: {error}"));
     }
-    Ok(recording.outcome(&instruments, plan))
+    Ok(recording.outcome(plan))
 }
 
 fn record_passively(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
-    let mut recording = Recording::new(&[], plan, master.bus().timestamps());
+    let mut recording = Recording::new(Vec::new(), plan, master.bus());
     let mut learner = Learner::new(&plan.nodes, &plan.overrides, &plan.wanted);
     learner.begin(&mut recording.decoder);
     recording.learner = Some(learner);
     recording.expect_sources();
     master.listen(&Filters::All)?;
-    match recording.run(master, plan, &[], &mut States::default(), None, observer) {
+    match recording.run(master, plan, observer) {
         Ok(()) => {}
         Err(Error::Interrupted) if recording.rows > 0 => recording.interrupted = true,
         Err(error) => return Err(error.into()),
     }
-    Ok(recording.outcome(&[], plan))
+    Ok(recording.outcome(plan))
 }
 
 /// `period` times `n`, to the nanosecond, for as many as there may be.

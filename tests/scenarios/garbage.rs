@@ -97,6 +97,7 @@ fn garbage_changes_no_row_and_ends_nothing() {
             duration: Some(Duration::from_secs(4)),
             count: None,
             nmt: true,
+            max_gap: None,
             overrides: BTreeMap::new(),
         };
         let mut kept = Kept::default();

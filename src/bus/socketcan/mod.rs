@@ -13,9 +13,7 @@ mod setup;
 mod socket;
 
 use super::interrupt::Interrupts;
-use super::{
-    Bus, BusError, Event, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource, Wall, poll,
-};
+use super::{Bus, BusError, Event, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource, Wall, poll};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 use clocks::Clocks;

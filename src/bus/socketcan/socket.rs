@@ -118,13 +118,7 @@ fn read_memory_info(socket: BorrowedFd<'_>) -> io::Result<Vec<u32>> {
     // SAFETY: `numbers` is as long as `length` says and outlives the call, every pattern of bits is a u32, and the
     // descriptor is borrowed and so is open.
     let result = unsafe {
-        libc::getsockopt(
-            socket.as_raw_fd(),
-            libc::SOL_SOCKET,
-            SO_MEMINFO,
-            numbers.as_mut_ptr().cast(),
-            &raw mut length,
-        )
+        libc::getsockopt(socket.as_raw_fd(), libc::SOL_SOCKET, SO_MEMINFO, numbers.as_mut_ptr().cast(), &raw mut length)
     };
     if result < 0 {
         return Err(io::Error::last_os_error());

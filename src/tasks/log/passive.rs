@@ -22,6 +22,8 @@ pub(super) struct Learner {
     overrides: Overrides,
     wanted: Vec<Wanted>,
     known: BTreeMap<(NodeId, ObjectId), Vec<u8>>,
+    /// What the nodes refused to tell.
+    refused: BTreeSet<(NodeId, ObjectId)>,
     uploads: BTreeMap<NodeId, (ObjectId, Upload)>,
     downloads: BTreeMap<NodeId, (ObjectId, Vec<u8>)>,
     planned: BTreeSet<CanId>,
@@ -36,6 +38,7 @@ impl Learner {
             overrides: overrides.clone(),
             wanted: wanted.to_vec(),
             known: BTreeMap::new(),
+            refused: BTreeSet::new(),
             uploads: BTreeMap::new(),
             downloads: BTreeMap::new(),
             planned: BTreeSet::new(),
@@ -63,6 +66,20 @@ impl Learner {
             && !self.planned.contains(&frame.id())
         {
             self.not_understood.insert(node);
+        }
+    }
+
+    /// A node has restarted: what was learned of it may have been lost with its power. What the user has named
+    /// stays.
+    pub(super) fn forget(&mut self, node: NodeId, decoder: &mut Decoder) {
+        self.known.retain(|(of, _), _| *of != node);
+        self.refused.retain(|(of, _)| *of != node);
+        self.uploads.remove(&node);
+        self.downloads.remove(&node);
+        decoder.remove(node);
+        self.planned = decoder.can_ids().collect();
+        if self.overrides.contains_key(&node) && self.nodes.contains(&node) {
+            self.plan(node, decoder);
         }
     }
 
@@ -104,7 +121,7 @@ impl Learner {
             }
             Progress::Failed(_) => {
                 self.uploads.remove(&node);
-                false
+                self.nodes.contains(&node) && self.refused.insert((node, object))
             }
             Progress::NotOurs | Progress::Continue => false,
         }
@@ -134,9 +151,23 @@ impl Learner {
     }
 
     fn plan(&mut self, node: NodeId, decoder: &mut Decoder) {
-        let instrument = self.instrument(node);
+        let mut instrument = self.instrument(node);
+        // An integer without its digits is a number that is wrong by a power of ten.
+        let has_digits = |instrument: &Instrument, tpdo: &Tpdo| {
+            tpdo.mapping.iter().all(|entry| {
+                let signal = instrument.signals.iter().find(|signal| signal.is_value(entry.object));
+                signal.is_none_or(|signal| {
+                    let digits = ObjectId::new(0x6132, signal.channel);
+                    let is_integer = matches!(instrument.data_type(entry.object, entry.bits), DataType::Integer(_));
+                    !is_integer || signal.digits.is_some() || self.refused.contains(&(node, digits))
+                })
+            })
+        };
+        let mut tpdos = std::mem::take(&mut instrument.tpdos);
+        tpdos.retain(|tpdo| has_digits(&instrument, tpdo));
+        instrument.tpdos = tpdos;
         if !instrument.tpdos.is_empty() {
-            decoder.add(&instrument, &self.wanted);
+            decoder.renew(&instrument, &self.wanted);
             self.planned = decoder.can_ids().collect();
             self.not_understood.remove(&node);
         }

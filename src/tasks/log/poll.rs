@@ -2,6 +2,7 @@
 
 use super::{Note, nth};
 use crate::bus::Mono;
+use crate::canopen::id::NodeId;
 use crate::master::{Answer, Master, SdoError, Ticket};
 use crate::measure::decode::{Decoder, Wanted};
 use crate::measure::instrument::Instrument;
@@ -16,6 +17,8 @@ pub(super) struct Poll {
     period: Duration,
     cycles: u64,
     targets: Vec<Target>,
+    /// Which of them are read at the moment.
+    live: Vec<bool>,
     open: BTreeMap<Ticket, (usize, Part)>,
     answers: Vec<Parts>,
     failing: Vec<bool>,
@@ -42,28 +45,65 @@ impl Poll {
         decoder: &mut Decoder,
         period: Duration,
     ) -> Result<Poll, Failure> {
-        let mut all: Vec<Target> = Vec::new();
+        let mut poll = Poll {
+            period,
+            cycles: 0,
+            targets: Vec::new(),
+            live: Vec::new(),
+            open: BTreeMap::new(),
+            answers: Vec::new(),
+            failing: Vec::new(),
+        };
         for instrument in instruments {
-            let mut number = 0;
-            // Of several nodes each gives what it has; that somebody has it was checked before.
-            let has = |item: &&Wanted| match item {
-                Wanted::Signal(name) | Wanted::Status(name) => {
-                    instrument.signals.iter().any(|signal| signal.name == *name)
-                }
-                Wanted::Object(_) => true,
+            poll.renew(instrument, wanted, decoder)?;
+        }
+        Ok(poll)
+    }
+
+    /// What is read of a node from now on. It must have been held before if it was read.
+    ///
+    /// # Errors
+    /// Why nothing can be read of it.
+    pub(super) fn renew(
+        &mut self,
+        instrument: &Instrument,
+        wanted: &[Wanted],
+        decoder: &mut Decoder,
+    ) -> Result<(), Failure> {
+        let mut number = 0;
+        // Of several nodes each gives what it has; that somebody has it was checked before.
+        let has = |item: &&Wanted| match item {
+            Wanted::Signal(name) | Wanted::Status(name) => instrument.signals.iter().any(|signal| signal.name == *name),
+            Wanted::Object(_) => true,
+        };
+        let own: Vec<Wanted> = wanted.iter().filter(has).cloned().collect();
+        if own.is_empty() && !wanted.is_empty() {
+            return Ok(());
+        }
+        for mut target in targets(instrument, &own, &mut number)? {
+            target.reading.source = decoder.add_source(target.source.clone());
+            // The places of what was read of the node before are free by now: a node has one request at a time.
+            let is_free = |&at: &usize| {
+                !self.live[at] && self.answers[at].under_way == 0 && self.targets[at].source.node == instrument.node
             };
-            let own: Vec<Wanted> = wanted.iter().filter(has).cloned().collect();
-            if own.is_empty() && !wanted.is_empty() {
-                continue;
-            }
-            for mut target in targets(instrument, &own, &mut number)? {
-                target.reading.source = decoder.add_source(target.source.clone());
-                all.push(target);
+            match (0..self.targets.len()).find(is_free) {
+                Some(at) => (self.targets[at], self.live[at], self.failing[at]) = (target, true, false),
+                None => {
+                    self.targets.push(target);
+                    self.live.push(true);
+                    self.answers.push(Parts::default());
+                    self.failing.push(false);
+                }
             }
         }
-        let answers = all.iter().map(|_| Parts::default()).collect();
-        let failing = vec![false; all.len()];
-        Ok(Poll { period, cycles: 0, targets: all, open: BTreeMap::new(), answers, failing })
+        Ok(())
+    }
+
+    /// Nothing is read of a node any more, and what is under way is thrown away when it comes.
+    pub(super) fn hold(&mut self, node: NodeId) {
+        for (target, live) in self.targets.iter().zip(&mut self.live) {
+            *live &= target.source.node != node;
+        }
     }
 
     /// When the next cycle begins, counted from `begin`.
@@ -87,6 +127,9 @@ impl Poll {
         while self.due(begin) <= now {
             self.cycles += 1;
             for (at, target) in self.targets.iter().enumerate() {
+                if !self.live[at] {
+                    continue;
+                }
                 let parts = &mut self.answers[at];
                 if parts.under_way > 0 {
                     skipped += 1;
@@ -121,6 +164,9 @@ impl Poll {
             return None;
         }
         let parts = std::mem::take(parts);
+        if !self.live[at] {
+            return None;
+        }
         match sample(&self.targets[at], parts.value?, parts.status) {
             Ok(sample) => {
                 samples.push(sample);

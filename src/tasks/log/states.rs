@@ -40,16 +40,11 @@ impl States {
         Ok(())
     }
 
-    /// Takes a sign of life; `true` when the node has restarted. It is started again only if this recording
-    /// had started it.
-    pub(super) fn take(&mut self, node: NodeId, life: Life, master: &mut Master<'_>) -> bool {
-        if life != Life::BootUp {
-            return false;
-        }
+    /// Starts a node again that has been away, if this recording had started it.
+    pub(super) fn start_again(&self, node: NodeId, master: &mut Master<'_>) {
         if self.started.contains_key(&node) {
             master.send(NmtCommand::Start.frame(Some(node)));
         }
-        true
     }
 
     /// Returns every node whose state was known to that state.
