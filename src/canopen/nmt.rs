@@ -134,6 +134,11 @@ impl Life {
     }
 }
 
+/// The node that says with this frame that it has (re)started.
+pub fn booted(frame: &Frame) -> Option<NodeId> {
+    Life::parse(frame).filter(|(_, life)| *life == Life::BootUp).map(|(node, _)| node)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

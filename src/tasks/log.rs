@@ -34,6 +34,7 @@ use passive::Learner;
 use poll::Poll;
 pub use producer::Syncs;
 use recording::Recording;
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -217,16 +218,20 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     recording.expect_sources();
     recording.excuse(plan);
     observer.sources(recording.decoder.sources())?;
+    // Between the reading and the recording, too, nodes restart.
+    let mut restarted = BTreeSet::new();
     recording.tell_contested(master.bus().now(), observer);
     master.listen(&recording.filters())?;
     if let Mode::Sync(period) = plan.mode {
-        refuse_second_sync(master, &recording.instruments, period)?;
+        refuse_second_sync(master, &recording.instruments, period, &mut restarted)?;
         if let Some(share) = sync_share(master, &recording.instruments, period) {
             observer.note(&Note::Share(period, share), master.bus().now());
         }
     }
-    let result = recording.states.start(master, &recording.instruments, plan).and_then(|()| {
+    let started = recording.states.start(master, &recording.instruments, plan, &mut restarted);
+    let result = started.and_then(|()| {
         master.ride_out(true);
+        recording.doubt_restarted(&restarted, master, observer);
         recording.run(master, plan, observer)
     });
     master.ride_out(false);

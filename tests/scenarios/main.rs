@@ -6,6 +6,7 @@ mod bit_rates;
 mod detect;
 mod full_queue;
 mod garbage;
+mod log_goes_on;
 mod lss;
 mod pdo_map;
 mod pdo_map_devices;

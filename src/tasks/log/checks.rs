@@ -2,7 +2,8 @@
 
 use super::{Mode, Plan};
 use crate::bus::BusError;
-use crate::canopen::id::CanId;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::nmt::booted;
 use crate::canopen::pdo::Transmission;
 use crate::master::{Error, Happening, Master};
 use crate::measure::decode::Wanted;
@@ -64,11 +65,12 @@ pub(super) fn check_wanted(instruments: &[Instrument], plan: &Plan) -> Result<()
     Ok(())
 }
 
-/// Two SYNC producers would double every synchronous TPDO.
+/// Two SYNC producers would double every synchronous TPDO. Nodes that restart meanwhile go to `restarted`.
 pub(super) fn refuse_second_sync(
     master: &mut Master<'_>,
     instruments: &[Instrument],
     period: Duration,
+    restarted: &mut BTreeSet<NodeId>,
 ) -> Result<(), Failure> {
     let ids: BTreeSet<CanId> = instruments.iter().map(|instrument| instrument.sync).collect();
     if ids.len() > 1 {
@@ -85,6 +87,7 @@ pub(super) fn refuse_second_sync(
                 )
                 .hint("leave --sync out: the nodes send on the SYNC that is there"));
             }
+            Happening::Frame(received) => restarted.extend(booted(&received.frame)),
             Happening::Deadline => return Ok(()),
             Happening::Interrupted => return Err(Error::Interrupted.into()),
             Happening::Link(false) => return Err(BusError::Down(master.bus().name().to_owned()).into()),

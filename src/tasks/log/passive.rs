@@ -69,11 +69,12 @@ impl Learner {
         }
     }
 
-    /// A node has restarted: what was learned of it may have been lost with its power. What the user has named
-    /// stays.
+    /// A node has restarted: how it was set up may have been lost with its power. What it is stays, and what the
+    /// user has named.
     pub(super) fn forget(&mut self, node: NodeId, decoder: &mut Decoder) {
-        self.known.retain(|(of, _), _| *of != node);
-        self.refused.retain(|(of, _)| *of != node);
+        let stays = |(of, object): &(NodeId, ObjectId)| *of != node || !is_setup(*object);
+        self.known.retain(|key, _| stays(key));
+        self.refused.retain(stays);
         self.uploads.remove(&node);
         self.downloads.remove(&node);
         decoder.remove(node);
@@ -246,6 +247,11 @@ impl Learner {
         signals.dedup_by_key(|signal| signal.channel);
         signals
     }
+}
+
+/// Whether an object belongs to what TPDOs are read by, and not to what a device is.
+fn is_setup(object: ObjectId) -> bool {
+    matches!(object.index, 0x1800..=0x1bff | 0x6131 | 0x6132)
 }
 
 /// The node whose predefined TPDO identifier this is: it only tells that something was not understood.

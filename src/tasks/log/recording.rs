@@ -18,7 +18,7 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::master::{Answer, Error, Happening, Master, SdoError, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::instrument::Instrument;
-use crate::measure::sample::Sample;
+use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
@@ -122,7 +122,14 @@ impl Recording {
 
     pub(super) fn expect_sources(&mut self) {
         self.statistics.resize(self.decoder.sources().len(), Statistics::default());
-        self.rhythms.resize(self.decoder.sources().len(), Rhythm::default());
+        let sources = self.decoder.sources();
+        for source in &sources[self.rhythms.len()..] {
+            // A signal whose unit has changed goes on in its rhythm.
+            let is_same =
+                |(other, _): &(&Source, &Rhythm)| (other.node, &other.signal) == (source.node, &source.signal);
+            let before = sources.iter().zip(&self.rhythms).rfind(is_same);
+            self.rhythms.push(before.map(|(_, rhythm)| rhythm.clone()).unwrap_or_default());
+        }
     }
 
     /// TPDOs, emergencies, heartbeats, SDO answers and SYNC of the nodes recorded, nothing else.

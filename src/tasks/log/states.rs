@@ -3,10 +3,10 @@
 use super::{Mode, Plan};
 use crate::bus::BusError;
 use crate::canopen::id::NodeId;
-use crate::canopen::nmt::{Life, NmtCommand, NmtState};
+use crate::canopen::nmt::{Life, NmtCommand, NmtState, booted};
 use crate::master::{Error, Happening, Master};
 use crate::measure::instrument::Instrument;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 /// A heartbeat slower than this is not waited for: the node's state counts as unknown.
@@ -19,17 +19,18 @@ pub(super) struct States {
 }
 
 impl States {
-    /// Starts the nodes that are not known to be operational.
+    /// Starts the nodes that are not known to be operational. Nodes that restart meanwhile go to `restarted`.
     pub(super) fn start(
         &mut self,
         master: &mut Master<'_>,
         instruments: &[Instrument],
         plan: &Plan,
+        restarted: &mut BTreeSet<NodeId>,
     ) -> Result<(), Error> {
         if !plan.nmt || matches!(plan.mode, Mode::Poll(_) | Mode::Passive) {
             return Ok(());
         }
-        let known = heartbeats(master, instruments)?;
+        let known = heartbeats(master, instruments, restarted)?;
         for instrument in instruments {
             let before = known.get(&instrument.node).copied();
             if before != Some(NmtState::Operational) {
@@ -83,7 +84,11 @@ impl States {
 }
 
 /// The states that heartbeats tell, waited for as long as the slowest of them needs.
-fn heartbeats(master: &mut Master<'_>, instruments: &[Instrument]) -> Result<BTreeMap<NodeId, NmtState>, Error> {
+fn heartbeats(
+    master: &mut Master<'_>,
+    instruments: &[Instrument],
+    restarted: &mut BTreeSet<NodeId>,
+) -> Result<BTreeMap<NodeId, NmtState>, Error> {
     let period = |instrument: &Instrument| {
         let period = Duration::from_millis(u64::from(instrument.heartbeat_ms?));
         (!period.is_zero() && period <= SLOWEST_HEARTBEAT).then_some(period)
@@ -96,6 +101,7 @@ fn heartbeats(master: &mut Master<'_>, instruments: &[Instrument]) -> Result<BTr
     while known.len() < expected.len() {
         match master.next(until)? {
             Happening::Frame(received) => {
+                restarted.extend(booted(&received.frame));
                 if let Some((node, Life::State(state))) = Life::parse(&received.frame)
                     && expected.contains_key(&node)
                 {

@@ -12,6 +12,7 @@ use crate::tasks::log::changes::changes;
 use crate::tasks::log::hearts::Beat;
 use crate::tasks::log::renewal::{Doubt, Renewed, writes_setup};
 use crate::tasks::log::{Note, Observer, Plan};
+use std::collections::BTreeSet;
 
 impl Recording {
     /// Learns what an instrument says of its services.
@@ -80,6 +81,22 @@ impl Recording {
             Beat::State(state) => observer.note(&Note::State(node, state), at),
         }
         if is_boot_up {
+            self.events.restarts += 1;
+            observer.note(&Note::Restarted(node), at);
+            self.doubt(node, Doubt::Away, at.mono, master);
+        }
+    }
+
+    /// These have restarted since they were read.
+    pub(in crate::tasks::log) fn doubt_restarted(
+        &mut self,
+        nodes: &BTreeSet<NodeId>,
+        master: &mut Master<'_>,
+        observer: &mut dyn Observer,
+    ) {
+        let at = master.bus().now();
+        let recorded: Vec<NodeId> = nodes.iter().copied().filter(|node| self.pulses.contains_key(node)).collect();
+        for node in recorded {
             self.events.restarts += 1;
             observer.note(&Note::Restarted(node), at);
             self.doubt(node, Doubt::Away, at.mono, master);

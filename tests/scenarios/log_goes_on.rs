@@ -1,0 +1,432 @@
+//! A recording goes on by itself, whatever happens to nodes, mapping and interface; and no row is made by a
+//! mapping, a unit or digits that are not those of the device when it sent it.
+
+use super::Kept;
+use cangauge::bus::memory::{MemoryBus, Outbox, Station};
+use cangauge::bus::time::{Mono, Stamp};
+use cangauge::bus::{Bus, BusError, Event, Fault, Filters, Received, TimestampSource};
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::{CanId, NodeId};
+use cangauge::canopen::nmt::NmtState;
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::sdo::DownloadSize;
+use cangauge::master::{Master, Request, Timing};
+use cangauge::sim::Bench;
+use cangauge::tasks::log::{Mode, Note, Outcome, Plan, log};
+use std::collections::{BTreeMap, VecDeque};
+use std::ops::Range;
+use std::path::Path;
+use std::time::Duration;
+
+fn at(milliseconds: u64) -> Mono {
+    Mono::at(Duration::from_millis(milliseconds))
+}
+
+fn node(id: u8) -> NodeId {
+    NodeId::new(id).expect("a node-ID")
+}
+
+/// Somebody else on the bus, who sends what he was told and listens to nobody.
+struct Other {
+    frames: VecDeque<(Mono, Frame)>,
+}
+
+impl Other {
+    /// Frames with their times in milliseconds, in order.
+    fn new(frames: &[(u64, &str)]) -> Other {
+        let frames = frames.iter().map(|(time, text)| (at(*time), text.parse().expect("a frame")));
+        Other { frames: frames.collect() }
+    }
+}
+
+impl Station for Other {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        while let Some((_, frame)) = self.frames.pop_front_if(|(time, _)| *time <= now) {
+            out.send(frame);
+        }
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.frames.front().map(|(time, _)| *time)
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+/// What a recording gave, beside what the simulator says that it sent.
+struct Run {
+    kept: Kept,
+    outcome: Outcome,
+    /// The simulator's own lines from the first row to the last.
+    sent: Vec<String>,
+    /// The NMT commands on the bus, ours among them.
+    commands: Vec<String>,
+}
+
+impl Run {
+    /// Every row says what the simulator says of the same moment; how many of its lines are missing.
+    #[track_caller]
+    fn missing(&self) -> usize {
+        let mut sent = self.sent.iter();
+        for row in &self.kept.rows {
+            assert!(sent.any(|line| line == row), "{row} was never sent so");
+        }
+        self.sent.len() - self.kept.rows.len()
+    }
+
+    fn has(&self, note: &Note) -> bool {
+        self.kept.notes.contains(note)
+    }
+
+    /// What has changed, by the notes.
+    fn changes(&self) -> Vec<&[String]> {
+        let changes = self.kept.notes.iter().filter_map(|note| match note {
+            Note::ReadAgain(_, changes) => Some(changes.as_slice()),
+            _ => None,
+        });
+        changes.collect()
+    }
+
+    /// The units of the rows, each run of the same once.
+    fn units(&self) -> Vec<&str> {
+        let mut units: Vec<&str> = self.kept.rows.iter().filter_map(|row| row.split(',').nth(4)).collect();
+        units.dedup();
+        units
+    }
+}
+
+const SECONDS: u64 = 5;
+
+/// Records a bench for five seconds beside somebody else. `before` is done to the devices first.
+fn record(devices: &str, mode: Mode, others: &[(u64, &str)], before: &dyn Fn(&mut Master<'_>)) -> Run {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = format!("clock = \"virtual\"\nrecord = \"truth.csv\"\n{devices}");
+    let mut bus = Bench::from_toml(&text, folder.path()).expect("a bench").open().expect("a bus");
+    bus.attach(Other::new(others));
+    bus.attach(Ear::default());
+    before(&mut Master::new(&mut bus, Timing::default()));
+    let mut kept = Kept::default();
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(mode), &mut kept).expect("a recording");
+    let commands = bus.stations::<Ear>().flat_map(|ear| ear.commands.clone()).collect();
+    drop(bus);
+    let truth = std::fs::read_to_string(folder.path().join("truth.csv")).expect("the record");
+    let time = |line: &str| line.split(',').next().and_then(|time| time.parse::<u64>().ok()).expect("a time");
+    let (first, last) = (time(&kept.rows[0]), time(kept.rows.last().expect("rows")));
+    let sent = truth.lines().skip(1).filter(|line| (first..=last).contains(&time(line)));
+    Run { sent: sent.map(str::to_owned).collect(), kept, outcome, commands }
+}
+
+fn plan(mode: Mode) -> Plan {
+    Plan {
+        nodes: vec![node(5)],
+        wanted: Vec::new(),
+        mode,
+        duration: Some(Duration::from_secs(SECONDS)),
+        count: None,
+        nmt: true,
+        max_gap: None,
+        overrides: BTreeMap::new(),
+    }
+}
+
+/// Hears NMT commands.
+#[derive(Default)]
+struct Ear {
+    commands: Vec<String>,
+}
+
+impl Station for Ear {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, _: &mut Outbox) {
+        let text = frame.to_string();
+        if text.starts_with("000#") {
+            self.commands.push(text);
+        }
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+fn write(master: &mut Master<'_>, object: ObjectId, bytes: &[u8]) {
+    let write = Request::write(node(5), object, bytes.to_vec(), DownloadSize::Indicated);
+    master.transfer_one(write).expect("a bus").expect("written");
+}
+
+const DPS: &str = "[[device]]\nkind = \"dps\"\nnode = 5\n";
+const MH4: &str = "[[device]]\nkind = \"mh4\"\nnode = 5\n";
+const SYNC: Mode = Mode::Sync(Duration::from_millis(10));
+/// 6131h:1, and bar and psi as it holds them.
+const UNIT: ObjectId = ObjectId::new(0x6131, 1);
+const BAR: [u8; 4] = [0x00, 0x00, 0x4e, 0x00];
+
+fn nothing(_: &mut Master<'_>) {}
+
+#[test]
+fn a_node_that_restarts_is_started_again_and_nothing_else_changes() {
+    let run = record(DPS, Mode::AsSent, &[(2000, "000#8105")], &nothing);
+    assert_eq!(run.missing(), 0);
+    assert!(run.has(&Note::Restarted(node(5))));
+    assert_eq!(run.changes(), [[""; 0]], "set up as before");
+    assert_eq!(run.commands, ["000#0105", "000#8105", "000#0105"]);
+    assert_eq!((run.outcome.events.restarts, run.outcome.events.changes), (1, 0));
+    let after = run.kept.rows.iter().filter(|row| row.split(',').next().is_some_and(|time| time > "2500000")).count();
+    assert!(after > 20, "rows continue: {after}");
+}
+
+#[test]
+fn what_was_not_stored_is_gone_after_a_restart_and_no_row_is_read_by_it() {
+    // In bar; by its factory settings it comes back in psi.
+    let before = |master: &mut Master<'_>| write(master, UNIT, &BAR);
+    for mode in [Mode::AsSent, Mode::Poll(Duration::from_millis(20))] {
+        let run = record(DPS, mode, &[(2000, "000#8105")], &before);
+        assert_eq!(run.units(), ["bar", "psi"], "{mode:?}");
+        if mode == Mode::AsSent {
+            assert_eq!(run.missing(), 0);
+        }
+        // 25 bar are 362.6 psi: a number that was read before the restart does not get the unit of after it.
+        for row in &run.kept.rows {
+            let value: f64 = row.split(',').nth(3).and_then(|value| value.parse().ok()).expect(row);
+            let first: f64 = run.kept.rows[0].split(',').nth(3).and_then(|value| value.parse().ok()).expect("a value");
+            let factor = if row.contains(",psi,") { 14.5 } else { 1.0 };
+            assert!((0.5..2.0).contains(&(value / first / factor)), "{row} after {}", run.kept.rows[0]);
+        }
+        assert_eq!(run.outcome.events.changes, 1);
+        let said = run.changes().concat().join("; ");
+        assert!(said.contains("pressure is in psi and not in bar"), "{said}");
+        // Each unit has its own statistics.
+        let units: Vec<_> = run.outcome.statistics.iter().map(|(source, _)| source.unit.to_string()).collect();
+        assert_eq!(units, ["bar", "psi"]);
+    }
+}
+
+#[test]
+fn a_node_that_starts_by_itself_is_not_recorded_until_it_was_read() {
+    let devices = format!("{MH4}start = true\n");
+    let run = record(&devices, SYNC, &[(2000, "000#8105"), (2030, "000#0105")], &nothing);
+    assert!(run.missing() > 0 && run.outcome.events.not_recorded > 0, "{:?}", run.outcome.events);
+    assert_eq!(run.missing() as u64, run.outcome.events.not_recorded, "what is missing is counted");
+}
+
+#[test]
+fn a_mapping_that_somebody_else_changes() {
+    // Switched off, emptied, status first, two entries, switched on: as CiA 301 has it.
+    let writes = [
+        (2000, "605#23001801850100C0"),
+        (2020, "605#2F001A0000000000"),
+        (2040, "605#23001A0108015061"),
+        (2060, "605#23001A0220013061"),
+        (2080, "605#2F001A0002000000"),
+        (2100, "605#2300180185010040"),
+    ];
+    let run = record(MH4, SYNC, &writes, &nothing);
+    let missing = run.missing();
+    assert!(missing > 0 && missing as u64 == run.outcome.events.not_recorded, "{missing}: {:?}", run.outcome.events);
+    assert!(run.outcome.events.changes == 1 && run.outcome.events.wrong_lengths == 0, "{:?}", run.outcome.events);
+    let said = run.changes().concat().join("; ");
+    assert!(said.contains("TPDO1 carries 0x6150:1, pressure"), "{said}");
+    let last = run.kept.rows.last().expect("rows");
+    assert!(last.contains(",pressure,") && last.contains(",ok,"), "{last}");
+    let time: u64 = last.split(',').next().and_then(|time| time.parse().ok()).expect("a time");
+    assert!(time > 4_500_000, "it goes on to its end");
+    assert_eq!(run.commands, ["000#0105"], "nobody is started who was not away");
+}
+
+#[test]
+fn a_unit_that_somebody_else_changes() {
+    let run = record(DPS, Mode::AsSent, &[(2000, "605#2331610100004E00")], &nothing);
+    assert_eq!(run.units(), ["psi", "bar"]);
+    assert_eq!(run.missing() as u64, run.outcome.events.not_recorded);
+    assert!(run.outcome.events.not_recorded < 10, "read half a second later: {:?}", run.outcome.events);
+}
+
+#[test]
+fn a_mapping_that_was_changed_behind_the_back_shows_in_its_length() {
+    // A frame of the node that is shorter than its mapping: it is read again, once, and nothing has changed.
+    let others = [(2000, "185#01"), (2200, "185#01"), (2400, "185#01")];
+    let run = record(MH4, SYNC, &others, &nothing);
+    assert_eq!(run.changes(), [[""; 0]], "read once");
+    let events = &run.outcome.events;
+    assert_eq!((events.wrong_lengths, run.missing() as u64), (3, events.not_recorded), "{events:?}");
+}
+
+#[test]
+fn a_heartbeat_that_stops_is_told_and_so_is_a_state() {
+    let devices = format!("{MH4}set = {{ \"0x1017\" = 100 }}\n");
+    let run = record(&devices, SYNC, &[(2000, "000#8005"), (2600, "000#0105")], &nothing);
+    assert!(run.has(&Note::State(node(5), NmtState::PreOperational)), "{:?}", run.kept.notes);
+    assert_eq!((run.missing(), run.outcome.events.heartbeat_losses), (0, 0));
+    let text = format!("clock = \"virtual\"\n{devices}");
+    let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
+    let mut bus = Shaky { no_heartbeat: at(2000)..at(3000), ..Shaky::new(inner, &[]) };
+    let mut kept = Kept::default();
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(SYNC), &mut kept).expect("a recording");
+    let lost =
+        kept.notes.iter().filter(|note| matches!(note, Note::HeartbeatLost(_, silence) if silence.as_millis() < 400));
+    assert_eq!((lost.count(), outcome.events.heartbeat_losses), (1, 1), "{:?}", kept.notes);
+    assert!(kept.notes.contains(&Note::HeartbeatBack(node(5))));
+    assert!(kept.notes.contains(&Note::ReadAgain(node(5), Vec::new())), "a boot-up may have been missed");
+}
+
+/// A bus whose interface does what it is told at its time.
+struct Shaky {
+    inner: MemoryBus,
+    /// Events at their times; while the link is down nothing goes through.
+    events: VecDeque<(Mono, Event)>,
+    up: bool,
+    /// When heartbeats are not heard.
+    no_heartbeat: Range<Mono>,
+}
+
+impl Shaky {
+    fn new(inner: MemoryBus, events: &[(u64, Event)]) -> Shaky {
+        let events = events.iter().map(|(time, event)| (at(*time), *event)).collect();
+        Shaky { inner, events, up: true, no_heartbeat: Mono::START..Mono::START }
+    }
+}
+
+impl Bus for Shaky {
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        self.inner.bit_rate()
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        self.inner.timestamps()
+    }
+
+    fn now(&self) -> Stamp {
+        self.inner.now()
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        self.inner.listen(filters)
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        if self.up { self.inner.send(frame) } else { Err(BusError::Down(self.name().to_owned())) }
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        loop {
+            let due = self.events.front().map(|(time, _)| *time);
+            if due.is_some_and(|due| due <= self.inner.now().mono)
+                && let Some((_, event)) = self.events.pop_front()
+            {
+                match event {
+                    Event::Link(up) => self.up = up,
+                    Event::Fault(Fault::BusOff, _) => self.up = false,
+                    Event::Fault(Fault::Restarted, _) => self.up = true,
+                    _ => {}
+                }
+                return Ok(event);
+            }
+            let until = due.map_or(deadline, |due| due.min(deadline));
+            match self.inner.receive(until)? {
+                Event::Timeout if until < deadline => {}
+                Event::Frame(_) if !self.up => {}
+                Event::Frame(Received { frame, at })
+                    if frame.id() == CanId::heartbeat(node(5)) && self.no_heartbeat.contains(&at.mono) => {}
+                event => return Ok(event),
+            }
+        }
+    }
+
+    fn late_drops(&mut self) -> u32 {
+        7
+    }
+}
+
+/// Records with something that happens to the interface, and a restart of the node at 2.2 s that nobody hears.
+fn shaken(events: &[(u64, Event)]) -> (Kept, Outcome) {
+    let text = format!("clock = \"virtual\"\n{DPS}");
+    let mut inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
+    inner.attach(Other::new(&[(2200, "000#8105")]));
+    write(&mut Master::new(&mut inner, Timing::default()), UNIT, &BAR);
+    let mut bus = Shaky::new(inner, events);
+    let mut kept = Kept::default();
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(Mode::AsSent), &mut kept);
+    (kept, outcome.expect("a recording"))
+}
+
+#[test]
+fn an_interface_that_goes_down_and_comes_back() {
+    let (kept, outcome) = shaken(&[(2000, Event::Link(false)), (3000, Event::Link(true))]);
+    assert_eq!((outcome.events.link_losses, outcome.events.changes, outcome.gaps), (1, 1, 1));
+    assert!(outcome.lost.is_empty() && outcome.events.silences == 0, "nobody is blamed for the interface");
+    let rows = |unit: &str| kept.rows.iter().filter(|row| row.contains(unit)).count();
+    assert!(rows(",bar,") > 15 && rows(",psi,") > 15, "restarted unheard, started again, and read by what it is now");
+    let links: Vec<_> = kept.notes.iter().filter(|note| matches!(note, Note::Link(_))).collect();
+    assert_eq!(links, [&Note::Link(false), &Note::Link(true)]);
+    assert_eq!(outcome.dropped, 7, "what was lost last is asked for at the end");
+}
+
+#[test]
+fn a_controller_that_switches_itself_off_and_is_restarted() {
+    let fault = |fault, time| (time, Event::Fault(fault, Stamp { mono: at(time), ..Stamp::default() }));
+    let (kept, outcome) = shaken(&[fault(Fault::BusOff, 2000), fault(Fault::Restarted, 2500)]);
+    assert_eq!((outcome.events.bus_offs, outcome.events.changes), (1, 1));
+    let rows = |unit: &str| kept.rows.iter().filter(|row| row.contains(unit)).count();
+    assert!(rows(",bar,") > 15 && rows(",psi,") > 15, "{:?}", kept.notes);
+}
+
+#[test]
+fn sixteen_nodes_are_polled_side_by_side() {
+    let devices: String = (1..=16).map(|id| format!("[[device]]\nkind = \"mh4\"\nnode = {id}\n")).collect();
+    let text = format!("clock = \"virtual\"\nbit_rate = 1000000\n{devices}");
+    let mut bus = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
+    let mut plan = plan(Mode::Poll(Duration::from_millis(100)));
+    plan.nodes = (1..=16).map(node).collect();
+    let mut kept = Kept::default();
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
+    assert_eq!(outcome.skipped, 0);
+    assert_eq!(outcome.statistics.len(), 32, "pressure and temperature of each");
+    for (source, statistics) in &outcome.statistics {
+        assert!((49..=51).contains(&statistics.count()), "{source:?}: {}", statistics.count());
+        assert!(statistics.jitter().is_some_and(|jitter| jitter.max < Duration::from_millis(10)));
+    }
+}
+
+#[test]
+fn syncs_and_how_well_they_kept_their_time() {
+    let run = record(MH4, SYNC, &[], &nothing);
+    let syncs = &run.outcome.syncs;
+    assert_eq!((syncs.sent, syncs.left_out, syncs.delays.count()), (SECONDS * 100, 0, SECONDS * 100));
+    assert!(syncs.delays.longest() < Some(Duration::from_millis(1)), "{:?}", syncs.delays.longest());
+    assert_eq!(run.outcome.rows, SECONDS * 100);
+    // While the interface is down none is sent, and none is counted as sent.
+    let text = format!("clock = \"virtual\"\n{MH4}");
+    let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
+    let mut bus = Shaky::new(inner, &[(2000, Event::Link(false)), (3000, Event::Link(true))]);
+    let mut kept = Kept::default();
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(SYNC), &mut kept).expect("a recording");
+    assert_eq!(outcome.syncs.sent + outcome.syncs.left_out, SECONDS * 100);
+    assert!((99..=101).contains(&outcome.syncs.left_out), "{:?}", outcome.syncs.left_out);
+}
+
+#[test]
+fn a_gap_is_what_the_user_says() {
+    for (longest, gaps) in [(99, 1), (200, 0)] {
+        let text = format!("clock = \"virtual\"\n{MH4}");
+        let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
+        let mut bus = Shaky::new(inner, &[(2000, Event::Link(false)), (2120, Event::Link(true))]);
+        let plan = Plan { max_gap: Some(Duration::from_millis(longest)), ..plan(SYNC) };
+        let mut kept = Kept::default();
+        let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
+        assert_eq!(outcome.gaps, gaps, "{longest}");
+        assert_eq!(outcome.statistics[0].1.gaps(), gaps);
+    }
+}
