@@ -75,7 +75,9 @@ impl Learner {
         let stays = |(of, object): &(NodeId, ObjectId)| *of != node || !is_setup(*object);
         self.known.retain(|key, _| stays(key));
         self.refused.retain(stays);
-        self.uploads.remove(&node);
+        if self.uploads.get(&node).is_some_and(|(object, _)| is_setup(*object)) {
+            self.uploads.remove(&node);
+        }
         self.downloads.remove(&node);
         decoder.remove(node);
         self.planned = decoder.can_ids().collect();

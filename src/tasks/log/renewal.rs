@@ -27,7 +27,7 @@ pub(super) enum Doubt {
     Away,
     /// Somebody else wrote what its TPDOs depend on.
     Written,
-    /// A TPDO has not the length of its mapping.
+    /// A TPDO has not the length of its mapping, and was not recorded for that. Others are, meanwhile.
     Length,
 }
 

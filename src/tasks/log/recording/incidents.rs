@@ -106,7 +106,11 @@ impl Recording {
     /// No row is made of what this node sends until it has been read again. Who only listens cannot.
     fn doubt(&mut self, node: NodeId, why: Doubt, now: Mono, master: &mut Master<'_>) {
         let is_recorded = self.learner.is_none() && self.instruments.iter().any(|known| known.node == node);
-        if is_recorded && self.renewals.doubt(node, why, now, master) {
+        if !is_recorded || !self.renewals.doubt(node, why, now, master) {
+            return;
+        }
+        // What has the right length although another has not is what it was: the other is garbage.
+        if why != Doubt::Length {
             self.decoder.hold(node);
             if let Some(poll) = &mut self.poll {
                 poll.hold(node);
