@@ -59,11 +59,13 @@ impl Histogram {
 
     /// The distance to `centre` that `share` (0 to 1) of all times keep, either way; off by 0.05 % of the time.
     pub fn distance(&self, centre: Duration, share: f64) -> Option<Duration> {
+        // The middle of a bucket may lie beyond the last time in it.
+        let farthest = self.farthest(centre)?;
         let centre = nanoseconds(centre);
         let mut distances: Vec<(u64, u64)> =
             self.buckets().map(|(time, count)| (time.abs_diff(centre), count)).collect();
         distances.sort_unstable();
-        self.rank(share, distances.into_iter())
+        self.rank(share, distances.into_iter()).map(|distance| distance.min(farthest))
     }
 
     /// The greatest distance to `centre`, exact.
@@ -155,6 +157,17 @@ mod tests {
         let distance = histogram.distance(centre, 0.5).expect("a distance").as_secs_f64();
         assert!((distance - 0.0025).abs() < 0.000_01, "{distance}");
         assert_eq!(histogram.farthest(centre), Some(Duration::from_millis(5)));
+    }
+
+    #[test]
+    fn no_share_of_all_is_farther_than_the_farthest() {
+        for micros in (99_000..101_000).step_by(7) {
+            let mut histogram = Histogram::default();
+            histogram.add(Duration::from_micros(micros));
+            histogram.add(Duration::from_micros(micros + 16));
+            let centre = histogram.quantile(0.5).expect("a median");
+            assert!(histogram.distance(centre, 0.99) <= histogram.farthest(centre), "{micros}");
+        }
     }
 
     #[test]
