@@ -12,6 +12,7 @@ mod controller;
 mod frames;
 mod link;
 mod load;
+mod log;
 mod log_files;
 mod lss;
 mod program;
