@@ -135,6 +135,28 @@ fn the_summary() {
 }
 
 #[test]
+fn gaps_jitter_and_syncs_in_the_summary() {
+    let bench = Bench::of("dps@127,mh4@5");
+    // Every 100 ms, and so 19 intervals that are longer than the 99 ms allowed.
+    let done = bench.run("log 127 --count 20 --max-gap 99ms --summary sum.json").exit(0);
+    assert!(done.stderr.contains(", 19 gaps\n"), "{}", done.stderr);
+    assert!(done.stderr.contains("  every 100 ms, jitter p99 "), "{}", done.stderr);
+    let summary: serde_json::Value = serde_json::from_str(&bench.text("sum.json")).expect("JSON");
+    let signal = &summary["signals"][0];
+    assert_eq!((&summary["gaps"], &signal["gaps"], &summary["sync_delay_s"]), (&json!(19), &json!(19), &json!(null)));
+    let seconds = |key: &str, part: &str| signal[key][part].as_f64().expect(key);
+    assert!((seconds("interval_s", "p50") - 0.1).abs() < 0.000_03 && seconds("jitter_s", "max") < 0.000_5, "{signal}");
+    let done = bench.run("log 127 --count 20 --max-gap 101ms").exit(0);
+    assert!(done.stderr.contains(", 0 gaps\n"), "{}", done.stderr);
+    let done = bench.run("log 5 --sync 10ms --count 50 --summary - -o run.csv").exit(0);
+    let summary = &done.json()[0];
+    assert_eq!((&summary["syncs"], &summary["syncs_left_out"]), (&json!(50), &json!(0)));
+    assert!(summary["sync_delay_s"]["max"].as_f64().is_some_and(|delay| delay < 0.001), "{summary}");
+    assert!(done.stderr.contains("50 SYNC sent, after their time by min "), "{}", done.stderr);
+    bench.run("log 127 --max-gap 3").exit(2);
+}
+
+#[test]
 fn an_overload_is_told_as_it_comes() {
     let bench = Bench::described(
         "[[device]]\nkind = \"mh4\"\nnode = 5\n\

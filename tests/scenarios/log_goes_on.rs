@@ -10,6 +10,7 @@ use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::nmt::NmtState;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::DownloadSize;
+use cangauge::device::catalog;
 use cangauge::master::{Master, Request, Timing};
 use cangauge::sim::Bench;
 use cangauge::tasks::log::{Mode, Note, Outcome, Plan, log};
@@ -258,6 +259,27 @@ fn a_mapping_that_was_changed_behind_the_back_shows_in_its_length() {
     assert_eq!(run.changes(), [[""; 0]], "read once");
     let events = &run.outcome.events;
     assert_eq!((events.wrong_lengths, run.missing()), (3, 0), "{events:?}");
+}
+
+#[test]
+fn who_only_listens_reads_by_no_old_mapping_either() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = format!("clock = \"virtual\"\nrecord = \"truth.csv\"\n{DPS}");
+    let mut bus = Bench::from_toml(&text, folder.path()).expect("a bench").open().expect("a bus");
+    // Started, set to bar, restarted and started again: it is in psi then.
+    let unit = "605#2331610100004E00";
+    bus.attach(Other::new(&[(100, "000#0105"), (1000, unit), (2000, "000#8105"), (2500, "000#0105")]));
+    let dps = catalog::by_name("dps").expect("a description");
+    let plan = Plan { overrides: [(node(5), dps)].into(), ..plan(Mode::Passive) };
+    let mut kept = Kept::default();
+    log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
+    drop(bus);
+    let truth = std::fs::read_to_string(folder.path().join("truth.csv")).expect("the record");
+    assert_eq!(kept.rows, truth.lines().skip(1).collect::<Vec<_>>());
+    let mut units: Vec<&str> = kept.rows.iter().filter_map(|row| row.split(',').nth(4)).collect();
+    units.dedup();
+    assert_eq!(units, ["psi", "bar", "psi"]);
+    assert!(kept.notes.contains(&Note::Restarted(node(5))));
 }
 
 #[test]

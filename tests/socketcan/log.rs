@@ -191,7 +191,7 @@ fn the_link_goes_down_and_up_in_the_middle() {
     let numbers = numbers(&rows(&ended.text), 5);
     assert_eq!((holes(&numbers), numbers.last()), (vec![], Some(&(sender.next - 1))));
     assert_eq!(ended.summary["link_losses"], 2, "{}", ended.stderr);
-    let said = ["the interface went down", "the interface is up again"];
+    let said = ["the interface went down; waiting", "the interface is up again"];
     assert!(said.iter().all(|said| ended.stderr.matches(said).count() == 2), "{}", ended.stderr);
 }
 
@@ -279,7 +279,7 @@ fn killed_at_any_moment() {
         log.child.wait().unwrap();
         let text = read(&log.file);
         let numbers = numbers(&whole_rows(&text), 5);
-        assert_eq!(holes(&numbers), [], "killed after {KILLED}");
+        assert_eq!(holes(&numbers), []);
         // A second by the contract, and half a one for a machine with one CPU and all these programs.
         let due = sent.iter().rev().find(|(at, _)| killed.duration_since(*at) > Duration::from_millis(1500));
         let last = *numbers.last().expect("rows");
@@ -370,8 +370,7 @@ fn a_full_bus_for_twenty_seconds() {
         assert_eq!((numbers[0], holes(&numbers), numbers.last()), (first, vec![], Some(&(sender.next - 1))));
     }
     assert_eq!(ended.summary["dropped"], 0);
-    println!("{} rows, sent in {length:?}, at most {memory} kB", rows.len());
-    assert!(memory < 20 << 10, "{memory} kB");
+    assert!(memory < 20 << 10, "{memory} kB for {} rows, sent in {length:?}", rows.len());
 }
 
 /// The most memory that a process had at once.

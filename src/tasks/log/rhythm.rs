@@ -60,23 +60,28 @@ impl Rhythm {
 mod tests {
     use super::*;
 
-    fn beats(at: &[u64], max_gap: Option<Duration>) -> Vec<Option<u64>> {
+    fn ms(milliseconds: u64) -> Option<Duration> {
+        Some(Duration::from_millis(milliseconds))
+    }
+
+    fn beats(at: &[u64], max_gap: Option<Duration>) -> Vec<Option<Duration>> {
         let mut rhythm = Rhythm::default();
-        let at = at.iter().map(|&millis| Mono::at(Duration::from_millis(millis)));
-        at.map(|now| rhythm.beat(now, max_gap).map(|gap| gap.as_millis() as u64)).collect()
+        let at = at.iter().map(|&milliseconds| Mono::at(Duration::from_millis(milliseconds)));
+        at.map(|now| rhythm.beat(now, max_gap)).collect()
     }
 
     #[test]
     fn a_gap_is_longer_than_three_usual_intervals() {
-        assert_eq!(beats(&[0, 10, 20, 50, 60, 91], None), [None, None, None, None, None, Some(31)]);
-        assert_eq!(beats(&[0, 10, 20, 30], Some(Duration::from_millis(9))), [None, Some(10), Some(10), Some(10)]);
+        assert_eq!(beats(&[0, 10, 20, 50], None), [None; 4]);
+        assert_eq!(beats(&[0, 10, 20, 51], None), [None, None, None, ms(31)]);
+        assert_eq!(beats(&[0, 10, 20, 30], Some(Duration::from_millis(9))), [None, ms(10), ms(10), ms(10)]);
         assert_eq!(beats(&[0, 10, 1000], Some(Duration::from_secs(1))), [None; 3]);
     }
 
     #[test]
     fn the_second_gap_is_one_as_well() {
         let gaps = beats(&[0, 10, 20, 5020, 5030, 5040, 5090], None);
-        assert_eq!(gaps, [None, None, None, Some(5000), None, None, Some(50)]);
+        assert_eq!(gaps, [None, None, None, ms(5000), None, None, ms(50)]);
     }
 
     #[test]
