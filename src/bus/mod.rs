@@ -1,6 +1,7 @@
 //! Buses: what a CAN bus can do for the layers above, and everything that touches the outside world
 //! for it. The only place with sockets, clocks, signals and `unsafe`.
 
+pub mod claim;
 pub mod faults;
 pub mod interrupt;
 pub mod memory;

@@ -1,6 +1,7 @@
 //! What people type: nodes, signals, objects, durations. Everything is checked here, before a bus is
 //! opened.
 
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::measure::decode::Wanted;
@@ -55,6 +56,16 @@ pub enum Nodes {
     All,
     /// These, in ascending order.
     These(Vec<NodeId>),
+}
+
+impl Nodes {
+    /// These nodes for oneself.
+    pub(super) fn claim(&self) -> Claim {
+        match self {
+            Nodes::All => Claim::every_node(),
+            Nodes::These(nodes) => Claim::Nodes(nodes.clone()),
+        }
+    }
 }
 
 impl FromStr for Nodes {

@@ -4,6 +4,7 @@ use super::args::Nodes;
 use super::each::each;
 use super::exit::stdout;
 use super::{Format, Global};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
 use crate::measure::sample::Number;
@@ -66,6 +67,11 @@ fn parse_limit(text: &str) -> Result<Limit, String> {
 }
 
 impl Autozero {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        self.nodes.claim()
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let options = Options {
             channel: self.channel,

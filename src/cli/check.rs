@@ -6,6 +6,7 @@ use super::file::OutFile;
 use super::log::{refuse_to_send, sync_period, tell};
 use super::{Format, Global, open};
 use crate::bus::Stamp;
+use crate::bus::claim::{Claim, Claims};
 use crate::canopen::id::NodeId;
 use crate::measure::expression::Expression;
 use crate::measure::expression::judge::Jury;
@@ -68,6 +69,11 @@ pub(crate) struct Check {
 }
 
 impl Check {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        self.nodes.claim()
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         refuse_to_send(global, self.sync.or(self.poll))?;
         self.refuse_at_once(global)?;
@@ -112,7 +118,7 @@ impl Check {
         let duration = self.duration.map(|duration| duration.0);
         let limits = Limits::new(duration.is_some() && global.shows_progress(), duration.unwrap_or_default());
         let console = Console { progress: Some(limits.multi()), ..global.console() };
-        global.with_master(|master| {
+        global.with_claims(|master, claims| {
             // A recording (`replay:`) can only be listened to, and is judged from its beginning to its end.
             let live = master.bus().is_live();
             let nodes = match &self.nodes {
@@ -127,7 +133,9 @@ impl Check {
                 expressions: self.expressions.clone(),
                 measuring: (duration.is_some() || !live).then_some((mode, duration)),
             };
-            let mut screen = Screen { limits, console, begun: None };
+            // Whoever only listens from then on leaves the nodes to others.
+            let claims = self.poll.is_none().then(|| std::mem::take(claims));
+            let mut screen = Screen { limits, console, begun: None, claims };
             let report = check(master, &plan, &mut screen);
             let interrupted = report.as_ref().is_err_and(|failure| failure.kind == Kind::Interrupted);
             screen.limits.finish(interrupted);
@@ -188,10 +196,13 @@ struct Screen {
     limits: Limits,
     console: Console,
     begun: Option<Stamp>,
+    /// What is kept from others until it has begun.
+    claims: Option<Claims>,
 }
 
 impl Observer for Screen {
     fn samples(&mut self, _samples: &[Sample], _sources: &[Source]) -> ControlFlow<()> {
+        self.claims = None;
         ControlFlow::Continue(())
     }
 
@@ -207,6 +218,7 @@ impl Observer for Screen {
     }
 
     fn tick(&mut self, _at: Stamp, _rows: u64) -> ControlFlow<()> {
+        self.claims = None;
         ControlFlow::Continue(())
     }
 }

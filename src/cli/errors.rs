@@ -2,6 +2,7 @@
 
 use super::exit::stdout;
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::{csv, info, settings as json, table};
 use crate::tasks::settings::Device;
@@ -23,6 +24,11 @@ pub(crate) struct Errors {
 }
 
 impl Errors {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        Claim::Nodes(vec![self.node])
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let overrides = open::overrides(global, &[self.node])?;
         let (report, cleared) = global.with_master(|master| {

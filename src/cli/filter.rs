@@ -3,6 +3,7 @@
 use super::args::Duration;
 use super::exit::stdout;
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::{csv, settings as json, table};
 use crate::tasks::settings::Device;
@@ -43,6 +44,11 @@ enum Type {
 }
 
 impl Filter {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        Claim::Nodes(vec![self.node])
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let wanted = Wanted {
             kind: self.kind.map(|kind| match kind {

@@ -2,6 +2,7 @@
 
 use super::exit::stdout;
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::{csv, info, info_json};
 use crate::tasks::settings::Device;
@@ -21,6 +22,11 @@ pub(crate) struct Info {
 }
 
 impl Info {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        Claim::Nodes(vec![self.node])
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let overrides = open::overrides(global, &[self.node])?;
         let page = global.with_master(|master| {

@@ -2,6 +2,7 @@
 
 use super::exit::stdout;
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::{csv, settings as json, table};
 use crate::tasks::settings::Device;
@@ -42,6 +43,11 @@ fn finite(text: &str) -> Result<f64, String> {
 }
 
 impl Limits {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        Claim::Nodes(vec![self.node])
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let given = [self.delta, self.lower, self.upper, self.hysteresis];
         let wanted: Vec<(Limit, f64)> =

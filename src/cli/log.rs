@@ -7,6 +7,7 @@ use super::args::{BusSpec, Duration, Nodes, SignalArg};
 use super::exit::{Several, stdout};
 use super::file::OutFile;
 use super::{Format, Global, When, check, open};
+use crate::bus::claim::Claim;
 use crate::bus::interrupt::Interrupts;
 use crate::canopen::id::NodeId;
 use crate::measure::decode::Wanted;
@@ -102,6 +103,11 @@ pub(super) fn refuse_to_send(global: &Global, interval: Option<Duration>) -> Res
 }
 
 impl Log {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        if self.passive { Claim::Nothing } else { self.nodes.claim() }
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         refuse_to_send(global, self.sync.or(self.poll))?;
         self.refuse_at_once()?;
@@ -134,7 +140,7 @@ impl Log {
         let duration = self.duration.map(|duration| duration.0);
         let progress = Progress::new(show, duration, self.count);
         let console = Console { progress: Some(progress.multi()), ..global.console() };
-        let (outcome, verdicts, screen) = global.with_master(|master| {
+        let (outcome, verdicts, screen) = global.with_claims(|master, claims| {
             let nodes = match (&self.nodes, self.passive || !master.bus().is_live()) {
                 (Nodes::All, true) => NodeId::all().collect(),
                 _ => open::nodes(master, global, &self.nodes)?,
@@ -154,6 +160,8 @@ impl Log {
             let waits = master.bus().waits();
             let (rows, events) = (opened.rows(waits)?, opened.events(waits)?);
             let mut screen = Screen::new(rows, events, progress, console);
+            // Whoever only listens from then on leaves the nodes to others.
+            screen.claims = self.poll.is_none().then(|| std::mem::take(claims));
             let mut expecting = Expecting::new(&self.expect, &plan.nodes, true, &mut screen);
             let outcome = log(master, &plan, &mut expecting);
             let verdicts = match &outcome {

@@ -27,6 +27,7 @@ mod sim;
 mod store;
 mod unit;
 
+use crate::bus::claim::{Claim, Claims};
 use crate::master::{Master, Timing};
 use crate::output::console::Console;
 use anstream::ColorChoice;
@@ -116,6 +117,10 @@ pub struct Global {
     /// Colour on stderr; auto: on a terminal, and without NO_COLOR
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
     pub(crate) color: When,
+
+    /// What the command keeps other cangauges from.
+    #[arg(skip)]
+    pub(crate) claim: Claim,
 }
 
 // No doc comments on the variants: clap would spread each over lines of its own in every help text.
@@ -216,9 +221,19 @@ impl Global {
 
     /// Runs `work` with a master on the bus.
     pub(crate) fn with_master<T>(&self, work: impl FnOnce(&mut Master<'_>) -> anyhow::Result<T>) -> anyhow::Result<T> {
-        let mut bus = open::open(self)?;
+        self.with_claims(|master, _| work(master))
+    }
+
+    /// The same for work that need not keep others away to its end: what it takes of the claims is its own.
+    pub(crate) fn with_claims<T>(
+        &self,
+        work: impl FnOnce(&mut Master<'_>, &mut Claims) -> anyhow::Result<T>,
+    ) -> anyhow::Result<T> {
+        let spec = open::spec(self)?;
+        let mut claims = open::claim(self, &spec)?;
+        let mut bus = open::open_as(self, &spec, false)?;
         let mut master = Master::new(&mut *bus, self.timing(Timing::default().timeout));
-        let result = work(&mut master);
+        let result = work(&mut master, &mut claims);
         // What a command leaves behind at its end still goes out: an abort, a node's state.
         master.settle();
         let finished = bus.finish().or_fail();
@@ -233,26 +248,53 @@ impl Global {
 /// # Errors
 /// Why it was not done; [`exit::report`] turns it into words and an exit code.
 pub fn run(cli: &Cli) -> anyhow::Result<()> {
+    let global = Global { claim: cli.command.claim(), ..cli.global.clone() };
     match &cli.command {
-        Command::Scan(command) => command.run(&cli.global),
-        Command::Read(command) => command.run(&cli.global),
-        Command::Nmt(command) => command.run(&cli.global),
-        Command::Sdo(command) => command.run(&cli.global),
-        Command::Log(command) => command.run(&cli.global),
-        Command::Check(command) => command.run(&cli.global),
-        Command::Lss(command) => command.run(&cli.global),
-        Command::Info(command) => command.run(&cli.global),
-        Command::Unit(command) => command.run(&cli.global),
-        Command::Filter(command) => command.run(&cli.global),
-        Command::Limits(command) => command.run(&cli.global),
-        Command::Minmax(command) => command.run(&cli.global),
-        Command::Errors(command) => command.run(&cli.global),
-        Command::Bus(command) => command.run(&cli.global),
-        Command::Pdo(command) => command.run(&cli.global),
-        Command::Autozero(command) => command.run(&cli.global),
-        Command::Store(command) => command.run(&cli.global),
-        Command::Restore(command) => command.run(&cli.global),
-        Command::Sim(command) => command.run(&cli.global),
+        Command::Scan(command) => command.run(&global),
+        Command::Read(command) => command.run(&global),
+        Command::Nmt(command) => command.run(&global),
+        Command::Sdo(command) => command.run(&global),
+        Command::Log(command) => command.run(&global),
+        Command::Check(command) => command.run(&global),
+        Command::Lss(command) => command.run(&global),
+        Command::Info(command) => command.run(&global),
+        Command::Unit(command) => command.run(&global),
+        Command::Filter(command) => command.run(&global),
+        Command::Limits(command) => command.run(&global),
+        Command::Minmax(command) => command.run(&global),
+        Command::Errors(command) => command.run(&global),
+        Command::Bus(command) => command.run(&global),
+        Command::Pdo(command) => command.run(&global),
+        Command::Autozero(command) => command.run(&global),
+        Command::Store(command) => command.run(&global),
+        Command::Restore(command) => command.run(&global),
+        Command::Sim(command) => command.run(&global),
         Command::Completions(command) => command.run(),
+    }
+}
+
+impl Command {
+    /// What it does not share with another cangauge while it runs.
+    fn claim(&self) -> Claim {
+        match self {
+            Command::Scan(command) => command.claim(),
+            Command::Read(command) => command.claim(),
+            Command::Nmt(command) => command.claim(),
+            Command::Sdo(command) => command.claim(),
+            Command::Log(command) => command.claim(),
+            Command::Check(command) => command.claim(),
+            Command::Lss(_) => Claim::Bus,
+            Command::Info(command) => command.claim(),
+            Command::Unit(command) => command.claim(),
+            Command::Filter(command) => command.claim(),
+            Command::Limits(command) => command.claim(),
+            Command::Minmax(command) => command.claim(),
+            Command::Errors(command) => command.claim(),
+            Command::Pdo(command) => command.claim(),
+            Command::Autozero(command) => command.claim(),
+            Command::Store(command) => command.claim(),
+            Command::Restore(command) => command.claim(),
+            Command::Bus(_) | Command::Sim(_) | Command::Completions(_) => Claim::Nothing,
+        }
     }
 }

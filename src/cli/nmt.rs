@@ -3,6 +3,7 @@
 use super::args::{Duration, Nodes};
 use super::exit::{IntoFailure, Several, stdout};
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::bus::time::spoken;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtCommand;
@@ -95,6 +96,21 @@ enum StartupMode {
 }
 
 impl Nmt {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        match &self.action {
+            Action::Start(targets)
+            | Action::Stop(targets)
+            | Action::Preop(targets)
+            | Action::Reset(targets)
+            | Action::ResetComm(targets) => targets.nodes.claim(),
+            Action::State(args) => args.nodes.claim(),
+            // It asks each node once and then listens, for hours.
+            Action::Watch(_) => Claim::Nothing,
+            Action::Startup(args) => Claim::Nodes(vec![args.node]),
+        }
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let (kind, targets) = match &self.action {
             Action::Start(targets) => (NmtCommand::Start, targets),

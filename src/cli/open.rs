@@ -5,6 +5,7 @@ use super::args::{BusSpec, Nodes};
 use super::exit::{FileError, IntoFailure};
 use super::read::everybody;
 use crate::bus::Bus;
+use crate::bus::claim::{ClaimError, Claims};
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
 use crate::bus::replay::Replay;
@@ -20,14 +21,32 @@ use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
+
+/// How long another cangauge is waited for that is busy with the same nodes.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// The bus that the options name, or the only one there is.
+pub(super) fn spec(global: &Global) -> Result<BusSpec, Failure> {
+    global.bus.clone().map_or_else(only_interface, Ok)
+}
 
 /// Opens the bus that the options name, or the only one there is.
 pub(super) fn open(global: &Global) -> anyhow::Result<Box<dyn Bus>> {
-    let spec = match &global.bus {
-        Some(spec) => spec.clone(),
-        None => only_interface()?,
-    };
-    open_as(global, &spec, false)
+    open_as(global, &spec(global)?, false)
+}
+
+/// Claims what the command needs for itself. A simulated bus and a recording are its own anyhow.
+pub(super) fn claim(global: &Global, spec: &BusSpec) -> Result<Claims, Failure> {
+    let BusSpec::SocketCan(bus) = spec else { return Ok(Claims::default()) };
+    let mut waiting = |what: &ClaimError| global.console().note(&format!("{what}; waiting for it to end"));
+    Claims::take(bus, &global.claim, PATIENCE, &mut waiting).map_err(|error| match error {
+        ClaimError::InUse(node, _) => {
+            let hint = "wait until it has ended, or end it; nodes that nobody uses can be named meanwhile";
+            Failure { node, ..Failure::new(Kind::Bus, error.to_string()) }.hint(hint)
+        }
+        ClaimError::Interrupted => Failure::new(Kind::Interrupted, error.to_string()),
+    })
 }
 
 /// Opens this bus, whatever the options name; an interface that is down too, where that is wanted.

@@ -3,6 +3,7 @@
 use super::args::{Duration, Nodes, ObjectArg};
 use super::exit::stdout;
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::TpdoNumber;
@@ -161,6 +162,15 @@ fn identifier(text: &str) -> Result<u16, String> {
 }
 
 impl Pdo {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        match &self.action {
+            Action::Show(args) => Claim::Nodes(vec![args.node]),
+            Action::Map(args) => Claim::Nodes(vec![args.node]),
+            Action::Watch(args) => args.nodes.claim(),
+        }
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         match &self.action {
             Action::Show(args) => args.run(global),
@@ -239,10 +249,13 @@ impl WatchArgs {
         if global.format == Format::Csv {
             output::watched_head(&mut out).map_err(stdout)?;
         }
-        global.with_master(|master| {
+        global.with_claims(|master, claims| {
             let nodes = open::nodes(master, global, &self.nodes)?;
             let overrides = open::overrides(global, &nodes)?;
+            let mut claims = Some(std::mem::take(claims));
             let mut tell = |seen: &Line<'_>| {
+                // The nodes have been asked for their mapping; from here on it only listens.
+                claims.take();
                 match seen {
                     Line::Restarted(node) => {
                         console.warn(&format!("node {node} restarted: its mapping is taken for the same"));

@@ -3,6 +3,7 @@
 use super::args::{Nodes, SignalArg};
 use super::exit::{IntoFailure, Several, stdout};
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
 use crate::master::Master;
@@ -49,6 +50,11 @@ struct Shown {
 }
 
 impl Read {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        self.nodes.claim()
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let wanted: Vec<Wanted> = self.signals.iter().map(|signal| signal.0.clone()).collect();
         let (asked, results) = global.with_master(|master| {

@@ -3,6 +3,7 @@
 use super::args::Nodes;
 use super::exit::{IntoFailure, Several, stdout};
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::{csv, json, table, text};
 use crate::tasks::scan::{Found, listen, scan};
@@ -33,6 +34,11 @@ pub(crate) struct Scan {
 }
 
 impl Scan {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        if self.passive { Claim::Nothing } else { self.nodes.claim() }
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let nodes: Vec<NodeId> = match &self.nodes {
             Nodes::All => NodeId::all().collect(),

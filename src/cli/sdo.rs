@@ -4,6 +4,7 @@ use super::args::ObjectArg;
 use super::exit::{FileError, IntoFailure, stdout};
 use super::file::OutFile;
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value, parse_hex};
@@ -129,6 +130,13 @@ impl From<SdoSize> for SizeMode {
 }
 
 impl Sdo {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        match &self.action {
+            Action::Read(ReadArgs { node, .. }) | Action::Write(WriteArgs { node, .. }) => Claim::Nodes(vec![*node]),
+        }
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         match &self.action {
             Action::Read(args) => args.run(global),

@@ -4,6 +4,7 @@ use super::args::Nodes;
 use super::each::{Each, each};
 use super::exit::stdout;
 use super::{Format, Global};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::{csv, json, table};
 use crate::tasks::store::{Done, Group};
@@ -70,6 +71,11 @@ impl From<GroupArg> for Group {
 }
 
 impl Store {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        self.nodes.claim()
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let each = each(global, &self.nodes, |master, node, overrides| {
             let device = store::device(master, node, overrides)?;
@@ -80,6 +86,11 @@ impl Store {
 }
 
 impl Restore {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        self.nodes.claim()
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let each = each(global, &self.nodes, |master, node, overrides| {
             let device = store::device(master, node, overrides)?;

@@ -3,6 +3,7 @@
 use super::exit::stdout;
 use super::read::parse_unit;
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit as Code;
 use crate::output::console::Console;
@@ -31,6 +32,11 @@ pub(crate) struct Unit {
 }
 
 impl Unit {
+    /// What it does not share with another cangauge.
+    pub(super) fn claim(&self) -> Claim {
+        Claim::Nodes(vec![self.node])
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let (signal, unit) = self.words().map_err(|message| Failure::new(Kind::Usage, message))?;
         let overrides = open::overrides(global, &[self.node])?;

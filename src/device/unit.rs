@@ -120,8 +120,12 @@ impl Unit {
     }
 
     /// The ASCII symbol: `bar`, `degC`, `mbar`, `deg/s`; empty for no dimension; `None` where the code is
-    /// not known.
+    /// not known, or would look like another one (a hundredth of a day is no candela).
     pub fn symbol(self) -> Option<String> {
+        self.composed().filter(|symbol| symbol.is_empty() || Unit::from_symbol(symbol) == Some(self))
+    }
+
+    fn composed(self) -> Option<String> {
         let (prefix, numerator, denominator, reserved) = self.parts();
         if self == Unit::NONE {
             return Some(String::new());
@@ -135,16 +139,20 @@ impl Unit {
         }
     }
 
-    /// The unit of a symbol as people type it: `bar`, `mbar`, `kPa`, `°C` or `degC`, or a raw code `0x…`.
+    /// The unit of a symbol as people type it: `bar`, `mbar`, `kPa`, `°C` or `degC`, `deg/s`, or a raw code `0x…`.
     pub fn from_symbol(text: &str) -> Option<Unit> {
         if text.starts_with("0x") || text.starts_with("0X") {
             return crate::canopen::id::parse_u32(text).map(Unit);
         }
         let text = text.replace('\u{b0}', "deg").replace(['\u{b5}', '\u{3bc}'], "u");
+        let (numerator, denominator) = match text.split_once('/') {
+            Some((numerator, symbol)) => (numerator, BASES.iter().find(|base| base.symbol == symbol)?.code),
+            None => (text.as_str(), 0),
+        };
         for base in BASES {
             for (power, prefix) in PREFIXES {
-                if text.strip_suffix(base.symbol) == Some(*prefix) {
-                    return Some(Unit(u32::from_le_bytes([0, 0, base.code, power.to_le_bytes()[0]])));
+                if numerator.strip_suffix(base.symbol) == Some(*prefix) {
+                    return Some(Unit(u32::from_le_bytes([0, denominator, base.code, power.to_le_bytes()[0]])));
                 }
             }
         }
@@ -240,6 +248,23 @@ mod tests {
             assert_eq!(unit.to_string(), base.symbol);
             assert_eq!(Unit::from_symbol(base.symbol), Some(unit), "{}", base.symbol);
         }
+    }
+
+    #[test]
+    fn no_code_looks_like_another_one() {
+        // Found by fuzzing: centi-days looked like candelas, and m/rad could not be typed.
+        let mut shown = std::collections::BTreeMap::new();
+        for base in BASES {
+            for (power, _) in PREFIXES {
+                for below in [0, 0x03, 0x10, 0x47] {
+                    let unit = Unit(u32::from_le_bytes([0, below, base.code, power.to_le_bytes()[0]]));
+                    assert_eq!(shown.insert(unit.to_string(), unit), None, "{unit}");
+                    assert_eq!(Unit::from_symbol(&unit.to_string()), Some(unit));
+                }
+            }
+        }
+        assert_eq!(Unit(0xfe49_0000).to_string(), "0xFE490000");
+        assert_eq!((Unit::from_symbol("m/"), Unit::from_symbol("/s")), (None, None));
     }
 
     #[test]

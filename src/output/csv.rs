@@ -1,5 +1,8 @@
 //! Tables as CSV: what `--format csv` gives of every command but `log`, whose rows stand in [`super::rows`].
+//!
+//! A terminal may be on the other end of stdout: text from devices is made safe here, whatever the cell.
 
+use super::text::safe;
 use std::io::{self, Write};
 
 /// Writes a header, if there is one, and rows. A cell that is not known is empty.
@@ -8,7 +11,7 @@ pub fn write(out: &mut dyn Write, head: &[&str], rows: impl IntoIterator<Item = 
     if !head.is_empty() {
         csv.write_record(head)?;
     }
-    rows.into_iter().try_for_each(|row| csv.write_record(row))?;
+    rows.into_iter().try_for_each(|row| csv.write_record(row.iter().map(|cell| safe(cell))))?;
     csv.flush()
 }
 

@@ -1,5 +1,6 @@
 //! JSON Lines: one object a line.
 
+use super::text::steers;
 use crate::canopen::id::NodeId;
 use crate::measure::sample::{Number, Sample, Source, Status};
 use crate::tasks::autozero::Zeroed;
@@ -10,11 +11,31 @@ use crate::tasks::store::Done;
 use crate::tasks::{Failure, Kind};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer as _};
+use serde_json::ser::Formatter;
 use std::io::{self, Write};
 
 pub(super) fn line<T: Serialize>(out: &mut dyn Write, object: &T) -> io::Result<()> {
-    serde_json::to_writer(&mut *out, object)?;
+    object.serialize(&mut serde_json::Serializer::with_formatter(&mut *out, Safe))?;
     out.write_all(b"\n")
+}
+
+/// Escapes more than JSON asks for: what steers a terminal is not only below 20h (9Bh begins a sequence, too), and
+/// JSON Lines are looked at in terminals.
+struct Safe;
+
+impl Formatter for Safe {
+    fn write_string_fragment<W: ?Sized + Write>(&mut self, out: &mut W, fragment: &str) -> io::Result<()> {
+        for part in fragment.split_inclusive(steers) {
+            match part.char_indices().next_back() {
+                Some((at, last)) if steers(last) => {
+                    out.write_all(&part.as_bytes()[..at])?;
+                    write!(out, "\\u{:04x}", u32::from(last))?;
+                }
+                _ => out.write_all(part.as_bytes())?,
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The name of a kind of failure in the contract.
@@ -310,5 +331,20 @@ pub fn value(value: &crate::canopen::value::Value) -> serde_json::Value {
         Value::Real64(number) if number.is_finite() => (*number).into(),
         Value::Real32(_) | Value::Real64(_) => serde_json::Value::Null,
         other => other.to_string().into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_steers_a_terminal_is_escaped_and_reads_back() {
+        let text = "MH\x1b[2J\u{9b}31m\u{7f}\u{202e}\n\"D\u{fc}se\" \u{1f600}";
+        let mut out = Vec::new();
+        line(&mut out, &[text]).expect("memory");
+        let out = String::from_utf8(out).expect("text");
+        assert_eq!(out, "[\"MH\\u001b[2J\\u009b31m\\u007f\\u202e\\n\\\"D\u{fc}se\\\" \u{1f600}\"]\n");
+        assert_eq!(serde_json::from_str::<[String; 1]>(&out).expect("JSON"), [text]);
     }
 }

@@ -222,6 +222,5 @@ pub fn json(out: &mut dyn Write, outcome: &Outcome, written: Written) -> io::Res
         remarks: &outcome.remarks,
         signals: signals.collect(),
     };
-    serde_json::to_writer(&mut *out, &summary)?;
-    out.write_all(b"\n")
+    super::json::line(out, &summary)
 }

@@ -1,5 +1,6 @@
-//! Aligned columns.
+//! Aligned columns. Text from devices is made safe for a terminal here, whatever the cell.
 
+use super::text::safe;
 use std::io::{self, Write};
 
 /// How a column stands.
@@ -13,9 +14,10 @@ pub enum Align {
 
 /// Writes rows in aligned columns, two blanks apart, without blanks at the ends of lines.
 pub fn write(out: &mut dyn Write, align: &[Align], rows: &[Vec<String>]) -> io::Result<()> {
+    let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(|cell| safe(cell)).collect()).collect();
     let width = |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
     let widths: Vec<usize> = (0..align.len()).map(|column| width(column).unwrap_or(0)).collect();
-    for row in rows {
+    for row in &rows {
         let mut line = String::new();
         for ((cell, &width), align) in row.iter().zip(&widths).zip(align) {
             if !line.is_empty() {

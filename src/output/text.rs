@@ -8,8 +8,7 @@ use std::fmt::Write;
 pub fn safe(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for character in text.chars() {
-        let hidden = matches!(character, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
-        if character.is_control() || hidden {
+        if steers(character) {
             // Writing to a String cannot fail.
             let _ = if character.is_ascii() || u32::from(character) < 0x100 {
                 write!(safe, "\\x{:02X}", u32::from(character))
@@ -21,6 +20,13 @@ pub fn safe(text: &str) -> String {
         }
     }
     safe
+}
+
+/// Whether a terminal does something else with this character than show it.
+pub(super) fn steers(character: char) -> bool {
+    let hidden =
+        matches!(character, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
+    character.is_control() || hidden
 }
 
 /// A moment as RFC 3339 in UTC with microseconds.

@@ -175,8 +175,7 @@ pub fn json(out: &mut dyn Write, verdicts: &[Verdict]) -> io::Result<()> {
             first,
             reason: verdict.reason.as_deref(),
         };
-        serde_json::to_writer(&mut *out, &object)?;
-        out.write_all(b"\n")?;
+        super::json::line(out, &object)?;
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Everything that a recording shows and writes while it runs.
 
 use super::tell;
+use crate::bus::claim::Claims;
 use crate::bus::{Mono, Stamp};
 use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
@@ -31,6 +32,8 @@ pub(super) struct Screen {
     pub(super) error: Option<Unwritten>,
     /// The file that is to be continued has other columns than will come.
     pub(super) other_head: Option<OtherHead>,
+    /// What is kept from others until the recording has begun.
+    pub(super) claims: Option<Claims>,
     begun: Option<Mono>,
     looked: Option<Mono>,
     lost: u64,
@@ -46,6 +49,7 @@ impl Screen {
             progress,
             console,
             error: None,
+            claims: None,
             other_head: None,
             begun: None,
             looked: None,
@@ -135,6 +139,7 @@ impl Observer for Screen {
     }
 
     fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
+        self.claims = None;
         self.take(None, samples, sources)
     }
 
@@ -143,6 +148,7 @@ impl Observer for Screen {
     }
 
     fn tick(&mut self, at: Stamp, _rows: u64) -> ControlFlow<()> {
+        self.claims = None;
         let begun = *self.begun.get_or_insert(at.mono);
         self.progress.tick(at.mono.since(begun), self.rows.count());
         let result = self.rows.pass(at);

@@ -1,0 +1,100 @@
+//! Whole tasks against a device that answers every SDO request with anything: they end, touch nobody else, write
+//! nothing, and what is printed of it steers no terminal.
+#![no_main]
+
+use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
+use cangauge::bus::time::Mono;
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::CanId;
+use cangauge::master::{Master, Timing};
+use cangauge::measure::survey::Overrides;
+use cangauge::output::{info, info_json, json};
+use cangauge::tasks::scan::scan;
+use cangauge::tasks::settings::Device;
+use cangauge::tasks::settings::info::read;
+use cangauge_fuzz::{Bytes, node};
+use libfuzzer_sys::fuzz_target;
+use std::time::Duration;
+
+struct Answerer {
+    script: Vec<u8>,
+    at: usize,
+}
+
+impl Station for Answerer {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+        // Another participant does not exist: everything sent here is the program's.
+        assert_eq!(frame.id(), CanId::sdo_request(node()), "{frame} is not for this node");
+        let request = frame.all_eight().expect("eight bytes");
+        assert!(matches!(request[0] >> 5, 2 | 3 | 4 | 5), "{frame} is no part of a read");
+        let mut bytes = Bytes(self.script.get(self.at..).unwrap_or_default());
+        let before = bytes.0.len();
+        let head = bytes.byte();
+        let response = CanId::sdo_response(node());
+        let mut data = [0; 8];
+        if request[0] >> 5 == 2 {
+            data[1..4].copy_from_slice(&request[1..4]);
+            data[0] = [0x43, 0x4b, 0x4f, 0x42, 0x41, 0x40, 0x80, 0xc6][usize::from(head & 7)];
+            data[4..].copy_from_slice(&bytes.long().to_le_bytes());
+        } else {
+            data[0] = (request[0] & 0x10) | head & 0xf;
+            let taken = bytes.take(7);
+            data[1..=taken.len()].copy_from_slice(taken);
+        }
+        match head >> 4 {
+            0 => {}
+            1 => out.send(bytes.frame(response)),
+            2 => {
+                out.send(Frame::full(response, data));
+                out.send(bytes.frame(response));
+            }
+            _ => out.send(Frame::full(response, data)),
+        }
+        self.at += before - bytes.0.len();
+        // Behind the end it begins anew, so that no length of the script is special; an empty one is silence.
+        if self.at >= self.script.len() {
+            self.at = 0;
+        }
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+/// Lines of a table, an object or a page: no other control character, and nothing that turns the direction.
+fn assert_harmless(text: &[u8]) {
+    let text = std::str::from_utf8(text).expect("text");
+    let steers = |c: char| c.is_control() && c != '\n' || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    assert!(!text.contains(steers), "{text:?}");
+}
+
+fuzz_target!(|data: &[u8]| {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(Answerer { script: data.to_vec(), at: 0 });
+    let timing = Timing { timeout: Duration::from_millis(20), retries: 0 };
+    let mut master = Master::new(&mut bus, timing);
+    let mut text = Vec::new();
+    let overrides = Overrides::new();
+    if let Ok(found) = scan(&mut master, &[node()], timing.timeout, 1, &overrides) {
+        assert!(found.len() <= 1);
+        found.iter().for_each(|found| json::found(&mut text, found).expect("memory"));
+    }
+    match Device::open(&mut master, node(), &overrides).and_then(|device| read(&mut master, &device)) {
+        Ok(page) => {
+            info::text(&mut text, &page).expect("memory");
+            info_json::object(&mut text, &page).expect("memory");
+        }
+        Err(failure) => {
+            assert_eq!(failure.node, Some(node()), "{}", failure.message);
+            json::failure(&mut text, &failure, 1).expect("memory");
+        }
+    }
+    assert_harmless(&text);
+});

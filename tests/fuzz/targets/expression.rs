@@ -1,0 +1,25 @@
+//! Expressions of `check`: what is printed reads back as the same.
+#![no_main]
+
+use cangauge::measure::expression::Expression;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    match Expression::parse(text) {
+        Ok(expression) => {
+            let printed = expression.to_string();
+            match Expression::parse(&printed) {
+                Ok(again) => assert_eq!(again.to_string(), printed, "{text:?}"),
+                // The parentheses and blanks that make it clear can make it too long.
+                Err(error) => assert!(printed.chars().count() > 1000, "{text:?}: {printed:?}: {error}"),
+            }
+            let _ = (expression.wanted(), expression.needs_many());
+        }
+        Err(error) => {
+            assert!(error.at <= error.text.len() && !error.message.is_empty());
+            assert!(error.text.is_char_boundary(error.at), "{text:?}");
+            let _ = error.column();
+        }
+    }
+});

@@ -1,0 +1,62 @@
+//! The decoding of TPDOs by any mapping: never more samples than are mapped, and only bits that were sent.
+#![no_main]
+
+use cangauge::bus::time::{Mono, Stamp, Wall};
+use cangauge::bus::Received;
+use cangauge::canopen::id::CanId;
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::pdo::{CobId, MappingEntry, TpdoNumber};
+use cangauge::canopen::value::DataType;
+use cangauge::device::unit::Unit;
+use cangauge::measure::decode::{Decoded, Decoder};
+use cangauge::measure::instrument::{Instrument, Signal, Tpdo};
+use cangauge_fuzz::{Bytes, node};
+use libfuzzer_sys::fuzz_target;
+use std::time::Duration;
+
+const TPDO: u32 = 0x185;
+
+fuzz_target!(|data: &[u8]| {
+    let mut bytes = Bytes(data);
+    let head = bytes.byte();
+    let mut instrument = Instrument::new(node());
+    instrument.signals.push(Signal {
+        name: "pressure".into(),
+        channel: 1,
+        value: (ObjectId::new(0x9130, 1), DataType::Integer(4)),
+        also: Vec::new(),
+        status: (head & 1 != 0).then_some(ObjectId::new(0x6150, 1)),
+        marker: head & 2 != 0,
+        unit: Some(Unit(bytes.long())),
+        digits: Some(bytes.byte()),
+    });
+    let mapping: Vec<MappingEntry> = (0..head >> 4).map(|_| MappingEntry::from_word(bytes.long())).collect();
+    let bits: usize = mapping.iter().map(|entry| usize::from(entry.bits)).sum();
+    let number = TpdoNumber::new(1).expect("1 to 512");
+    let mapped = mapping.len();
+    instrument.tpdos.push(Tpdo { number, cob_id: CobId(TPDO), transmission: None, event_timer_ms: None, mapping });
+    let mut decoder = Decoder::default();
+    decoder.add(&instrument, &[]);
+    assert!(decoder.sources().len() <= mapped);
+    let at = Stamp { mono: Mono::START, wall: Wall::at(Duration::ZERO) };
+    while !bytes.is_empty() {
+        let frame = bytes.frame(CanId::standard(0x185).expect("eleven bits"));
+        let mut samples = Vec::new();
+        match decoder.decode(&Received { frame, at }, &mut samples) {
+            Decoded::NotOurs => assert!(frame.is_remote() || Some(frame.id()) != CanId::standard(0x185)),
+            Decoded::WrongLength(_) => assert_ne!(frame.data().len(), bits.div_ceil(8)),
+            Decoded::Tpdo(of) => {
+                assert_eq!((of, frame.data().len()), (node(), bits.div_ceil(8)));
+                assert!(samples.len() <= mapped);
+                for sample in &samples {
+                    assert!(sample.source < decoder.sources().len());
+                    if let Some(number) = sample.value {
+                        assert!(number.is_finite() && !number.to_string().is_empty());
+                    }
+                }
+                continue;
+            }
+        }
+        assert!(samples.is_empty());
+    }
+});
