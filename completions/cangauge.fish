@@ -403,6 +403,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s d -l duration 
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s n -l count -d 'End after this many rows' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sync -d 'Send SYNC at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l poll -d 'Read by SDO at this interval' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l max-gap -d 'The longest interval that is no gap; three usual ones where nothing is said' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l expect -d 'Exit with 1 at the end unless this held: \'pressure in 9..11 bar\', see cangauge check --help' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s o -l output -d 'Write to a file instead of stdout' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l layout -d 'One line per value, or one per cycle of --sync or --poll' -r -f -a "long\t''
