@@ -15,7 +15,7 @@
 //!   statistics. When something came is an argument.
 //! - [`tasks`] → measure, master, device, canopen, bus (the trait). The procedures that users think in.
 //!   They return reports and print nothing.
-//! - [`output`] → tasks (reports), measure, device, canopen (values), bus (moments). Rows and text; knows no
+//! - [`output`] → tasks (reports), measure, device, canopen (values), bus (moments, faults). Rows and text; knows no
 //!   transport and no command line.
 //! - [`cli`] → tasks, output, measure, master, sim, bus, device, canopen (values). Holds no protocol bytes and
 //!   no sockets. One file a subcommand.

@@ -12,15 +12,30 @@ const ONLY: &[(&str, &str, &[&str])] = &[
     ("master", "bus", THE_TRAIT),
     ("tasks", "bus", THE_TRAIT),
     ("measure", "bus", STAMPS),
-    ("output", "bus", STAMPS),
+    ("output", "bus", TOLD),
     ("output", "canopen", &["id", "lss", "value"]),
     ("sim", "canopen", &["frame", "id", "object", "value", "wire_length"]),
     ("cli", "canopen", &["emcy", "id", "lss", "nmt", "object", "pdo", "value"]),
 ];
 
 /// The trait and what it speaks of; no transport.
-const THE_TRAIT: &[&str] =
-    &["Bus", "BusError", "Event", "Fault", "Filters", "Mode", "Mono", "Received", "Stamp", "TimestampSource", "time"];
+const THE_TRAIT: &[&str] = &[
+    "Bus",
+    "BusError",
+    "Event",
+    "Fault",
+    "Filters",
+    "Mode",
+    "Mono",
+    "ReceiveBuffer",
+    "Received",
+    "Stamp",
+    "TimestampSource",
+    "time",
+];
+
+/// Moments, and what a bus tells of itself on the way.
+const TOLD: &[&str] = &["Fault", "Mono", "ReceiveBuffer", "Received", "Stamp", "time"];
 
 /// Moments, and a frame with the moment it was received.
 const STAMPS: &[&str] = &["Mono", "Received", "Stamp", "time"];
