@@ -140,9 +140,12 @@ impl Statistics {
             return None;
         }
         let median = self.intervals.quantile(0.5)?;
-        let max = self.intervals.farthest(median)?;
-        let distance = |share| self.intervals.distance(median, share).map(|distance| distance.min(max));
-        Some(Jitter { median, p50: distance(0.5)?, p99: distance(0.99)?, max })
+        Some(Jitter {
+            median,
+            p50: self.intervals.distance(median, 0.5)?,
+            p99: self.intervals.distance(median, 0.99)?,
+            max: self.intervals.farthest(median)?,
+        })
     }
 
     /// When the last sample came.

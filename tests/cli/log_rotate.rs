@@ -39,7 +39,7 @@ fn by_size_no_row_is_lost_or_doubled() {
         let bench = Bench::of("mh4@1");
         bench.run(&format!("log 1 {line} --duration 2s -o run.csv --rotate 3kB")).exit(0);
         let files = bench.files();
-        assert!(files.len() > 3 && files == names(1..=files.len() as u32), "{files:?}");
+        assert!(files.len() > 3 && files == names(1..=u32::try_from(files.len()).unwrap_or(0)), "{files:?}");
         let head = if line.contains("json") { "" } else { whole.split_inclusive('\n').next().expect("a line") };
         let texts: Vec<String> = files.iter().map(|name| bench.text(name)).collect();
         assert!(texts.iter().all(|text| text.len() <= 3000 && text.ends_with('\n')), "{line}");

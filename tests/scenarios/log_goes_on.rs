@@ -46,7 +46,8 @@ impl Station for Other {
     fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
 
     fn wake(&mut self, now: Mono, out: &mut Outbox) {
-        while let Some((_, frame)) = self.frames.pop_front_if(|(time, _)| *time <= now) {
+        while let Some(&(_, frame)) = self.frames.front().filter(|(time, _)| *time <= now) {
+            self.frames.pop_front();
             out.send(frame);
         }
     }
