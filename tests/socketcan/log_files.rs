@@ -75,7 +75,7 @@ fn values(text: &str) -> Vec<u32> {
     let rows = text.lines().skip(1).map(|line| line.split(',').collect::<Vec<_>>());
     rows.map(|cells| {
         assert_eq!(cells.len(), 8, "{cells:?}");
-        cells[4].parse::<f32>().unwrap() as u32
+        cells[4].parse().unwrap()
     })
     .collect()
 }
