@@ -52,9 +52,8 @@ fn the_second_waits_and_then_works() {
     let first = poller(&can);
     // Another node is nobody's.
     cangauge(&format!("sdo read 6 0x1018:1 -b {}", can.name)).is(0, "866\n", "");
-    let mut second =
-        command(&format!("sdo read 5 0x1018:1 -b {}", can.name)).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut second = second.spawn().unwrap();
+    let mut second = command(&format!("sdo read 5 0x1018:1 -b {}", can.name));
+    let mut second = second.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut told = BufReader::new(second.stderr.take().unwrap());
     let mut line = String::new();
     told.read_line(&mut line).unwrap();
