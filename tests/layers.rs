@@ -72,6 +72,14 @@ const CLOCKS: [[&str; 2]; 4] = [["Instant", "now"], ["SystemTime", "now"], ["Wal
 /// A path in the code and its line.
 type Use = (usize, Vec<String>);
 
+/// Where `unsafe` stands, how often, and why nothing else does.
+const UNSAFE: &[(&str, usize, &str)] = &[
+    ("bus/claim.rs", 1, "SO_PEERCRED: std does not tell the credentials of a peer (peer_cred is unstable)"),
+    ("bus/poll.rs", 2, "ppoll and poll: std cannot wait for a descriptor"),
+    ("bus/socketcan/receive.rs", 3, "recvmmsg, and zeroed headers for it: nothing safe delivers the drop counter"),
+    ("bus/socketcan/socket.rs", 1, "SO_MEMINFO: neither socket2 nor the socketcan crate reads it"),
+];
+
 /// The most lines of a file.
 const LINES: usize = 600;
 
@@ -479,6 +487,32 @@ fn the_map_is_the_plan() {
             "tasks: bus canopen device master measure",
         ]
     );
+}
+
+#[test]
+fn unsafe_is_counted_and_reasoned() {
+    let mut found: BTreeMap<String, usize> = BTreeMap::new();
+    for source in sources() {
+        for _ in source.tokens.iter().filter(|token| token.name() == Some("unsafe")) {
+            *found.entry(source.file.clone()).or_default() += 1;
+        }
+    }
+    let expected = UNSAFE.iter().map(|(file, count, _)| ((*file).to_owned(), *count)).collect();
+    assert_eq!(found, expected, "say in UNSAFE why, or do without");
+}
+
+#[test]
+fn no_command_runs_another_program() {
+    let running: Vec<String> = sources()
+        .iter()
+        .flat_map(|source| {
+            let (_, outer) = source.paths();
+            let runs = |path: &[String]| path.windows(2).any(|pair| pair == ["process", "Command"]);
+            let lines: Vec<usize> = outer.iter().filter(|(_, path)| runs(path)).map(|(line, _)| *line).collect();
+            lines.into_iter().map(|line| format!("src/{}:{line}", source.file))
+        })
+        .collect();
+    assert_none(&running);
 }
 
 #[test]

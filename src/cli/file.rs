@@ -1,7 +1,7 @@
 //! Files that a command writes: opened before the bus, and none overwritten unasked.
 
 use super::exit::FileError;
-use crate::output::rows::{Kept, look};
+use crate::output::rows::{Kept, Target, look};
 use crate::tasks::{Failure, Kind};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Seek, Write};
@@ -28,6 +28,8 @@ pub(super) struct OutFile {
     existing: Existing,
     /// How many bytes stay.
     keep: u64,
+    /// A stream that we have been given: nothing of it is taken away.
+    own: bool,
 }
 
 impl OutFile {
@@ -37,17 +39,26 @@ impl OutFile {
 
     pub(super) fn open(path: &Path, existing: Existing) -> anyhow::Result<OutFile> {
         let mut options = OpenOptions::new();
+        if is_own(path) {
+            // A file on our own standard output was chosen by whoever started us, and may hold more already.
+            let file = options.append(true).open(path);
+            let file = file.map_err(|source| FileError { what: format!("open {}", path.display()), source })?;
+            return Ok(OutFile { path: path.to_owned(), file, new: false, existing, keep: 0, own: true });
+        }
         options.write(true);
         let there = path.metadata().ok();
-        let new = there.is_none();
+        // A link that leads nowhere yet leads to the new file.
+        let leads = there.is_none() && path.symlink_metadata().is_ok();
+        let new = there.is_none() && !leads;
         let regular = there.is_some_and(|metadata| metadata.is_file());
         // A FIFO and a device are opened as they are, as other programs do.
         if new || existing == Existing::Refuse && regular {
             options.create_new(true);
         }
+        options.create(leads);
         options.read(existing == Existing::Continue && regular);
         match options.open(path) {
-            Ok(file) => Ok(OutFile { path: path.to_owned(), file, new, existing, keep: 0 }),
+            Ok(file) => Ok(OutFile { path: path.to_owned(), file, new, existing, keep: 0, own: false }),
             Err(source) if source.kind() == io::ErrorKind::AlreadyExists => {
                 let failure = Failure::new(Kind::Usage, format!("{} exists", path.display()));
                 Err(failure.hint("overwrite it with --force, or name another file").into())
@@ -61,7 +72,7 @@ impl OutFile {
     }
 
     pub(super) fn is_regular(&self) -> bool {
-        self.file.metadata().is_ok_and(|metadata| metadata.is_file())
+        !self.own && self.file.metadata().is_ok_and(|metadata| metadata.is_file())
     }
 
     /// What stays of a file that is continued.
@@ -75,9 +86,10 @@ impl OutFile {
         Ok(kept)
     }
 
-    /// The file, for somebody else to empty and to write to.
-    pub(super) fn handle(&self) -> anyhow::Result<File> {
-        self.file.try_clone().map_err(|source| self.error(source))
+    /// The file, for somebody else to empty but for its first `keep` bytes and to write to.
+    pub(super) fn target(&self, keep: u64) -> anyhow::Result<Target> {
+        let file = self.file.try_clone().map_err(|source| self.error(source))?;
+        Ok(if self.own { Target::Stream(Box::new(file)) } else { Target::File { file, keep } })
     }
 
     /// Writes all there is to write, behind what stays.
@@ -96,6 +108,14 @@ impl OutFile {
     pub(super) fn error(&self, source: io::Error) -> anyhow::Error {
         FileError { what: format!("write {}", self.path.display()), source }.into()
     }
+}
+
+/// Whether a path names a stream that we have been given.
+fn is_own(path: &Path) -> bool {
+    let folders = ["/dev/fd", "/proc/self/fd"];
+    path == Path::new("/dev/stdout")
+        || path == Path::new("/dev/stderr")
+        || folders.iter().any(|folder| path.starts_with(folder))
 }
 
 impl Drop for OutFile {

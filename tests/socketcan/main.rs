@@ -16,6 +16,7 @@ mod log;
 mod log_files;
 mod lss;
 mod program;
+mod two;
 mod virtual_interfaces;
 
 use cangauge::bus::socketcan::SocketCan;

@@ -293,7 +293,7 @@ impl Opened {
     /// The rows' writer; where the bus does not wait for who is slow, a thread writes.
     pub(super) fn rows(&mut self, waits: bool) -> anyhow::Result<Rows> {
         let target = match &self.rows {
-            Some(file) => Target::File { file: file.handle()?, keep: self.keep },
+            Some(file) => file.target(self.keep)?,
             None => Target::Stream(Box::new(io::stdout())),
         };
         Ok(Rows::new(sink(target, self.series.take(), waits)?, self.setup.clone()))
@@ -303,7 +303,7 @@ impl Opened {
     pub(super) fn events(&self, waits: bool) -> anyhow::Result<Option<Events>> {
         let Some(file) = &self.events else { return Ok(None) };
         let (dialect, kept) = (self.setup.dialect, self.events_kept.as_ref());
-        let target = Target::File { file: file.handle()?, keep: kept.map_or(0, |kept| kept.length) };
+        let target = file.target(kept.map_or(0, |kept| kept.length))?;
         let sink = sink(target, None, waits)?;
         Ok(Some(Events::new(sink, dialect, self.setup.time, kept.is_some())))
     }

@@ -44,6 +44,7 @@ fuzz_target!(|data: &[u8]| {
         let mut samples = Vec::new();
         match decoder.decode(&Received { frame, at }, &mut samples) {
             Decoded::NotOurs => assert!(frame.is_remote() || Some(frame.id()) != CanId::standard(0x185)),
+            Decoded::Held(_) => panic!("nothing is held that nobody has asked to hold"),
             Decoded::WrongLength(_) => assert_ne!(frame.data().len(), bits.div_ceil(8)),
             Decoded::Tpdo(of) => {
                 assert_eq!((of, frame.data().len()), (node(), bits.div_ceil(8)));
