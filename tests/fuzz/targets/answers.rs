@@ -16,9 +16,13 @@ use cangauge_fuzz::{Bytes, node};
 use libfuzzer_sys::fuzz_target;
 use std::time::Duration;
 
+/// Segments of one object. An upload is given up only after 64 MiB, which takes too long here.
+const SEGMENTS: usize = 100;
+
 struct Answerer {
     script: Vec<u8>,
     at: usize,
+    segments: usize,
 }
 
 impl Station for Answerer {
@@ -35,11 +39,13 @@ impl Station for Answerer {
         let response = CanId::sdo_response(node());
         let mut data = [0; 8];
         if request[0] >> 5 == 2 {
+            self.segments = 0;
             data[1..4].copy_from_slice(&request[1..4]);
             data[0] = [0x43, 0x4b, 0x4f, 0x42, 0x41, 0x40, 0x80, 0xc6][usize::from(head & 7)];
             data[4..].copy_from_slice(&bytes.long().to_le_bytes());
         } else {
-            data[0] = (request[0] & 0x10) | head & 0xf;
+            self.segments += 1;
+            data[0] = (request[0] & 0x10) | head & 0xf | u8::from(self.segments > SEGMENTS);
             let taken = bytes.take(7);
             data[1..=taken.len()].copy_from_slice(taken);
         }
@@ -71,13 +77,14 @@ impl Station for Answerer {
 /// Lines of a table, an object or a page: no other control character, and nothing that turns the direction.
 fn assert_harmless(text: &[u8]) {
     let text = std::str::from_utf8(text).expect("text");
-    let steers = |c: char| c.is_control() && c != '\n' || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let steers =
+        |c: char| c.is_control() && c != '\n' || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     assert!(!text.contains(steers), "{text:?}");
 }
 
 fuzz_target!(|data: &[u8]| {
     let mut bus = MemoryBus::new(Clock::Virtual);
-    bus.attach(Answerer { script: data.to_vec(), at: 0 });
+    bus.attach(Answerer { script: data.to_vec(), at: 0, segments: 0 });
     let timing = Timing { timeout: Duration::from_millis(20), retries: 0 };
     let mut master = Master::new(&mut bus, timing);
     let mut text = Vec::new();

@@ -8,13 +8,8 @@ use cangauge::canopen::value::{DataType, Value};
 use cangauge_fuzz::{Bytes, assert_requests, node};
 use libfuzzer_sys::fuzz_target;
 
-const TYPES: [DataType; 5] = [
-    DataType::Unsigned(1),
-    DataType::Unsigned(4),
-    DataType::Integer(2),
-    DataType::Real32,
-    DataType::VisibleString,
-];
+const TYPES: [DataType; 5] =
+    [DataType::Unsigned(1), DataType::Unsigned(4), DataType::Integer(2), DataType::Real32, DataType::VisibleString];
 
 fuzz_target!(|data: &[u8]| {
     let mut bytes = Bytes(data);

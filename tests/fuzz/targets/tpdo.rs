@@ -1,8 +1,8 @@
 //! The decoding of TPDOs by any mapping: never more samples than are mapped, and only bits that were sent.
 #![no_main]
 
-use cangauge::bus::time::{Mono, Stamp, Wall};
 use cangauge::bus::Received;
+use cangauge::bus::time::{Mono, Stamp, Wall};
 use cangauge::canopen::id::CanId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::pdo::{CobId, MappingEntry, TpdoNumber};

@@ -11,7 +11,8 @@ const TYPES: [&str; 21] = [
 ];
 
 fn is_nan(value: &Value) -> bool {
-    matches!(value, Value::Real32(number) if number.is_nan()) || matches!(value, Value::Real64(number) if number.is_nan())
+    matches!(value, Value::Real32(number) if number.is_nan())
+        || matches!(value, Value::Real64(number) if number.is_nan())
 }
 
 /// Milliseconds have room for three days; times that use it have another, shorter form.
