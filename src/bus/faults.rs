@@ -1,6 +1,6 @@
 //! A wrapper around any bus that goes wrong on purpose, for tests.
 
-use super::{Bus, BusError, Event, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource};
+use super::{Bus, BusError, Event, Fault, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource};
 use crate::canopen::frame::Frame;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
@@ -18,7 +18,19 @@ pub struct FaultPlan {
     pub duplicate: BTreeSet<u64>,
     /// Received frames that arrive later, behind those that came in the meantime.
     pub delay: BTreeMap<u64, Duration>,
+    /// Received frames that arrive with one byte changed: which, counted around the end, and what is turned over
+    /// in it.
+    pub garble: BTreeMap<u64, (usize, u8)>,
+    /// Received frames that arrive with no more than this many bytes.
+    pub truncate: BTreeMap<u64, usize>,
+    /// When the interface goes down, and for how long; for ever without a time.
+    pub down: Option<(Mono, Option<Duration>)>,
+    /// When the controller switches itself off: what is sent from then on waits, until nothing more can wait.
+    pub bus_off: Option<Mono>,
 }
+
+/// How many frames wait in a controller that is off.
+const OFF_QUEUE: u32 = 10;
 
 /// A bus that follows a [`FaultPlan`].
 pub struct Faulty<B> {
@@ -28,12 +40,26 @@ pub struct Faulty<B> {
     received: u64,
     /// Frames held back, by the moment they are due; those due at once come first.
     held: VecDeque<Received>,
+    /// What the program has been told of the interface.
+    is_up: bool,
+    told_off: bool,
+    /// Frames that wait in a controller that is off.
+    waiting: u32,
 }
 
 impl<B: Bus> Faulty<B> {
     /// Lets `plan` happen to `bus`.
     pub fn new(bus: B, plan: FaultPlan) -> Faulty<B> {
-        Faulty { bus, plan, sends: 0, received: 0, held: VecDeque::new() }
+        Faulty {
+            bus,
+            plan,
+            sends: 0,
+            received: 0,
+            held: VecDeque::new(),
+            is_up: true,
+            told_off: false,
+            waiting: 0,
+        }
     }
 
     /// The bus inside.
@@ -41,18 +67,70 @@ impl<B: Bus> Faulty<B> {
         &self.bus
     }
 
+    /// The bus inside, to be changed.
+    pub fn inner_mut(&mut self) -> &mut B {
+        &mut self.bus
+    }
+
+    /// Whether the interface is up at `now`.
+    fn is_up_at(&self, now: Mono) -> bool {
+        match self.plan.down {
+            Some((from, length)) => now < from || length.is_some_and(|length| now >= from + length),
+            None => true,
+        }
+    }
+
+    fn is_off_at(&self, now: Mono) -> bool {
+        self.plan.bus_off.is_some_and(|from| from <= now)
+    }
+
+    /// The next moment after `now` at which something happens to the interface.
+    fn next_change(&self, now: Mono) -> Option<Mono> {
+        let down = self.plan.down.into_iter().flat_map(|(from, length)| [Some(from), length.map(|length| from + length)]);
+        down.flatten().chain(self.plan.bus_off).filter(|moment| *moment > now).min()
+    }
+
+    /// What has happened to the interface and was not told yet.
+    fn news(&mut self) -> Option<Event> {
+        let now = self.bus.now();
+        if self.is_up_at(now.mono) != self.is_up {
+            self.is_up = !self.is_up;
+            return Some(Event::Link(self.is_up));
+        }
+        if self.is_off_at(now.mono) && !self.told_off {
+            self.told_off = true;
+            return Some(Event::Fault(Fault::BusOff, now));
+        }
+        None
+    }
+
     fn hold(&mut self, received: Received) {
         let place = self.held.partition_point(|other| other.at.mono <= received.at.mono);
         self.held.insert(place, received);
+    }
+
+    /// What the plan makes of the bytes of a received frame.
+    fn altered(&self, number: u64, frame: Frame) -> Frame {
+        let mut data = frame.data().to_vec();
+        if let Some(&(place, turned)) = self.plan.garble.get(&number)
+            && let Some(place) = place.checked_rem(data.len())
+        {
+            data[place] ^= turned;
+        }
+        data.truncate(self.plan.truncate.get(&number).copied().unwrap_or(usize::MAX));
+        // A remote frame has no bytes that could change.
+        if frame.is_remote() { frame } else { Frame::new(frame.id(), &data).unwrap_or(frame) }
     }
 
     /// Notes a received frame; what the plan leaves of it is held until it is due.
     fn take_in(&mut self, mut received: Received) {
         let number = self.received;
         self.received += 1;
-        if self.plan.lose.contains(&number) {
+        let now = self.bus.now().mono;
+        if self.plan.lose.contains(&number) || !self.is_up_at(now) || self.is_off_at(now) {
             return;
         }
+        received.frame = self.altered(number, received.frame);
         if let Some(&by) = self.plan.delay.get(&number) {
             received.at.mono = received.at.mono + by;
             received.at.wall = super::Wall::at(received.at.wall.since_epoch() + by);
@@ -116,6 +194,17 @@ impl<B: Bus> Bus for Faulty<B> {
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let number = self.sends;
         self.sends += 1;
+        let now = self.bus.now().mono;
+        if !self.is_up_at(now) {
+            return Err(BusError::Down(self.bus.name().to_owned()));
+        }
+        if self.is_off_at(now) {
+            if self.waiting >= OFF_QUEUE {
+                return Err(BusError::QueueFull);
+            }
+            self.waiting += 1;
+            return Ok(());
+        }
         if self.plan.queue_full.contains(&number) {
             return Err(BusError::QueueFull);
         }
@@ -127,6 +216,9 @@ impl<B: Bus> Bus for Faulty<B> {
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
         loop {
+            if let Some(news) = self.news() {
+                return Ok(news);
+            }
             let due = self.held.front().map(|first| first.at.mono);
             let now = self.bus.now().mono;
             if let Some(due) = due
@@ -135,7 +227,7 @@ impl<B: Bus> Bus for Faulty<B> {
             {
                 return Ok(Event::Frame(first));
             }
-            let until = due.map_or(deadline, |due| due.min(deadline));
+            let until = [due, self.next_change(now)].into_iter().flatten().min().map_or(deadline, |at| at.min(deadline));
             match self.bus.receive(until)? {
                 Event::Frame(received) => self.take_in(received),
                 Event::Timeout if until < deadline => {}
@@ -183,6 +275,51 @@ mod tests {
         assert_eq!(heard(&mut bus, at(100))?, expected.map(|(ms, text)| (at(ms), text.to_owned())));
         assert_eq!(bus.now().mono, at(100));
         assert_eq!(heard(&mut bus, at(200))?, [(at(140), "185#".to_owned())]);
+        Ok(())
+    }
+
+    #[test]
+    fn received_frames_are_garbled_and_cut_short() -> Result<(), BusError> {
+        let script = (0..4u64).fold(Script::new(), |script, n| script.frame(at(10 * n), "185#0102030405"));
+        let plan = FaultPlan {
+            garble: [(0, (1, 0xff)), (1, (7, 0x10))].into(),
+            truncate: [(2, 3), (3, 8)].into(),
+            ..FaultPlan::default()
+        };
+        let mut bus = Faulty::new(script, plan);
+        let heard: Vec<String> = heard(&mut bus, at(100))?.into_iter().map(|(_, text)| text).collect();
+        assert_eq!(heard, ["185#01FD030405", "185#0102130405", "185#010203", "185#0102030405"]);
+        Ok(())
+    }
+
+    #[test]
+    fn an_interface_goes_down_and_comes_back() -> Result<(), BusError> {
+        let script = (0..4u64).fold(Script::new(), |script, n| script.frame(at(10 * n), &format!("18{n}#")));
+        let down = Some((at(5), Some(Duration::from_millis(20))));
+        let mut bus = Faulty::new(script, FaultPlan { down, ..FaultPlan::default() });
+        let mut events = Vec::new();
+        loop {
+            let event = bus.receive(at(100))?;
+            let may_send = bus.send(&Frame::empty(CanId::SYNC)).is_ok();
+            match event {
+                Event::Frame(received) => events.push((received.frame.to_string(), may_send)),
+                Event::Link(up) => events.push((up.to_string(), may_send)),
+                _ => break,
+            }
+        }
+        let expected = [("180#", true), ("false", false), ("true", true), ("183#", true)];
+        assert_eq!(events, expected.map(|(what, may_send)| (what.to_owned(), may_send)));
+        Ok(())
+    }
+
+    #[test]
+    fn a_controller_that_is_off_takes_a_queue_full_and_hears_nothing() -> Result<(), BusError> {
+        let script = Script::new().frame(at(10), "181#");
+        let mut bus = Faulty::new(script, FaultPlan { bus_off: Some(at(5)), ..FaultPlan::default() });
+        assert!(matches!(bus.receive(at(100))?, Event::Fault(Fault::BusOff, _)));
+        assert!(heard(&mut bus, at(100))?.is_empty());
+        let taken = (0..20u8).filter(|n| bus.send(&Frame::byte(CanId::NMT, *n)).is_ok()).count();
+        assert_eq!((taken, bus.inner().sent.len()), (10, 0));
         Ok(())
     }
 

@@ -1,0 +1,337 @@
+//! What sits on the bus: devices with vagaries that keep a record of what they really sent, and others.
+
+use crate::random::Random;
+use crate::spec::{Act, Vagary};
+use cangauge::bus::Mono;
+use cangauge::bus::memory::{Outbox, Station, Tuning};
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::{CanId, NodeId};
+use cangauge::canopen::object::ObjectId;
+use cangauge::sim::{Device, State};
+use std::collections::{BTreeSet, VecDeque};
+use std::time::Duration;
+
+pub(crate) fn ms(milliseconds: u64) -> Mono {
+    Mono::at(Duration::from_millis(milliseconds))
+}
+
+/// A device that does what it should not.
+pub(crate) struct Unruly {
+    pub(crate) device: Device,
+    /// Which of the bench.
+    pub(crate) place: usize,
+    vagaries: Vec<Vagary>,
+    resets: VecDeque<Mono>,
+    hangs: Vec<(Mono, Mono)>,
+    /// SDO answers so far.
+    answers: u64,
+    late: Vec<(Mono, Frame)>,
+    unsaved: Option<Frame>,
+    /// Everything that it sent, when it was complete.
+    pub(crate) sent: Vec<(Mono, Frame)>,
+    /// Every data byte sequence that it held in the object of interest.
+    pub(crate) watched: Option<ObjectId>,
+    pub(crate) held: BTreeSet<Vec<u8>>,
+}
+
+impl Unruly {
+    pub(crate) fn new(device: Device, place: usize, vagaries: &[Vagary], unsaved: Option<Frame>) -> Unruly {
+        let mut resets: Vec<Mono> = Vec::new();
+        let mut hangs = Vec::new();
+        for vagary in vagaries {
+            match vagary {
+                Vagary::ResetAt { ms: at } => resets.push(ms(*at)),
+                Vagary::Hang { from_ms, for_ms } => hangs.push((ms(*from_ms), ms(from_ms + for_ms))),
+                _ => {}
+            }
+        }
+        resets.sort();
+        Unruly {
+            device,
+            place,
+            vagaries: vagaries.to_vec(),
+            resets: resets.into(),
+            hangs,
+            answers: 0,
+            late: Vec::new(),
+            unsaved,
+            sent: Vec::new(),
+            watched: None,
+            held: BTreeSet::new(),
+        }
+    }
+
+    /// From now on it behaves.
+    pub(crate) fn tame(&mut self) {
+        self.vagaries.clear();
+        self.resets.clear();
+        self.hangs.clear();
+        self.late.clear();
+    }
+
+    fn hung_until(&self, now: Mono) -> Option<Mono> {
+        self.hangs.iter().filter(|(from, until)| *from <= now && now < *until).map(|(_, until)| *until).max()
+    }
+
+    fn look(&mut self, now: Mono) {
+        if let Some(object) = self.watched
+            && let Some(value) = self.device.value(object, now)
+        {
+            self.held.insert(value);
+        }
+    }
+
+    /// Lets the device act; of what it then has to say in answer, its vagaries make what they like.
+    fn act(&mut self, now: Mono, out: &mut Outbox, act: impl FnOnce(&mut Device, &mut Outbox)) {
+        let answers = |out: &mut Outbox| {
+            let mut count = 0;
+            out.retain(|frame| {
+                count += usize::from(frame.id().sdo_response_node().is_some());
+                true
+            });
+            count
+        };
+        let before = answers(out);
+        act(&mut self.device, out);
+        let mut old = answers(out).min(before);
+        if answers(out) > old && !self.vagaries.is_empty() {
+            let all: Vec<Frame> = std::iter::from_fn(|| out.pop()).collect();
+            for frame in all {
+                let is_answer = frame.id().sdo_response_node().is_some();
+                if !is_answer || old > 0 {
+                    old -= usize::from(is_answer);
+                    out.send(frame);
+                } else {
+                    self.answer(frame, now, out);
+                }
+            }
+        }
+        self.look(now);
+    }
+
+    fn answer(&mut self, mut frame: Frame, now: Mono, out: &mut Outbox) {
+        let number = self.answers;
+        self.answers += 1;
+        let (mut copies, mut late) = (1, None);
+        for vagary in &self.vagaries {
+            match *vagary {
+                Vagary::Lose { nth } if nth == number => copies = 0,
+                Vagary::Twice { nth } if nth == number => copies = 2,
+                Vagary::Late { nth, ms } if nth == number => late = Some(now + Duration::from_millis(ms)),
+                Vagary::Garbled { nth, place, turned } if nth == number => {
+                    let mut data = frame.data().to_vec();
+                    if let Some(byte) = data.get_mut(place) {
+                        *byte ^= turned;
+                    }
+                    frame = Frame::new(frame.id(), &data).unwrap_or(frame);
+                }
+                Vagary::As { nth, node } if nth == number => {
+                    let id = CanId::sdo_response(NodeId::new(node).expect("a node-ID"));
+                    frame = Frame::new(id, frame.data()).unwrap_or(frame);
+                }
+                _ => {}
+            }
+        }
+        for _ in 0..copies {
+            match late {
+                Some(due) => self.late.push((due, frame)),
+                None => out.send(frame),
+            }
+        }
+    }
+
+    fn refusal(&self, frame: &Frame) -> Option<Frame> {
+        let node = self.device.node()?;
+        let data = frame.all_eight().filter(|_| frame.id() == CanId::sdo_request(node))?;
+        let index = u16::from_le_bytes([data[1], data[2]]);
+        let begins = matches!(data[0] >> 5, 1 | 2) || data[0] >> 5 == 6 && data[0] & 1 == 0 || data[0] >> 5 == 5 && data[0] & 3 == 0;
+        let code = self.vagaries.iter().find_map(|vagary| match vagary {
+            Vagary::Refuse { index: refused, code } if *refused == index && begins => Some(code.to_le_bytes()),
+            _ => None,
+        })?;
+        let answer = [0x80, data[1], data[2], data[3], code[0], code[1], code[2], code[3]];
+        Some(Frame::full(CanId::sdo_response(node), answer))
+    }
+}
+
+impl Station for Unruly {
+    fn power_on(&mut self, now: Mono, out: &mut Outbox) {
+        self.device.power_on(now, out);
+        if let Some(write) = self.unsaved.take() {
+            let mut nowhere = Outbox::default();
+            self.device.receive(now, &write, &mut nowhere);
+        }
+    }
+
+    fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
+        if self.hung_until(now).is_some() {
+            return;
+        }
+        match self.refusal(frame) {
+            Some(refusal) if self.device.state().is_some_and(|state| state != State::Stopped) => out.send(refusal),
+            _ => self.act(now, out, |device, out| device.receive(now, frame, out)),
+        }
+    }
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        if self.resets.front().is_some_and(|due| *due <= now) {
+            self.resets.pop_front();
+            self.late.clear();
+            self.act(now, out, |device, out| device.power_on(now, out));
+            return;
+        }
+        if self.hung_until(now).is_some() {
+            return;
+        }
+        for (_, frame) in self.late.extract_if(.., |(due, _)| *due <= now) {
+            out.send(frame);
+        }
+        if self.device.next_wake().is_some_and(|due| due <= now) {
+            self.act(now, out, |device, out| device.wake(now, out));
+        }
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        let own = self.device.next_wake();
+        let hung = self.hangs.iter().find(|(from, until)| own.is_some_and(|own| *from <= own && own < *until));
+        // A device that hangs is not woken before it is over.
+        let own = hung.map_or(own, |(_, until)| Some(*until));
+        let late = self.late.iter().map(|(due, _)| *due);
+        late.chain(own).chain(self.resets.front().copied()).min()
+    }
+
+    fn sent(&mut self, now: Mono, frame: &Frame) {
+        self.sent.push((now, *frame));
+        self.device.sent(now, frame);
+    }
+
+    fn tuning(&self) -> Tuning {
+        self.device.tuning()
+    }
+
+    fn told_bit_rate(&mut self, bit_rate: u32) {
+        self.device.told_bit_rate(bit_rate);
+    }
+}
+
+/// A second master with a plan of its own.
+pub(crate) struct Rival {
+    plan: VecDeque<(Mono, Act)>,
+    fetching: Option<(u8, u8)>,
+}
+
+impl Rival {
+    pub(crate) fn new(plan: &[(u64, Act)]) -> Rival {
+        let mut plan: Vec<(Mono, Act)> =
+            plan.iter().map(|(at, act)| (Mono::at(Duration::from_micros(*at)), *act)).collect();
+        plan.sort_by_key(|(at, _)| *at);
+        Rival { plan: plan.into(), fetching: None }
+    }
+}
+
+fn request(node: u8, data: [u8; 8]) -> Frame {
+    Frame::full(CanId::sdo_request(NodeId::new(node).expect("a node-ID")), data)
+}
+
+/// A write of `bytes` bytes, as frame.
+pub(crate) fn write(node: u8, index: u16, sub: u8, value: u32, bytes: u8) -> Frame {
+    let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+    request(node, [0x23 | (4 - bytes) << 2, low, high, sub, a, b, c, d])
+}
+
+impl Station for Rival {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+        let Some((node, toggle)) = self.fetching else { return };
+        if frame.id().sdo_response_node().map(NodeId::get) != Some(node) {
+            return;
+        }
+        let Some(data) = frame.all_eight() else { return };
+        match data[0] >> 5 {
+            2 if data[0] & 2 == 0 => out.send(request(node, [0x60, 0, 0, 0, 0, 0, 0, 0])),
+            0 if data[0] & 1 == 0 => {
+                self.fetching = Some((node, toggle ^ 0x10));
+                out.send(request(node, [0x60 | toggle ^ 0x10, 0, 0, 0, 0, 0, 0, 0]));
+            }
+            _ => self.fetching = None,
+        }
+    }
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        while self.next_wake().is_some_and(|due| due <= now) {
+            let Some((_, act)) = self.plan.pop_front() else { return };
+            out.send(match act {
+                Act::Read { node, index, sub } => {
+                    self.fetching = Some((node, 0));
+                    let [low, high] = index.to_le_bytes();
+                    request(node, [0x40, low, high, sub, 0, 0, 0, 0])
+                }
+                Act::Write { node, index, sub, value, bytes } => write(node, index, sub, value, bytes),
+                Act::Nmt { specifier, node } => Frame::pair(CanId::NMT, specifier, node),
+            });
+        }
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.plan.front().map(|(due, _)| *due)
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+/// Sends frames that mean nothing; a nasty one under identifiers that mean something.
+pub(crate) struct Babbler {
+    every: Duration,
+    next: Mono,
+    random: Random,
+    nasty: bool,
+}
+
+impl Babbler {
+    pub(crate) fn new(every_us: u64, seed: u64, nasty: bool) -> Babbler {
+        Babbler { every: Duration::from_micros(every_us), next: Mono::START, random: Random::new(seed), nasty }
+    }
+}
+
+impl Station for Babbler {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        self.next = now + self.every;
+        if out.front().is_some() {
+            return;
+        }
+        let random = &mut self.random;
+        let node = u16::from(random.byte(1..=127));
+        let (id, least) = match random.within(0..=7) {
+            _ if !self.nasty => (*random.pick(&[0x7ff, 0x010, 0x7f0, 0x679]), 0),
+            0 => (0x080 + node, 8),
+            // What begins like an acknowledge would be one.
+            1..=3 => (0x580 + node, 0),
+            4 => (0x700 + node, 0),
+            5 => (0x7e4, 0),
+            _ => (0x180 + node, 0),
+        };
+        let length = usize::from(random.byte(least..=8));
+        let mut data: Vec<u8> = (0..length).map(|_| random.byte(0..=255)).collect();
+        if (0x580..0x600).contains(&id) && data.first().is_some_and(|first| matches!(first >> 5, 1 | 3 | 5)) {
+            data[0] = 0xe0;
+        }
+        if id == 0x7e4 && data.first().is_some_and(|first| *first < 0x80) {
+            data[0] = 0xf0;
+        }
+        let id = if random.percent(10) && !self.nasty { CanId::extended(0x1800_0000 + u32::from(id)) } else { CanId::standard(id) };
+        if let Some(frame) = id.and_then(|id| Frame::new(id, &data).ok()) {
+            out.send(frame);
+        }
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        Some(self.next)
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}

@@ -1,0 +1,117 @@
+//! The program's own end of the bus: keeps what goes through, and ends what would never end.
+
+use cangauge::bus::{Bus, BusError, Event, Fault, Filters, Mode, Mono, Stamp, TimestampSource};
+use cangauge::canopen::frame::Frame;
+
+/// So often nothing may be waited for without any time passing.
+const MOST_CALLS: u64 = 400_000;
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Passed {
+    Sent(Frame),
+    Received(Frame),
+}
+
+pub(crate) struct Tap<B> {
+    pub(crate) bus: B,
+    pub(crate) frames: Vec<(Mono, Passed)>,
+    /// By then the command must have ended.
+    pub(crate) deadline: Mono,
+    pub(crate) overran: bool,
+    calls: u64,
+    /// Whether the program was told to stop, that the interface is down, that the controller is off.
+    pub(crate) interrupted: bool,
+    pub(crate) was_down: bool,
+    pub(crate) was_off: bool,
+}
+
+impl<B: Bus> Tap<B> {
+    pub(crate) fn new(bus: B, deadline: Mono) -> Tap<B> {
+        Tap {
+            bus,
+            frames: Vec::new(),
+            deadline,
+            overran: false,
+            calls: 0,
+            interrupted: false,
+            was_down: false,
+            was_off: false,
+        }
+    }
+
+    fn sent(&self) -> impl Iterator<Item = (Mono, Frame)> {
+        self.frames.iter().filter_map(|(at, passed)| match passed {
+            Passed::Sent(frame) => Some((*at, *frame)),
+            Passed::Received(_) => None,
+        })
+    }
+
+    pub(crate) fn all_sent(&self) -> Vec<(Mono, Frame)> {
+        self.sent().collect()
+    }
+}
+
+impl<B: Bus> Bus for Tap<B> {
+    fn name(&self) -> &str {
+        self.bus.name()
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        self.bus.bit_rate()
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        self.bus.timestamps()
+    }
+
+    fn can_set_bit_rate(&self) -> Result<(), BusError> {
+        self.bus.can_set_bit_rate()
+    }
+
+    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
+        self.bus.set_bit_rate(bit_rate, mode)
+    }
+
+    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        self.bus.put_back_bit_rate()
+    }
+
+    fn now(&self) -> Stamp {
+        self.bus.now()
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        self.bus.listen(filters)
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        let result = self.bus.send(frame);
+        match &result {
+            Ok(()) => self.frames.push((self.bus.now().mono, Passed::Sent(*frame))),
+            Err(BusError::Down(_)) => self.was_down = true,
+            Err(_) => {}
+        }
+        result
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        let now = self.bus.now().mono;
+        self.calls += 1;
+        if now > self.deadline || self.calls > MOST_CALLS {
+            self.overran = true;
+            assert!(self.calls < 2 * MOST_CALLS, "it never ends, at {now:?}");
+            self.calls = self.calls.max(MOST_CALLS);
+            return Err(BusError::Unsupported("the scenario is over".to_owned()));
+        }
+        // Nobody waits for ever: beyond the end there is nothing to be found.
+        let result = self.bus.receive(deadline.min(self.deadline + std::time::Duration::from_nanos(1)));
+        match &result {
+            Ok(Event::Frame(received)) => self.frames.push((received.at.mono, Passed::Received(received.frame))),
+            Ok(Event::Interrupted) => self.interrupted = true,
+            Ok(Event::Link(false)) => self.was_down = true,
+            Ok(Event::Fault(Fault::BusOff, _)) => self.was_off = true,
+            Ok(_) | Err(_) => {}
+        }
+        result
+    }
+}
