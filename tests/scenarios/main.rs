@@ -10,6 +10,7 @@ mod log_goes_on;
 mod lss;
 mod pdo_map;
 mod pdo_map_devices;
+mod probe;
 mod scan;
 mod second_master;
 mod second_sync;

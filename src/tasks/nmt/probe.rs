@@ -5,12 +5,15 @@ use crate::canopen::id::NodeId;
 use crate::canopen::nmt::Life;
 use crate::canopen::sdo::DownloadSize;
 use crate::canopen::value::DataType;
-use crate::master::{Error, Master, Request};
+use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
 use crate::measure::survey::read_all;
 use std::time::Duration;
 
 /// The heartbeat that is set for a moment.
 const PERIOD: Duration = Duration::from_millis(100);
+
+/// How many more requests to stop are passed over until 1017h is put back.
+const DEAF: u32 = 5;
 
 /// What became of a probe.
 #[derive(Debug)]
@@ -35,21 +38,43 @@ pub fn probe(master: &mut Master<'_>, node: NodeId) -> Result<Probe, Error> {
     };
     let set = |time: u16| Request::write(node, HEARTBEAT, time.to_le_bytes().to_vec(), DownloadSize::Indicated);
     let milliseconds = u16::try_from(PERIOD.as_millis()).unwrap_or(u16::MAX);
-    if let Err(error) = master.transfer_one(set(milliseconds))? {
+    let begun = master.transfer_one(set(milliseconds));
+    if let Ok(Err(error @ SdoError { failure: SdoFailure::Refused(_), .. })) = &begun {
         return failed(error.to_string());
     }
     let mut watch = Watch::default();
-    let until = master.now() + PERIOD + master.timing().timeout;
-    let waited = watch.wait(master, until, &|watch| matches!(watch.lives.get(&node), Some(Life::State(_))));
-    let restored = master.transfer_one(set(before));
+    let waited = match &begun {
+        Ok(Ok(_)) => {
+            let until = master.now() + PERIOD + master.timing().timeout;
+            watch.wait(master, until, &|watch| matches!(watch.lives.get(&node), Some(Life::State(_))))
+        }
+        // Without an answer it may have been set all the same.
+        Ok(Err(_)) | Err(_) => Ok(()),
+    };
+    let restored = put_back(master, &set(before));
+    let begun = begun?;
     waited?;
-    let trouble = match restored? {
-        Ok(_) => None,
-        Err(error) => Some(format!("{error}; 1017h stays at {} ms", PERIOD.as_millis())),
+    let trouble = match (begun, restored?) {
+        (Ok(_), Ok(_)) => None,
+        (Err(error), Ok(_)) => Some(error.to_string()),
+        (Ok(_), Err(error)) => Some(format!("{error}; 1017h stays at {milliseconds} ms")),
+        (Err(_), Err(error)) => Some(format!("{error}; 1017h may stay at {milliseconds} ms")),
     };
     let report = match watch.lives.get(&node) {
         Some(Life::State(state)) => Report { state: Some(*state), by: By::Heartbeat, ..unknown },
         _ => unknown,
     };
     Ok(Probe { report, trouble })
+}
+
+/// Writes what was there before, whatever asks to stop in the meantime.
+fn put_back(master: &mut Master<'_>, write: &Request) -> Result<Result<Answer, SdoError>, Error> {
+    let mut result = master.transfer_one(write.clone());
+    for _ in 0..DEAF {
+        if !matches!(result, Err(Error::Interrupted)) {
+            break;
+        }
+        result = master.transfer_one(write.clone());
+    }
+    result
 }

@@ -1,0 +1,42 @@
+//! A state that is found out by switching the heartbeat on for a moment: whenever it is interrupted, 1017h is put back.
+
+use cangauge::bus::Mono;
+use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::object::ObjectId;
+use cangauge::device::catalog;
+use cangauge::master::{Error, Master, Timing};
+use cangauge::sim::{Device, Setup};
+use cangauge::tasks::nmt::probe;
+use std::time::Duration;
+
+/// The heartbeat time that is left when the user asks to stop at these moments in ms; and whether the probe ended so.
+fn left(interrupts: &[u64]) -> (Vec<u8>, bool) {
+    let node = NodeId::new(5).expect("a node-ID");
+    let mut setup = Setup::new(catalog::by_name("mh4").expect("built in"), node);
+    setup.oddities.latency = Duration::from_millis(40);
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(Device::new(setup).expect("a device"));
+    interrupts.iter().for_each(|at| bus.interrupt_at(Mono::at(Duration::from_millis(*at))));
+    let mut master = Master::new(&mut bus, Timing::default());
+    let result = probe(&mut master, node);
+    master.settle();
+    let late = master.now() + Duration::from_millis(500);
+    while master.now() < late {
+        master.next(late).expect("the bus works");
+    }
+    drop(master);
+    let device = bus.stations_mut::<Device>().next().expect("the device");
+    let period = device.value(ObjectId::new(0x1017, 0), late).expect("1017h");
+    (period, matches!(result, Err(Error::Interrupted)))
+}
+
+#[test]
+fn the_heartbeat_is_put_back_whenever_it_is_interrupted() {
+    // A request and its answer take 42 ms; once the heartbeat has come, nothing is left to be interrupted.
+    for at in 1..180 {
+        assert_eq!(left(&[at]), (vec![0, 0], at < 142), "interrupted at {at} ms");
+        assert_eq!(left(&[at, at + 9, at + 30]).0, [0, 0], "three times from {at} ms");
+    }
+    assert_eq!(left(&[]), (vec![0, 0], false));
+}
