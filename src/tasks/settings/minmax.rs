@@ -69,27 +69,33 @@ pub fn reset(master: &mut Master<'_>, device: &Device) -> Result<Vec<(Extremes, 
         }
         let objects = ["minimum-pv", "maximum-pv"].map(|name| device.of_signal(signal, name).unwrap_or(object));
         let now = extremes(master, device, signal, objects)?;
-        if !has_begun_anew(&old, &now) {
+        match has_begun_anew(&old, &now) {
+            Some(true) => {}
             // An answer that did not come is the better explanation.
-            sent?;
-            let message = format!("{object} was acknowledged, and minimum and maximum of {} stay", old.signal);
-            return Err(Failure { object: Some(object), ..Failure::of_node(Kind::Unexpected, device.node(), message) });
+            None | Some(false) if sent.is_err() => sent?,
+            None => {}
+            Some(false) => {
+                let message = format!("{object} was acknowledged, and minimum and maximum of {} stay", old.signal);
+                let failure = Failure::of_node(Kind::Unexpected, device.node(), message);
+                return Err(Failure { object: Some(object), ..failure });
+            }
         }
         all.push((old, now));
     }
     Ok(all)
 }
 
-/// Whether a reset shows: without one the lowest value only falls and the highest only rises. Where both are
-/// the same, nothing has moved yet and nothing can show.
-fn has_begun_anew(old: &Extremes, now: &Extremes) -> bool {
+/// Whether a reset shows: without one the lowest value only falls and the highest only rises. `None` where nothing
+/// tells: nothing had moved before, or by now the values have gone beyond both ends.
+fn has_begun_anew(old: &Extremes, now: &Extremes) -> Option<bool> {
     let ends = |extremes: &Extremes| {
         let (lowest, highest) = extremes.lowest.zip(extremes.highest)?;
         Some((lowest.number.as_f64(), highest.number.as_f64()))
     };
     match (ends(old), ends(now)) {
-        (Some(old), Some(now)) => now.0 > old.0 || now.1 < old.1 || old.0 >= old.1,
-        _ => false,
+        (Some(old), Some(now)) if now.0 > old.0 || now.1 < old.1 => Some(true),
+        (Some(old), Some(now)) if old.0 >= old.1 || now.0 < old.0 && now.1 > old.1 => None,
+        _ => Some(false),
     }
 }
 
@@ -106,11 +112,12 @@ mod tests {
             highest: Some(Quantity { number: Number::Real64(highest), unit: None }),
         };
         let old = range(1.0, 2.0);
-        assert!(has_begun_anew(&old, &range(1.5, 1.5)));
-        assert!(has_begun_anew(&old, &range(1.5, 2.5)));
-        assert!(!has_begun_anew(&old, &range(1.0, 2.0)));
-        assert!(!has_begun_anew(&old, &range(0.5, 2.5)));
-        assert!(has_begun_anew(&range(1.0, 1.0), &range(1.0, 1.0)), "stood still all the time");
-        assert!(!has_begun_anew(&old, &Extremes { lowest: None, ..old.clone() }));
+        assert_eq!(has_begun_anew(&old, &range(1.5, 1.5)), Some(true));
+        assert_eq!(has_begun_anew(&old, &range(1.5, 2.5)), Some(true));
+        assert_eq!(has_begun_anew(&old, &range(1.0, 2.0)), Some(false));
+        assert_eq!(has_begun_anew(&old, &range(1.0, 2.5)), Some(false));
+        assert_eq!(has_begun_anew(&old, &range(0.5, 2.5)), None, "noise since then is more than there was before");
+        assert_eq!(has_begun_anew(&range(1.0, 1.0), &range(1.0, 1.0)), None, "stood still all the time");
+        assert_eq!(has_begun_anew(&old, &Extremes { lowest: None, ..old.clone() }), Some(false));
     }
 }
