@@ -50,16 +50,7 @@ pub struct Faulty<B> {
 impl<B: Bus> Faulty<B> {
     /// Lets `plan` happen to `bus`.
     pub fn new(bus: B, plan: FaultPlan) -> Faulty<B> {
-        Faulty {
-            bus,
-            plan,
-            sends: 0,
-            received: 0,
-            held: VecDeque::new(),
-            is_up: true,
-            told_off: false,
-            waiting: 0,
-        }
+        Faulty { bus, plan, sends: 0, received: 0, held: VecDeque::new(), is_up: true, told_off: false, waiting: 0 }
     }
 
     /// The bus inside.
@@ -86,7 +77,8 @@ impl<B: Bus> Faulty<B> {
 
     /// The next moment after `now` at which something happens to the interface.
     fn next_change(&self, now: Mono) -> Option<Mono> {
-        let down = self.plan.down.into_iter().flat_map(|(from, length)| [Some(from), length.map(|length| from + length)]);
+        let down =
+            self.plan.down.into_iter().flat_map(|(from, length)| [Some(from), length.map(|length| from + length)]);
         down.flatten().chain(self.plan.bus_off).filter(|moment| *moment > now).min()
     }
 
@@ -227,7 +219,8 @@ impl<B: Bus> Bus for Faulty<B> {
             {
                 return Ok(Event::Frame(first));
             }
-            let until = [due, self.next_change(now)].into_iter().flatten().min().map_or(deadline, |at| at.min(deadline));
+            let until =
+                [due, self.next_change(now)].into_iter().flatten().min().map_or(deadline, |at| at.min(deadline));
             match self.bus.receive(until)? {
                 Event::Frame(received) => self.take_in(received),
                 Event::Timeout if until < deadline => {}

@@ -9,6 +9,7 @@ use cangauge::canopen::nmt::NmtState;
 use cangauge::canopen::object::ObjectId;
 use cangauge::sim::State;
 use cangauge::tasks::Kind;
+use cangauge::tasks::lss::Via;
 use cangauge::tasks::pdo::Settings;
 use cangauge::tasks::sdo::is_signature;
 use cangauge::tasks::store::Group;
@@ -26,6 +27,7 @@ pub(crate) fn judge(spec: &Spec, run: &mut Run) -> Vec<Broken> {
     put_back(spec, run, &after, &mut broken);
     kinds(spec, run, &mut broken);
     rows(spec, run, &mut broken);
+    signatures(spec, run, &mut broken);
     if let Ok(said) = run.result.clone() {
         claims(spec, run, &said, &after, &mut broken);
         last_writes(spec, run, &mut broken);
@@ -45,7 +47,13 @@ fn named(spec: &Spec) -> BTreeSet<u8> {
     let of = |target: &Target| match target {
         Target::Node(node) => vec![*node],
         Target::Identity(place) => spec.devices[*place].node.into_iter().collect(),
-        Target::Only if spec.devices.len() == 1 => spec.devices[0].node.into_iter().collect(),
+        Target::Only
+            if spec.devices.len() == 1
+                || spec.devices.iter().any(|device| device.node.is_none())
+                || !spec.is_clean() =>
+        {
+            spec.devices.iter().filter_map(|device| device.node).collect()
+        }
         Target::Only | Target::Unconfigured => Vec::new(),
     };
     match &spec.command {
@@ -79,10 +87,7 @@ fn named(spec: &Spec) -> BTreeSet<u8> {
 }
 
 fn is_lss(command: &Command) -> bool {
-    matches!(
-        command,
-        Command::LssScan | Command::LssInquire { .. } | Command::LssStore { .. } | Command::Assign { .. }
-    )
+    matches!(command, Command::LssScan | Command::LssInquire { .. } | Command::LssStore { .. } | Command::Assign { .. })
 }
 
 /// Whether a command may write anything by SDO.
@@ -125,22 +130,30 @@ fn frames(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
                 (command, &[_, node]) => resets(command) && named.contains(&node),
                 _ => false,
             },
-            CanId::Standard(0x080) => matches!(spec.command, Command::Log { sync_ms: Some(_), .. }) && !frame.is_remote(),
+            CanId::Standard(0x080) => {
+                matches!(spec.command, Command::Log { sync_ms: Some(_), .. }) && !frame.is_remote()
+            }
             CanId::Standard(0x7e5) => lss && !frame.is_remote(),
             id if frame.is_remote() => {
                 let guards = matches!(
                     spec.command,
-                    Command::Nmt { .. } | Command::NmtState { .. } | Command::NmtProbe { .. } | Command::Map { .. }
-                        | Command::Store { .. } | Command::Restore { .. }
+                    Command::Nmt { .. }
+                        | Command::NmtState { .. }
+                        | Command::NmtProbe { .. }
+                        | Command::Map { .. }
+                        | Command::Store { .. }
+                        | Command::Restore { .. }
                 );
-                guards && id.heartbeat_node().is_some_and(|node| named.contains(&node.get()))
+                (guards || lss) && id.heartbeat_node().is_some_and(|node| named.contains(&node.get()))
             }
             id => match (id.sdo_request_node().map(NodeId::get), frame.all_eight()) {
                 (Some(node), Some(data)) => {
                     let reads = matches!(data[0] >> 5, 2..=5);
                     let meant = named.contains(&node);
                     // A block of a long download begins with a number; only short ones are written here.
-                    if reads { meant || lss } else { meant && writes(&spec.command) }
+                    // Whether an identifier is free is seen by asking who there is.
+                    let asks = lss || matches!(spec.command, Command::Map { cob_id: Some(_), .. });
+                    if reads { meant || asks } else { meant && writes(&spec.command) }
                 }
                 _ => false,
             },
@@ -156,15 +169,23 @@ fn frames(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
 fn is_meant(spec: &Spec, place: usize) -> bool {
     let node = spec.devices[place].node;
     match &spec.command {
-        Command::Assign { target, .. } | Command::LssStore { target } | Command::LssInquire { target } => match target {
-            Target::Node(id) => node == Some(*id),
-            Target::Identity(meant) => {
-                let same = |at: usize| (spec.devices[at].kind, spec.devices[at].serial);
-                same(*meant) == same(place)
+        Command::Assign { target, .. } | Command::LssStore { target } | Command::LssInquire { target } => {
+            match target {
+                Target::Node(id) => node == Some(*id),
+                Target::Identity(meant) => {
+                    let same = |at: usize| (spec.devices[at].kind, spec.devices[at].serial);
+                    same(*meant) == same(place)
+                }
+                // Who has no node-ID and knows none of the inquiries cannot be seen, and takes what the only one takes.
+                Target::Only => {
+                    spec.devices.len() == 1
+                        || node.is_none()
+                        || spec.devices.iter().any(|device| device.node.is_none())
+                        || !spec.is_clean()
+                }
+                Target::Unconfigured => node.is_none(),
             }
-            Target::Only => spec.devices.len() == 1,
-            Target::Unconfigured => node.is_none(),
-        },
+        }
         _ => node.is_some_and(|node| named(spec).contains(&node)),
     }
 }
@@ -176,9 +197,11 @@ fn others_unchanged(spec: &Spec, run: &Run, after: &[Holds], broken: &mut Vec<Br
         if !is_meant(spec, place) && own(before) != own(after) {
             broken.push(("changes nobody else", format!("device {place}: {before:?} became {after:?}")));
         }
-        let meddled = written_by_others || spec.devices[place].vagaries.iter().any(|vagary| {
-            matches!(vagary, Vagary::ResetAt { .. } | Vagary::Hang { .. })
-        });
+        let meddled = written_by_others
+            || spec.devices[place]
+                .vagaries
+                .iter()
+                .any(|vagary| matches!(vagary, Vagary::ResetAt { .. } | Vagary::Hang { .. }));
         let broadcast = matches!(spec.command, Command::Nmt { all: true, .. });
         // Who has no node-ID of its own may stand where the new one is.
         if !is_meant(spec, place) && !meddled && !broadcast && before.state != after.state {
@@ -203,7 +226,7 @@ fn put_back(spec: &Spec, run: &mut Run, after: &[Holds], broken: &mut Vec<Broken
             broken.push(("leaves configuration state", format!("device {place}: {holds:?}")));
         }
     }
-    if spec.is_meddled_with() || spec.lies() || spec.is_disordered() {
+    if spec.is_meddled_with() || spec.lies() || spec.is_disordered() || spec.shares_node_ids() {
         return;
     }
     // A state that heartbeats told is what it was.
@@ -219,13 +242,20 @@ fn put_back(spec: &Spec, run: &mut Run, after: &[Holds], broken: &mut Vec<Broken
             let told = device.heartbeat_ms.is_some_and(|time| time <= 200) && device.unsaved_heartbeat.is_none();
             let refuses = device.vagaries.iter().any(|vagary| matches!(vagary, Vagary::Refuse { index: 0x1017, .. }));
             let shared = spec.shares_node_ids();
-            if told && !refuses && !shared && device.kind != "jumo" && before.state != after.state && heartbeats(run, before) {
+            if told
+                && !refuses
+                && !shared
+                && device.kind != "jumo"
+                && before.state != after.state
+                && heartbeats(run, before)
+            {
                 let remarks = match &run.result {
                     Ok(said) => format!("{said:?}"),
                     Err(failure) => failure.message.clone(),
                 };
                 if !remarks.contains("not put back") && !remarks.contains("stays") && !remarks.contains("state") {
-                    broken.push(("puts states back", format!("device {place}: {before:?} became {after:?}: {remarks}")));
+                    broken
+                        .push(("puts states back", format!("device {place}: {before:?} became {after:?}: {remarks}")));
                 }
             }
         }
@@ -254,7 +284,12 @@ fn put_back(spec: &Spec, run: &mut Run, after: &[Holds], broken: &mut Vec<Broken
 fn heartbeats(run: &Run, before: &Holds) -> bool {
     run.bus.bus.inner().stations::<Unruly>().any(|unruly| {
         holds(&unruly.device).node == before.node
-            && unruly.sent.iter().filter(|(_, frame)| frame.id().heartbeat_node().map(NodeId::get) == before.node).count() > 1
+            && unruly
+                .sent
+                .iter()
+                .filter(|(_, frame)| frame.id().heartbeat_node().map(NodeId::get) == before.node)
+                .count()
+                > 1
     })
 }
 
@@ -286,7 +321,9 @@ fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
             Fault::Down { at_us, .. } => Some(*at_us),
             _ => None,
         });
-        if down_at.min() == Some(0) || spec.faults.len() == 1 && !matches!(failure.kind, Kind::Usage | Kind::Refused) && quiet(spec) {
+        if down_at.min() == Some(0)
+            || spec.faults.len() == 1 && !matches!(failure.kind, Kind::Usage | Kind::Refused) && quiet(spec)
+        {
             broken.push(("names the cause", format!("the interface was down: {}", told())));
         }
     }
@@ -309,7 +346,9 @@ fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     if failure.kind == Kind::Unexpected && !may_be_odd(spec, &failure.message) {
         broken.push(("names the cause", format!("nothing is odd: {}", told())));
     }
-    if failure.kind == Kind::Refused && matches!(spec.command, Command::Scan { .. } | Command::Info { .. } | Command::Nmt { .. }) {
+    if failure.kind == Kind::Refused
+        && matches!(spec.command, Command::Scan { .. } | Command::Info { .. } | Command::Nmt { .. })
+    {
         broken.push(("names the cause", format!("nobody refuses: {}", told())));
     }
 }
@@ -326,20 +365,36 @@ fn all_there(spec: &Spec) -> bool {
 /// TPDOs that wait for something bring no rows; a device with a long latency is silent at a short time-out.
 fn may_be_silent(spec: &Spec) -> bool {
     matches!(spec.command, Command::Log { .. })
+        // Its table of bit rates has not that of this bus, and what it stores is that it works at another one.
+        || matches!(spec.command, Command::Store { .. }) && spec.devices.iter().any(|device| device.kind == "baumer")
         || spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
 }
 
 fn may_be_odd(spec: &Spec, message: &str) -> bool {
     // Devices that have no measured value, no such object; what a description does not know.
     matches!(spec.devices.len(), 0)
-        || ["it has no", "no source", "no object", "tells no", "no measured", "has no", "multiplexed", "not known"].iter().any(|part| message.contains(part))
+        || [
+            "it has no",
+            "no source",
+            "no object",
+            "tells no",
+            "no measured",
+            "has no",
+            "multiplexed",
+            "not known",
+            "it keeps no",
+        ]
+        .iter()
+        .any(|part| message.contains(part))
+        || matches!(spec.command, Command::Assign { store: false, via: Via::Sdo, .. })
+            && message.contains("it has been reset and is still")
         || is_lss(&spec.command) && spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
 }
 
 /// Every row is a value that was sent; none twice, none invented.
 fn rows(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     let Command::Log { poll_ms, count, .. } = &spec.command else { return };
-    if spec.lies() {
+    if spec.lies() || spec.shares_node_ids() {
         return;
     }
     if poll_ms.is_some() {
@@ -356,7 +411,14 @@ fn rows(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
         return;
     }
     let late = spec.faults.iter().any(|fault| matches!(fault, Fault::Delay(..)));
-    let key = |row: &str| if late { row.split_once(',').map_or("", |(_, rest)| rest).to_owned() } else { row.to_owned() };
+    // What was not to be read is not known: a unit, and the digits with it.
+    let refuses = spec.vagaries().any(|vagary| matches!(vagary, Vagary::Refuse { .. }));
+    let key = |row: &str| {
+        let cells: Vec<&str> = row.split(',').collect();
+        let time = if late { "" } else { cells[0] };
+        let rest = if refuses { [cells[1], cells[6]].join(",") } else { cells[1..].join(",") };
+        format!("{time},{rest}")
+    };
     let mut left: BTreeMap<String, usize> = BTreeMap::new();
     run.truth.iter().for_each(|row| *left.entry(key(row)).or_default() += 1);
     let mut twice = spec.faults.iter().filter(|fault| matches!(fault, Fault::Duplicate(_))).count() * 8;
@@ -451,7 +513,9 @@ fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], broken: &mut
                 }
             }
         }
-        (Said::States(states), command) if !spec.is_meddled_with() && !spec.lies() && !spec.is_disordered() && !spec.shares_node_ids() => {
+        (Said::States(states), command)
+            if !spec.is_meddled_with() && !spec.lies() && !spec.is_disordered() && !spec.shares_node_ids() =>
+        {
             let hangs = spec.vagaries().any(|vagary| matches!(vagary, Vagary::Hang { .. } | Vagary::Lose { .. }));
             // What proves that a node is stopped is that it is silent, and so is one that is deaf.
             let stops = matches!(command, Command::Nmt { what, .. } if what.target() == NmtState::Stopped);
@@ -475,9 +539,12 @@ fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], broken: &mut
                 }
             }
         }
+        // Another bit rate comes into force with power, and so does what was set with it.
+        (Said::Assigned { rate: Some(_), retimed: false, .. }, _) => {}
         (Said::Assigned { new, stored, rate, .. }, Command::Assign { id, .. }) => {
             // Who was given another node-ID by somebody else's reset is none of this command's business.
-            let meant: Vec<&Holds> = after.iter().enumerate().filter(|(place, _)| is_meant(spec, *place)).map(|(_, holds)| holds).collect();
+            let meant: Vec<&Holds> =
+                after.iter().enumerate().filter(|(place, _)| is_meant(spec, *place)).map(|(_, holds)| holds).collect();
             let wanted = id.or(rate.is_none().then_some(9));
             let right = |holds: &&Holds| {
                 (wanted.is_none() || holds.node == wanted && *new == wanted)
@@ -488,7 +555,9 @@ fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], broken: &mut
                 broken.push(("holds what was asked", format!("{said:?}, and it is {meant:?}")));
             }
         }
-        (Said::Mapped(settings), Command::Map { node, .. }) if !spec.is_meddled_with() && !spec.lies() && !spec.shares_node_ids() => {
+        (Said::Mapped(settings), Command::Map { node, .. })
+            if !spec.is_meddled_with() && !spec.lies() && !spec.shares_node_ids() =>
+        {
             for unruly in run.bus.bus.inner_mut().stations_mut::<Unruly>() {
                 if spec.devices[unruly.place].node == Some(*node)
                     && let Some(difference) = mapped_otherwise(unruly, settings, settled)
@@ -514,6 +583,33 @@ fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], broken: &mut
     }
 }
 
+/// What acts is sent once, and a command that says it acted has reached the device.
+fn signatures(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
+    let mut sent: BTreeMap<(u8, ObjectId), u32> = BTreeMap::new();
+    for (_, frame) in run.bus.all_sent() {
+        if let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.all_eight())
+            && data[0] >> 5 == 1
+            && is_signature(&data[4..8])
+        {
+            *sent.entry((node.get(), ObjectId::from_multiplexer([data[1], data[2], data[3]]))).or_default() += 1;
+        }
+    }
+    if let Some((what, times)) = sent.iter().find(|(_, times)| **times > 1) {
+        broken.push(("signs once", format!("{what:?} {times} times")));
+    }
+    let acts = matches!(
+        spec.command,
+        Command::Minmax { .. }
+            | Command::Autozero { dry_run: false, .. }
+            | Command::Store { .. }
+            | Command::Restore { .. }
+    );
+    let mut devices = run.bus.bus.inner().stations::<Unruly>();
+    if acts && run.result.is_ok() && !spec.lies() && !devices.any(|unruly| !unruly.signed.is_empty()) {
+        broken.push(("holds what was asked", "no signature reached the device".to_owned()));
+    }
+}
+
 /// Whether a device keeps the serial number that it was given.
 fn has_serial(spec: &Spec, node: u8) -> bool {
     let device = spec.devices.iter().find(|device| device.node == Some(node));
@@ -525,7 +621,8 @@ fn becomes_another(spec: &Spec, node: u8, object: ObjectId) -> bool {
     let device = spec.devices.iter().find(|device| device.node == Some(node));
     let model = device.and_then(|device| cangauge::device::catalog::by_name(device.kind));
     let described = model.as_ref().and_then(|model| model.description.object(object));
-    described.is_none() || object.index & 0x0fff == 0x1a0
+    // MH-4: 0 brings back the identifier as delivered.
+    described.is_none() || object.index & 0x0fff == 0x1a0 || object.index == 0x1014
 }
 
 fn number(bytes: &[u8]) -> u32 {
@@ -577,7 +674,8 @@ fn last_writes(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
             }
             let found = unruly.device.value(*object, settled);
             if found.as_ref().is_some_and(|found| found != bytes) {
-                broken.push(("holds what was written", format!("node {node} {object}: {found:02X?}, not {bytes:02X?}")));
+                broken
+                    .push(("holds what was written", format!("node {node} {object}: {found:02X?}, not {bytes:02X?}")));
             }
         }
     }
@@ -598,7 +696,9 @@ fn after_power(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
             }
         }
         Ok(Said::Mapped(settings)) if !spec.lies() && !spec.is_meddled_with() && !spec.shares_node_ids() => {
-            if let Command::Map { node, keep: true, .. } = &spec.command {
+            // What a device is and keeps is known of one that tells its identity.
+            let tells = !spec.vagaries().any(|vagary| matches!(vagary, Vagary::Refuse { .. }));
+            if let (Command::Map { node, keep: true, .. }, true) = (&spec.command, tells) {
                 for unruly in bus.stations_mut::<Unruly>() {
                     if spec.devices[unruly.place].node == Some(*node)
                         && let Some(difference) = mapped_otherwise(unruly, settings, settled)

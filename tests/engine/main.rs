@@ -40,8 +40,11 @@ fn asked<T: std::str::FromStr>(name: &str) -> Option<T> {
 fn try_out(spec: &Spec) -> (Vec<Broken>, String) {
     let tried = catch_unwind(AssertUnwindSafe(|| {
         let mut run = run::run(spec);
+        let end = format!("{:?} at {:?}\n", run.result, run.ended.since_start());
+        let devices = run.bus.bus.inner().stations::<station::Unruly>();
+        let devices: Vec<_> = devices.map(|unruly| run::holds(&unruly.device)).collect();
+        let end = end + &format!("before {:?}\nafter {devices:?}", run.before);
         let broken = judge(spec, &mut run);
-        let end = format!("{:?} at {:?}", run.result, run.ended.since_start());
         (broken, run::transcript(&run) + &end)
     }));
     tried.unwrap_or_else(|panic| {

@@ -40,12 +40,22 @@ pub(crate) enum Said {
     Values(Vec<(u8, ObjectId, Vec<u8>)>),
     States(Vec<(u8, Option<NmtState>)>),
     Probed(Option<NmtState>, bool),
-    Assigned { new: Option<u8>, stored: bool, rate: Option<Option<u32>>, retimed: bool },
+    Assigned {
+        new: Option<u8>,
+        stored: bool,
+        rate: Option<Option<u32>>,
+        retimed: bool,
+    },
     Mapped(Settings),
     Stored(bool),
-    Zeroed { stored: bool },
+    Zeroed {
+        stored: bool,
+    },
     /// Whether it recorded to its end, and its remarks.
-    Logged { rows: u64, remarks: Vec<String> },
+    Logged {
+        rows: u64,
+        remarks: Vec<String>,
+    },
 }
 
 /// What a device holds.
@@ -396,13 +406,22 @@ fn carry_out(master: &mut Master<'_>, spec: &Spec, rows: &mut Rows) -> Result<Sa
         Command::Unit { node: id, signal, unit: code } => {
             let mut device = settings::Device::open(master, node(*id), &none)?;
             unit::set(master, &mut device, *signal, Unit(*code))?;
-            let signal = device.signal(*signal).ok().map(|signal| signal.channel);
-            let object = ObjectId::new(0x6131, signal.unwrap_or(1));
-            Said::Values(vec![(*id, object, code.to_le_bytes().to_vec())])
+            match device.signal(*signal) {
+                Ok(signal) => {
+                    let object = ObjectId::new(0x6131, signal.channel);
+                    Said::Values(vec![(*id, object, code.to_le_bytes().to_vec())])
+                }
+                Err(_) => Said::Nothing,
+            }
         }
         Command::Filter { node: id, kind, constant } => {
             let device = settings::Device::open(master, node(*id), &none)?;
-            let kinds = [None, Some(filter::FilterType::None), Some(filter::FilterType::Moving), Some(filter::FilterType::Repeating)];
+            let kinds = [
+                None,
+                Some(filter::FilterType::None),
+                Some(filter::FilterType::Moving),
+                Some(filter::FilterType::Repeating),
+            ];
             let kind = kinds[usize::from(*kind)];
             filter::set(master, &device, None, filter::Wanted { kind, constant: *constant, damping: None })?;
             Said::Nothing
@@ -468,4 +487,3 @@ pub(crate) fn transcript(run: &Run) -> String {
     };
     run.bus.frames.iter().map(line).collect()
 }
-

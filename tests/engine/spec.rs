@@ -44,17 +44,39 @@ pub(crate) struct DeviceSpec {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Vagary {
     /// Its power fails for a moment.
-    ResetAt { ms: u64 },
-    Hang { from_ms: u64, for_ms: u64 },
+    ResetAt {
+        ms: u64,
+    },
+    Hang {
+        from_ms: u64,
+        for_ms: u64,
+    },
     /// Every SDO request for this index is refused.
-    Refuse { index: u16, code: u32 },
+    Refuse {
+        index: u16,
+        code: u32,
+    },
     /// The n-th SDO answer never comes.
-    Lose { nth: u64 },
-    Late { nth: u64, ms: u64 },
-    Twice { nth: u64 },
-    Garbled { nth: u64, place: usize, turned: u8 },
+    Lose {
+        nth: u64,
+    },
+    Late {
+        nth: u64,
+        ms: u64,
+    },
+    Twice {
+        nth: u64,
+    },
+    Garbled {
+        nth: u64,
+        place: usize,
+        turned: u8,
+    },
     /// The n-th SDO answer comes under another node-ID.
-    As { nth: u64, node: u8 },
+    As {
+        nth: u64,
+        node: u8,
+    },
     LoseLss(u8),
     LateLss(u8, u64),
     RefuseLss(u8),
@@ -103,42 +125,125 @@ pub(crate) enum Target {
 
 #[derive(Clone, Debug)]
 pub(crate) enum Command {
-    Scan { nodes: Vec<u8> },
-    Read { nodes: Vec<u8> },
-    Info { node: u8 },
-    PdoShow { node: u8 },
-    SdoRead { node: u8, object: ObjectId },
-    SdoWrite { node: u8, object: ObjectId, bytes: Vec<u8> },
-    Nmt { what: NmtCommand, nodes: Vec<u8>, all: bool },
-    NmtState { nodes: Vec<u8> },
-    NmtProbe { node: u8 },
-    Startup { node: u8, auto: bool },
+    Scan {
+        nodes: Vec<u8>,
+    },
+    Read {
+        nodes: Vec<u8>,
+    },
+    Info {
+        node: u8,
+    },
+    PdoShow {
+        node: u8,
+    },
+    SdoRead {
+        node: u8,
+        object: ObjectId,
+    },
+    SdoWrite {
+        node: u8,
+        object: ObjectId,
+        bytes: Vec<u8>,
+    },
+    Nmt {
+        what: NmtCommand,
+        nodes: Vec<u8>,
+        all: bool,
+    },
+    NmtState {
+        nodes: Vec<u8>,
+    },
+    NmtProbe {
+        node: u8,
+    },
+    Startup {
+        node: u8,
+        auto: bool,
+    },
     LssScan,
-    LssInquire { target: Target },
-    LssStore { target: Target },
-    Assign { target: Target, id: Option<u8>, rate: Option<u32>, store: bool, retime: bool, via: Via },
-    Map { node: u8, number: u16, items: Vec<&'static str>, code: Option<u8>, timer_ms: Option<u16>, cob_id: Option<u16>, keep: bool },
-    Autozero { node: u8, channel: Option<u8>, force: bool, store: bool, dry_run: bool },
-    Store { node: u8, group: u8, verify: bool },
-    Restore { node: u8, group: u8, reset: bool },
-    Unit { node: u8, signal: Option<&'static str>, unit: u32 },
-    Filter { node: u8, kind: u8, constant: Option<u16> },
-    Limits { node: u8, lower: f64, upper: f64 },
-    Errors { node: u8, clear: bool },
-    Minmax { node: u8 },
-    Log { nodes: Vec<u8>, sync_ms: Option<u64>, poll_ms: Option<u64>, duration_ms: u64, count: Option<u64>, nmt: bool },
+    LssInquire {
+        target: Target,
+    },
+    LssStore {
+        target: Target,
+    },
+    Assign {
+        target: Target,
+        id: Option<u8>,
+        rate: Option<u32>,
+        store: bool,
+        retime: bool,
+        via: Via,
+    },
+    Map {
+        node: u8,
+        number: u16,
+        items: Vec<&'static str>,
+        code: Option<u8>,
+        timer_ms: Option<u16>,
+        cob_id: Option<u16>,
+        keep: bool,
+    },
+    Autozero {
+        node: u8,
+        channel: Option<u8>,
+        force: bool,
+        store: bool,
+        dry_run: bool,
+    },
+    Store {
+        node: u8,
+        group: u8,
+        verify: bool,
+    },
+    Restore {
+        node: u8,
+        group: u8,
+        reset: bool,
+    },
+    Unit {
+        node: u8,
+        signal: Option<&'static str>,
+        unit: u32,
+    },
+    Filter {
+        node: u8,
+        kind: u8,
+        constant: Option<u16>,
+    },
+    Limits {
+        node: u8,
+        lower: f64,
+        upper: f64,
+    },
+    Errors {
+        node: u8,
+        clear: bool,
+    },
+    Minmax {
+        node: u8,
+    },
+    Log {
+        nodes: Vec<u8>,
+        sync_ms: Option<u64>,
+        poll_ms: Option<u64>,
+        duration_ms: u64,
+        count: Option<u64>,
+        nmt: bool,
+    },
 }
 
-const KINDS: [&str; 13] = [
-    "mh4", "mh4", "mh4", "d20", "d20", "mc1609", "mc1609", "dps", "dps", "hydac", "jumo", "baumer", "hydac-old",
-];
+const KINDS: [&str; 13] =
+    ["mh4", "mh4", "mh4", "d20", "d20", "mc1609", "mc1609", "dps", "dps", "hydac", "jumo", "baumer", "hydac-old"];
 const RATES: [u32; 4] = [125_000, 250_000, 500_000, 1_000_000];
 const ABORTS: [u32; 6] = [0x0800_0000, 0x0602_0000, 0x0609_0011, 0x0601_0002, 0x0800_0022, 0x0606_0000];
 
 impl Spec {
     pub(crate) fn of(seed: u64) -> Spec {
         let random = &mut Random::new(seed);
-        let mut devices: Vec<DeviceSpec> = (0..*random.pick(&[1, 1, 2, 2, 3, 5])).map(|at| device(random, at)).collect();
+        let mut devices: Vec<DeviceSpec> =
+            (0..*random.pick(&[1, 1, 2, 2, 3, 5])).map(|at| device(random, at)).collect();
         let last = devices.len() - 1;
         if last > 0 && random.percent(6) {
             devices[last].node = devices[0].node;
@@ -205,10 +310,13 @@ impl Spec {
     }
 
     pub(crate) fn acts(&self) -> impl Iterator<Item = &Act> {
-        self.others.iter().flat_map(|other| match other {
-            Other::Master { plan } => plan.as_slice(),
-            Other::Babbler { .. } => &[],
-        }).map(|(_, act)| act)
+        self.others
+            .iter()
+            .flat_map(|other| match other {
+                Other::Master { plan } => plan.as_slice(),
+                Other::Babbler { .. } => &[],
+            })
+            .map(|(_, act)| act)
     }
 
     /// Whether anybody but the program changes what a device holds or does.
@@ -225,7 +333,9 @@ impl Spec {
     /// Frames come late, twice or in another order.
     pub(crate) fn is_disordered(&self) -> bool {
         self.faults.iter().any(|fault| matches!(fault, Fault::Duplicate(_) | Fault::Delay(..)))
-            || self.vagaries().any(|vagary| matches!(vagary, Vagary::Late { .. } | Vagary::Twice { .. } | Vagary::LateLss(..)))
+            || self
+                .vagaries()
+                .any(|vagary| matches!(vagary, Vagary::Late { .. } | Vagary::Twice { .. } | Vagary::LateLss(..)))
     }
 
     pub(crate) fn loses_sent(&self) -> bool {
@@ -352,7 +462,8 @@ fn vagary(random: &mut Random) -> Vagary {
         0 => Vagary::ResetAt { ms: when(random) / 1000 },
         1 => Vagary::Hang { from_ms: when(random) / 1000, for_ms: *random.pick(&[20, 200, 2_000, 1_000_000]) },
         2 | 3 => {
-            let index = [0x1000, 0x1017, 0x1018, 0x1008, 0x1010, 0x1011, 0x1800, 0x1a00, 0x6125, 0x6131, 0x61a0, 0x2320];
+            let index =
+                [0x1000, 0x1017, 0x1018, 0x1008, 0x1010, 0x1011, 0x1800, 0x1a00, 0x6125, 0x6131, 0x61a0, 0x2320];
             Vagary::Refuse { index: *random.pick(&index), code: *random.pick(&ABORTS) }
         }
         4 | 5 => Vagary::Lose { nth },
@@ -361,7 +472,9 @@ fn vagary(random: &mut Random) -> Vagary {
         8 => Vagary::Garbled { nth, place: usize::from(random.byte(0..=7)), turned: random.byte(1..=255) },
         9 => Vagary::As { nth, node: *random.pick(&[1, 5, 12, 16, 127]) },
         10 => Vagary::LoseLss(*random.pick(&[0x11, 0x13, 0x17, 0x43, 0x4b, 0x5e, 0x5a])),
-        11 => Vagary::LateLss(*random.pick(&[0x11, 0x13, 0x17, 0x43, 0x5e]), *random.pick(&[60, 300, 700, 2_500, 4_000])),
+        11 => {
+            Vagary::LateLss(*random.pick(&[0x11, 0x13, 0x17, 0x43, 0x5e]), *random.pick(&[60, 300, 700, 2_500, 4_000]))
+        }
         12 => Vagary::RefuseLss(*random.pick(&[0x11, 0x13, 0x17])),
         _ if random.percent(50) => Vagary::GoneAfterReset,
         _ => Vagary::ScansForEver,
@@ -370,11 +483,14 @@ fn vagary(random: &mut Random) -> Vagary {
 
 fn act(random: &mut Random, devices: &[DeviceSpec]) -> Act {
     let node = random.pick(devices).node.unwrap_or(5);
-    let (index, sub) = *random.pick(&[(0x1000, 0), (0x1008, 0), (0x1017, 0), (0x1018, 4), (0x6130, 1), (0x1a00, 0), (0x100a, 0)]);
+    let (index, sub) =
+        *random.pick(&[(0x1000, 0), (0x1008, 0), (0x1017, 0), (0x1018, 4), (0x6130, 1), (0x1a00, 0), (0x100a, 0)]);
     match random.within(0..=9) {
         0..=5 => Act::Read { node, index, sub },
         6 | 7 => Act::Write { node, index: 0x1017, sub: 0, value: *random.pick(&[0, 77, 500]), bytes: 2 },
-        _ => Act::Nmt { specifier: *random.pick(&[0x01, 0x02, 0x80, 0x81, 0x82]), node: *random.pick(&[node, node, 0]) },
+        _ => {
+            Act::Nmt { specifier: *random.pick(&[0x01, 0x02, 0x80, 0x81, 0x82]), node: *random.pick(&[node, node, 0]) }
+        }
     }
 }
 
@@ -456,10 +572,12 @@ fn command(random: &mut Random, devices: &[DeviceSpec]) -> Command {
         12 => Command::NmtState { nodes: nodes(random, devices) },
         13 => Command::NmtProbe { node: one },
         14 => Command::Startup { node: one, auto: random.percent(50) },
-        15 if random.percent(30) => Command::LssScan,
-        15 => Command::LssInquire { target: target(random, devices) },
-        16 => Command::LssStore { target: target(random, devices) },
-        17..=19 => Command::Assign {
+        // What asks all 127 takes its time.
+        15 if random.percent(15) => Command::LssScan,
+        15 if random.percent(40) => Command::LssInquire { target: target(random, devices) },
+        15 => Command::LssStore { target: target(random, devices) },
+        16 => Command::SdoRead { node: one, object: ObjectId::new(0x1008, 0) },
+        17 | 18 => Command::Assign {
             target: target(random, devices),
             id: random.percent(85).then(|| *random.pick(&[1, 2, 5, 12, 16, 55, 127])),
             rate: random.percent(25).then(|| *random.pick(&RATES)),
@@ -467,11 +585,18 @@ fn command(random: &mut Random, devices: &[DeviceSpec]) -> Command {
             retime: random.percent(10),
             via: *random.pick(&[Via::Auto, Via::Auto, Via::Lss, Via::Sdo]),
         },
-        20..=22 => Command::Map {
+        19..=22 => Command::Map {
             node: one,
             number: *random.pick(&[1, 1, 2, 3]),
             items: random
-                .pick(&[&[][..], &["pressure"], &["pressure", "temperature"], &["ch1"], &["ch3", "ch1"], &["pressure.status"]])
+                .pick(&[
+                    &[][..],
+                    &["pressure"],
+                    &["pressure", "temperature"],
+                    &["ch1"],
+                    &["ch3", "ch1"],
+                    &["pressure.status"],
+                ])
                 .to_vec(),
             code: random.percent(60).then(|| *random.pick(&[1, 2, 240, 254, 255])),
             timer_ms: random.percent(50).then(|| *random.pick(&[0, 10, 100, 1000])),
@@ -492,8 +617,16 @@ fn command(random: &mut Random, devices: &[DeviceSpec]) -> Command {
             signal: *random.pick(&[None, Some("pressure"), Some("temperature"), Some("ch1")]),
             unit: *random.pick(&[0x00ab_0000, 0x004e_0000, 0x0622_0000, 0x002d_0000, 0x00ac_0000]),
         },
-        28 => Command::Filter { node: one, kind: random.byte(0..=3), constant: random.percent(60).then(|| *random.pick(&[1, 8, 50])) },
-        29 => Command::Limits { node: one, lower: *random.pick(&[0.0, 1.5, -3.0]), upper: *random.pick(&[2.0, 9.0, 40.0]) },
+        28 => Command::Filter {
+            node: one,
+            kind: random.byte(0..=3),
+            constant: random.percent(60).then(|| *random.pick(&[1, 8, 50])),
+        },
+        29 => Command::Limits {
+            node: one,
+            lower: *random.pick(&[0.0, 1.5, -3.0]),
+            upper: *random.pick(&[2.0, 9.0, 40.0]),
+        },
         30 => Command::Errors { node: one, clear: random.percent(60) },
         31 => Command::Minmax { node: one },
         _ => {

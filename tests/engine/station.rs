@@ -8,6 +8,7 @@ use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
 use cangauge::sim::{Device, State};
+use cangauge::tasks::sdo::is_signature;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
@@ -23,12 +24,16 @@ pub(crate) struct Unruly {
     vagaries: Vec<Vagary>,
     resets: VecDeque<Mono>,
     hangs: Vec<(Mono, Mono)>,
+    /// It was to be woken and is not before then.
+    hung_until: Mono,
     /// SDO answers so far.
     answers: u64,
     late: Vec<(Mono, Frame)>,
     unsaved: Option<Frame>,
     /// Everything that it sent, when it was complete.
     pub(crate) sent: Vec<(Mono, Frame)>,
+    /// Signatures that reached it.
+    pub(crate) signed: Vec<ObjectId>,
     /// Every data byte sequence that it held in the object of interest.
     pub(crate) watched: Option<ObjectId>,
     pub(crate) held: BTreeSet<Vec<u8>>,
@@ -52,10 +57,12 @@ impl Unruly {
             vagaries: vagaries.to_vec(),
             resets: resets.into(),
             hangs,
+            hung_until: Mono::START,
             answers: 0,
             late: Vec::new(),
             unsaved,
             sent: Vec::new(),
+            signed: Vec::new(),
             watched: None,
             held: BTreeSet::new(),
         }
@@ -67,6 +74,7 @@ impl Unruly {
         self.resets.clear();
         self.hangs.clear();
         self.late.clear();
+        self.hung_until = Mono::START;
     }
 
     fn hung_until(&self, now: Mono) -> Option<Mono> {
@@ -144,7 +152,9 @@ impl Unruly {
         let node = self.device.node()?;
         let data = frame.all_eight().filter(|_| frame.id() == CanId::sdo_request(node))?;
         let index = u16::from_le_bytes([data[1], data[2]]);
-        let begins = matches!(data[0] >> 5, 1 | 2) || data[0] >> 5 == 6 && data[0] & 1 == 0 || data[0] >> 5 == 5 && data[0] & 3 == 0;
+        let begins = matches!(data[0] >> 5, 1 | 2)
+            || data[0] >> 5 == 6 && data[0] & 1 == 0
+            || data[0] >> 5 == 5 && data[0] & 3 == 0;
         let code = self.vagaries.iter().find_map(|vagary| match vagary {
             Vagary::Refuse { index: refused, code } if *refused == index && begins => Some(code.to_le_bytes()),
             _ => None,
@@ -167,6 +177,13 @@ impl Station for Unruly {
         if self.hung_until(now).is_some() {
             return;
         }
+        if let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.all_eight())
+            && self.device.node() == Some(node)
+            && data[0] >> 5 == 1
+            && is_signature(&data[4..])
+        {
+            self.signed.push(ObjectId::from_multiplexer([data[1], data[2], data[3]]));
+        }
         match self.refusal(frame) {
             Some(refusal) if self.device.state().is_some_and(|state| state != State::Stopped) => out.send(refusal),
             _ => self.act(now, out, |device, out| device.receive(now, frame, out)),
@@ -180,7 +197,8 @@ impl Station for Unruly {
             self.act(now, out, |device, out| device.power_on(now, out));
             return;
         }
-        if self.hung_until(now).is_some() {
+        if let Some(until) = self.hung_until(now) {
+            self.hung_until = until;
             return;
         }
         for (_, frame) in self.late.extract_if(.., |(due, _)| *due <= now) {
@@ -192,12 +210,10 @@ impl Station for Unruly {
     }
 
     fn next_wake(&self) -> Option<Mono> {
-        let own = self.device.next_wake();
-        let hung = self.hangs.iter().find(|(from, until)| own.is_some_and(|own| *from <= own && own < *until));
-        // A device that hangs is not woken before it is over.
-        let own = hung.map_or(own, |(_, until)| Some(*until));
         let late = self.late.iter().map(|(due, _)| *due);
-        late.chain(own).chain(self.resets.front().copied()).min()
+        // A device that hangs is not woken before it is over.
+        let own = late.chain(self.device.next_wake()).min().map(|due| due.max(self.hung_until));
+        own.into_iter().chain(self.resets.front().copied()).min()
     }
 
     fn sent(&mut self, now: Mono, frame: &Frame) {
@@ -323,7 +339,11 @@ impl Station for Babbler {
         if id == 0x7e4 && data.first().is_some_and(|first| *first < 0x80) {
             data[0] = 0xf0;
         }
-        let id = if random.percent(10) && !self.nasty { CanId::extended(0x1800_0000 + u32::from(id)) } else { CanId::standard(id) };
+        let id = if random.percent(10) && !self.nasty {
+            CanId::extended(0x1800_0000 + u32::from(id))
+        } else {
+            CanId::standard(id)
+        };
         if let Some(frame) = id.and_then(|id| Frame::new(id, &data).ok()) {
             out.send(frame);
         }
