@@ -492,10 +492,12 @@ impl Station for Device {
             self.sdo.sent(now);
         }
         let Some(recorder) = &self.recorder else { return };
-        if self.under_way.front().is_some_and(|(sent, _)| sent == frame)
-            && let Some((_, lines)) = self.under_way.pop_front()
-        {
-            lines.iter().for_each(|line| recorder.write(now, line));
+        // What stands before it never got out: a controller that goes off forgets what waits.
+        if let Some(place) = self.under_way.iter().position(|(waiting, _)| waiting == frame) {
+            self.under_way.drain(..place);
+            if let Some((_, lines)) = self.under_way.pop_front() {
+                lines.iter().for_each(|line| recorder.write(now, line));
+            }
         }
     }
 

@@ -419,6 +419,38 @@ fn a_tpdo_that_a_reset_overtakes_is_neither_sent_nor_recorded() {
 }
 
 #[test]
+fn the_record_goes_on_after_a_controller_was_off() {
+    let file = Shared::default();
+    let recorder = Recorder::new(Box::new(file.clone())).expect("memory");
+    let mut setup = still("dps", 33, 17.898);
+    setup.start = true;
+    setup.seed = 1;
+    setup.channels.iter_mut().for_each(|channel| channel.noise = 0.5);
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(Device::new(setup).expect("a device").recording(recorder.clone()));
+    // Who is at another bit rate destroys what is sent, until one controller after the other is off.
+    let mut other = still("mc1609", 11, 1.0);
+    other.bit_rate = Some(500_000);
+    other.set = vec![(id("0x1017"), Scalar::Integer(1000))];
+    bus.attach(Device::new(other).expect("a device"));
+    let mut sent = Vec::new();
+    while let Ok(event) = bus.receive(ms(2000)) {
+        match event {
+            Event::Frame(received) if received.frame.len() == 4 => {
+                sent.push(received.frame.to_string().split_off(4));
+            }
+            Event::Timeout => break,
+            _ => {}
+        }
+    }
+    recorder.flush().expect("memory");
+    let text = String::from_utf8(file.0.lock().expect("not poisoned").clone()).expect("text");
+    let raw: Vec<&str> = text.lines().skip(1).filter_map(|line| line.rsplit_once(",0x")).map(|(_, raw)| raw).collect();
+    assert!(sent.len() > 3 && sent.len() < 18, "some went out, and some did not: {}", sent.len());
+    assert_eq!(raw, sent);
+}
+
+#[test]
 fn turns_do_not_drift_and_are_not_made_up_for() {
     let second = Duration::from_secs(1);
     assert_eq!(next_turn(ms(1000), second, ms(1000)), ms(2000));
