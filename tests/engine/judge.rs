@@ -567,8 +567,9 @@ fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], broken: &mut
             }
         }
         (Said::Nothing, Command::SdoWrite { node, object, bytes }) if !spec.lies() => {
-            let acknowledged_by_others = spec.loses_sent()
-                && spec.acts().any(|act| matches!(act, Act::Write { index, .. } if *index == object.index));
+            // Nothing tells the acknowledge of somebody else's write to the same object from that of ours.
+            let acknowledged_by_others =
+                spec.acts().any(|act| matches!(act, Act::Write { index, .. } if *index == object.index));
             let mut stations = run.bus.bus.inner_mut().stations_mut::<Unruly>();
             let held = stations.any(|unruly| {
                 let there = spec.devices[unruly.place].node == Some(*node);
@@ -585,13 +586,13 @@ fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], broken: &mut
 
 /// What acts is sent once, and a command that says it acted has reached the device.
 fn signatures(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
-    let mut sent: BTreeMap<(u8, ObjectId), u32> = BTreeMap::new();
+    let mut sent: BTreeMap<(u8, [u8; 8]), u32> = BTreeMap::new();
     for (_, frame) in run.bus.all_sent() {
         if let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.all_eight())
             && data[0] >> 5 == 1
             && is_signature(&data[4..8])
         {
-            *sent.entry((node.get(), ObjectId::from_multiplexer([data[1], data[2], data[3]]))).or_default() += 1;
+            *sent.entry((node.get(), data)).or_default() += 1;
         }
     }
     if let Some((what, times)) = sent.iter().find(|(_, times)| **times > 1) {
