@@ -12,6 +12,7 @@
 //! A scenario that breaks a rule is made smaller as long as it still breaks it, and printed with its frames.
 
 mod judge;
+mod make;
 mod random;
 mod run;
 mod spec;
@@ -20,6 +21,7 @@ mod tap;
 
 use judge::{Broken, judge};
 use spec::Spec;
+use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -34,6 +36,11 @@ const MOST: usize = 12;
 fn asked<T: std::str::FromStr>(name: &str) -> Option<T> {
     let text = std::env::var(name).ok()?;
     Some(text.parse().unwrap_or_else(|_| panic!("{name}={text} is no number")))
+}
+
+/// For people who look on; nobody may be there.
+fn say(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{text}");
 }
 
 /// What a scenario breaks, and its transcript.
@@ -83,7 +90,7 @@ fn nothing_that_must_hold_is_ever_broken() {
     if let Some(seed) = asked("ENGINE_SEED") {
         let spec = Spec::of(seed);
         let (broken, transcript) = try_out(&spec);
-        println!("{spec:#?}\n{transcript}");
+        say(&format!("{spec:#?}\n{transcript}"));
         assert!(broken.is_empty(), "{}", report(seed, &broken, true));
         return;
     }
@@ -95,7 +102,7 @@ fn nothing_that_must_hold_is_ever_broken() {
     let until = seconds.map(|seconds| begun + Duration::from_secs(seconds));
     let next = AtomicU64::new(0);
     let failures: Mutex<Vec<(u64, Vec<Broken>)>> = Mutex::new(Vec::new());
-    println!("scenarios from seed {first}");
+    say(&format!("scenarios from seed {first}"));
     let work = || {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
@@ -116,7 +123,7 @@ fn nothing_that_must_hold_is_ever_broken() {
         (0..threads).for_each(|_| drop(scope.spawn(work)));
     });
     let count = next.load(Ordering::Relaxed);
-    println!("{count} scenarios from seed {first} in {:.1} s", begun.elapsed().as_secs_f64());
+    say(&format!("{count} scenarios from seed {first} in {:.1} s", begun.elapsed().as_secs_f64()));
     let failures = failures.into_inner().expect("nobody panicked");
     let brief = asked::<u8>("ENGINE_BRIEF").is_some();
     let reports: String = failures.iter().map(|(seed, broken)| report(*seed, broken, !brief)).collect();

@@ -23,7 +23,7 @@ use cangauge::tasks::lss::{self, Job, LssAddress, Rate};
 use cangauge::tasks::pdo::{self, Item, Send, Settings, Wish};
 use cangauge::tasks::sdo::{Knowledge, Options, SizeMode};
 use cangauge::tasks::settings::{self, errors, filter, info, limits, minmax, unit};
-use cangauge::tasks::store::{Group, Verified};
+use cangauge::tasks::store::Group;
 use cangauge::tasks::{Failure, autozero, nmt, read, restore, scan, sdo, store};
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -39,7 +39,8 @@ pub(crate) enum Said {
     /// Node, object and bytes as they were sent.
     Values(Vec<(u8, ObjectId, Vec<u8>)>),
     States(Vec<(u8, Option<NmtState>)>),
-    Probed(Option<NmtState>, bool),
+    /// Whether all went well.
+    Probed(bool),
     Assigned {
         new: Option<u8>,
         stored: bool,
@@ -47,15 +48,7 @@ pub(crate) enum Said {
         retimed: bool,
     },
     Mapped(Settings),
-    Stored(bool),
-    Zeroed {
-        stored: bool,
-    },
-    /// Whether it recorded to its end, and its remarks.
-    Logged {
-        rows: u64,
-        remarks: Vec<String>,
-    },
+    Stored,
 }
 
 /// What a device holds.
@@ -327,7 +320,7 @@ fn carry_out(master: &mut Master<'_>, spec: &Spec, rows: &mut Rows) -> Result<Sa
         }
         Command::NmtProbe { node: id } => {
             let probed = nmt::probe(master, node(*id))?;
-            Said::Probed(probed.report.state, probed.trouble.is_none())
+            Said::Probed(probed.trouble.is_none())
         }
         Command::Startup { node: id, auto } => {
             let set = if *auto { nmt::Starts::Auto } else { nmt::Starts::Wait };
@@ -365,7 +358,7 @@ fn carry_out(master: &mut Master<'_>, spec: &Spec, rows: &mut Rows) -> Result<Sa
             Said::Assigned {
                 new: report.new.map(NodeId::get),
                 stored: report.stored,
-                rate: report.rate.map(|(bits, _)| bits),
+                rate: report.rate.map(|rate| rate.bits),
                 retimed: report.retimed,
             }
         }
@@ -390,18 +383,18 @@ fn carry_out(master: &mut Master<'_>, spec: &Spec, rows: &mut Rows) -> Result<Sa
                 store: *store,
                 dry_run: *dry_run,
             };
-            let zeroed = autozero::autozero(master, node(*id), &none, &options)?;
-            Said::Zeroed { stored: zeroed.stored }
+            autozero::autozero(master, node(*id), &none, &options)?;
+            Said::Nothing
         }
         Command::Store { node: id, group: number, verify } => {
             let device = store::device(master, node(*id), &none)?;
-            let done = store::store(master, &device, group(*number), *verify)?;
-            Said::Stored(done.verified == Verified::Reset)
+            store::store(master, &device, group(*number), *verify)?;
+            Said::Stored
         }
         Command::Restore { node: id, group: number, reset } => {
             let device = store::device(master, node(*id), &none)?;
-            let done = restore::restore(master, &device, group(*number), *reset)?;
-            Said::Stored(done.verified == Verified::Reset)
+            restore::restore(master, &device, group(*number), *reset)?;
+            Said::Stored
         }
         Command::Unit { node: id, signal, unit: code } => {
             let mut device = settings::Device::open(master, node(*id), &none)?;
@@ -458,12 +451,13 @@ fn carry_out(master: &mut Master<'_>, spec: &Spec, rows: &mut Rows) -> Result<Sa
                 duration: Some(Duration::from_millis(*duration_ms)),
                 count: *count,
                 nmt: *nmt,
+                max_gap: None,
                 overrides: none.clone(),
             };
             let outcome = log(master, &plan, rows)?;
             match outcome.nothing {
                 Some(nothing) => return Err(nothing),
-                None => Said::Logged { rows: outcome.rows, remarks: outcome.remarks },
+                None => Said::Nothing,
             }
         }
     })

@@ -1,0 +1,101 @@
+//! The kind of a failure is its real cause.
+
+use super::*;
+
+/// The kind of a failure is its real cause.
+pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
+    let Err(failure) = &run.result else { return };
+    if run.bus.overran {
+        return;
+    }
+    let told = || format!("{:?}: {failure} (hint: {:?})", failure.kind, failure.hint);
+    let tap = &run.bus;
+    if tap.interrupted && !tap.was_down && !tap.was_off {
+        // What went wrong before the interruption may be the reason.
+        if failure.kind == Kind::Bus {
+            broken.push(("names the cause", format!("interrupted: {}", told())));
+        }
+        let quiet = spec.faults.is_empty() && spec.others.is_empty() && spec.vagaries().next().is_none();
+        if quiet && failure.kind == Kind::NoAnswer && all_there(spec) {
+            broken.push(("names the cause", format!("interrupted: {}", told())));
+        }
+        return;
+    }
+    if failure.kind == Kind::Interrupted && !tap.interrupted {
+        broken.push(("names the cause", format!("nobody interrupted: {}", told())));
+    }
+    if tap.was_down && !tap.interrupted && !matches!(spec.command, Command::Log { .. }) && failure.kind != Kind::Bus {
+        // It may have failed before.
+        let down_at = spec.faults.iter().filter_map(|fault| match fault {
+            Fault::Down { at_us, .. } => Some(*at_us),
+            _ => None,
+        });
+        if down_at.min() == Some(0)
+            || spec.faults.len() == 1 && !matches!(failure.kind, Kind::Usage | Kind::Refused) && quiet(spec)
+        {
+            broken.push(("names the cause", format!("the interface was down: {}", told())));
+        }
+    }
+    let bus_is_well = spec.faults.iter().all(|fault| !matches!(fault, Fault::Down { .. } | Fault::BusOff { .. }));
+    if failure.kind == Kind::Bus && bus_is_well && spec.devices.iter().all(|device| device.bit_rate.is_none()) {
+        let sharing = spec.shares_node_ids() || !spec.others.is_empty();
+        let answered = run.bus.frames.iter().any(|(_, passed)| matches!(passed, crate::tap::Passed::Received(_)));
+        let retimes = matches!(spec.command, Command::Assign { rate: Some(_), .. });
+        if answered && !sharing && !retimes && !spec.vagaries().any(|vagary| matches!(vagary, Vagary::Hang { .. })) {
+            broken.push(("names the cause", format!("the bus works: {}", told())));
+        }
+    }
+    if !spec.is_clean() {
+        return;
+    }
+    // Nothing is wrong: who is there answers, and breaks no rule.
+    if failure.kind == Kind::NoAnswer && all_there(spec) && !may_be_silent(spec) {
+        broken.push(("names the cause", format!("everybody answers: {}", told())));
+    }
+    if failure.kind == Kind::Unexpected && !may_be_odd(spec, &failure.message) {
+        broken.push(("names the cause", format!("nothing is odd: {}", told())));
+    }
+    if failure.kind == Kind::Refused
+        && matches!(spec.command, Command::Scan { .. } | Command::Info { .. } | Command::Nmt { .. })
+    {
+        broken.push(("names the cause", format!("nobody refuses: {}", told())));
+    }
+}
+
+fn quiet(spec: &Spec) -> bool {
+    spec.others.is_empty() && spec.vagaries().next().is_none() && all_there(spec) && spec.is_clean_but_for_faults()
+}
+
+fn all_there(spec: &Spec) -> bool {
+    let there: BTreeSet<u8> = spec.devices.iter().filter_map(|device| device.node).collect();
+    !is_lss(&spec.command) && named(spec).is_subset(&there)
+}
+
+/// TPDOs that wait for something bring no rows; a device with a long latency is silent at a short time-out.
+fn may_be_silent(spec: &Spec) -> bool {
+    matches!(spec.command, Command::Log { .. })
+        // Its table of bit rates has not that of this bus, and what it stores is that it works at another one.
+        || matches!(spec.command, Command::Store { .. }) && spec.devices.iter().any(|device| device.kind == "baumer")
+        || spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
+}
+
+fn may_be_odd(spec: &Spec, message: &str) -> bool {
+    // Devices that have no measured value, no such object; what a description does not know.
+    matches!(spec.devices.len(), 0)
+        || [
+            "it has no",
+            "no source",
+            "no object",
+            "tells no",
+            "no measured",
+            "has no",
+            "multiplexed",
+            "not known",
+            "it keeps no",
+        ]
+        .iter()
+        .any(|part| message.contains(part))
+        || matches!(spec.command, Command::Assign { store: false, via: Via::Sdo, .. })
+            && message.contains("it has been reset and is still")
+        || is_lss(&spec.command) && spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
+}

@@ -1,0 +1,256 @@
+//! What a command that ended well says is true, and lasts where it says so.
+
+use super::rows::answers;
+use super::*;
+
+/// What a command that ended well says is true.
+pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], broken: &mut Vec<Broken>) {
+    let settled = run.settled;
+    match (said, &spec.command) {
+        (Said::Found(found), _) if !spec.lies() && !spec.shares_node_ids() => {
+            let there: BTreeMap<u8, u32> =
+                spec.devices.iter().filter_map(|device| Some((device.node?, device.serial))).collect();
+            for (node, serial) in found {
+                match (there.get(node), serial) {
+                    (None, _) => broken.push(("finds who is there", format!("nobody has node {node}"))),
+                    (Some(right), Some(serial)) if right != serial && has_serial(spec, *node) => {
+                        broken.push(("finds who is there", format!("node {node} is {right}, not {serial}")));
+                    }
+                    _ => {}
+                }
+            }
+            if let Command::Scan { nodes } = &spec.command
+                && spec.is_clean()
+                && spec.timeout_ms >= 100
+            {
+                let expected = nodes.iter().filter(|node| there.contains_key(node)).count();
+                if expected != found.len() {
+                    broken.push(("finds who is there", format!("{found:?} of {there:?}")));
+                }
+            }
+        }
+        (Said::Values(values), _) if !spec.lies() => {
+            let sent = answers(run);
+            for (node, object, raw) in values {
+                let expedited = sent.get(&(*node, *object)).is_some_and(|all| all.contains(raw));
+                let mut holders = run.bus.bus.inner_mut().stations_mut::<Unruly>();
+                let held = holders.any(|unruly| {
+                    let value = unruly.device.value(*object, settled);
+                    value.is_some_and(|value| value == *raw || value.starts_with(raw) && !raw.is_empty())
+                });
+                if !expedited && !held {
+                    broken.push(("reads what is there", format!("node {node} {object}: {raw:02X?}")));
+                }
+            }
+        }
+        (Said::States(states), command)
+            if !spec.is_meddled_with() && !spec.lies() && !spec.is_disordered() && !spec.shares_node_ids() =>
+        {
+            let hangs = spec.vagaries().any(|vagary| matches!(vagary, Vagary::Hang { .. } | Vagary::Lose { .. }));
+            // What proves that a node is stopped is that it is silent, and so is one that is deaf.
+            let stops = matches!(command, Command::Nmt { what, .. } if what.target() == NmtState::Stopped);
+            let fails = !spec.faults.is_empty() || hangs || run.before.iter().any(|holds| holds.bit_rate.is_some());
+            for (node, state) in states {
+                let Some(state) = state else { continue };
+                if stops && fails {
+                    continue;
+                }
+                let really = after.iter().find(|holds| holds.node == Some(*node)).and_then(|holds| holds.state);
+                let right = matches!(
+                    (state, really),
+                    (NmtState::Operational, Some(State::Operational))
+                        | (NmtState::PreOperational, Some(State::PreOperational))
+                        | (NmtState::Stopped, Some(State::Stopped))
+                );
+                // A boot-up says PRE-OPERATIONAL, also of one that starts by itself.
+                let starts = *state == NmtState::PreOperational && really == Some(State::Operational);
+                if !right && !starts {
+                    broken.push(("tells the real state", format!("node {node}: {state:?}, and it is {really:?}")));
+                }
+            }
+        }
+        // Another bit rate comes into force with power, and so does what was set with it.
+        (Said::Assigned { rate: Some(_), retimed: false, .. }, _) => {}
+        (Said::Assigned { new, stored, rate, .. }, Command::Assign { id, .. }) => {
+            // Who was given another node-ID by somebody else's reset is none of this command's business.
+            let meant: Vec<&Holds> =
+                after.iter().enumerate().filter(|(place, _)| is_meant(spec, *place)).map(|(_, holds)| holds).collect();
+            let wanted = id.or(rate.is_none().then_some(9));
+            let right = |holds: &&Holds| {
+                (wanted.is_none() || holds.node == wanted && *new == wanted)
+                    && (!stored || wanted.is_none() || holds.stored.0 == wanted)
+                    && rate.flatten().is_none_or(|rate| !stored || holds.stored.1 == Some(rate))
+            };
+            let may_be_gone = spec.is_meddled_with() && !stored;
+            if !spec.lies() && !meant.iter().any(right) && !may_be_gone {
+                broken.push(("holds what was asked", format!("{said:?}, and it is {meant:?}")));
+            }
+        }
+        (Said::Mapped(settings), Command::Map { node, .. })
+            if !spec.is_meddled_with() && !spec.lies() && !spec.shares_node_ids() =>
+        {
+            for unruly in run.bus.bus.inner_mut().stations_mut::<Unruly>() {
+                if spec.devices[unruly.place].node == Some(*node)
+                    && let Some(difference) = mapped_otherwise(unruly, settings, settled)
+                {
+                    broken.push(("holds what was asked", difference));
+                }
+            }
+        }
+        (Said::Nothing, Command::SdoWrite { node, object, bytes }) if !spec.lies() => {
+            // Nothing tells the acknowledge of somebody else's write to the same object from that of ours.
+            let acknowledged_by_others =
+                spec.acts().any(|act| matches!(act, Act::Write { index, .. } if *index == object.index));
+            let mut stations = run.bus.bus.inner_mut().stations_mut::<Unruly>();
+            let held = stations.any(|unruly| {
+                let there = spec.devices[unruly.place].node == Some(*node);
+                let now = unruly.device.value(*object, settled);
+                there && (unruly.held.contains(bytes) && spec.is_meddled_with() || now.as_deref() == Some(bytes))
+            });
+            if !held && !acknowledged_by_others && !becomes_another(spec, *node, *object) {
+                broken.push(("holds what was asked", format!("node {node} {object} is not {bytes:02X?}")));
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Whether a device keeps the serial number that it was given.
+fn has_serial(spec: &Spec, node: u8) -> bool {
+    let device = spec.devices.iter().find(|device| device.node == Some(node));
+    device.is_some_and(|device| crate::run::identity(device).serial == device.serial)
+}
+
+/// Objects in which a value stands for another one.
+fn becomes_another(spec: &Spec, node: u8, object: ObjectId) -> bool {
+    let device = spec.devices.iter().find(|device| device.node == Some(node));
+    let model = device.and_then(|device| cangauge::device::catalog::by_name(device.kind));
+    let described = model.as_ref().and_then(|model| model.description.object(object));
+    // MH-4: 0 brings back the identifier as delivered.
+    described.is_none() || object.index & 0x0fff == 0x1a0 || object.index == 0x1014
+}
+
+fn number(bytes: &[u8]) -> u32 {
+    bytes.iter().rev().fold(0u32, |number, byte| number << 8 | u32::from(*byte))
+}
+
+fn mapped_otherwise(unruly: &mut Unruly, settings: &Settings, now: Mono) -> Option<String> {
+    let mut value = |object: ObjectId| unruly.device.value(object, now).map(|bytes| number(&bytes));
+    let mut expected = vec![
+        (settings.number.communication(1), settings.cob_id.0),
+        (settings.number.communication(2), settings.transmission.into()),
+        (settings.number.mapping(0), u32::try_from(settings.mapping.len()).unwrap_or(0)),
+    ];
+    expected.extend(settings.event_timer_ms.map(|timer| (settings.number.communication(5), timer.into())));
+    for (sub, entry) in (1u8..).zip(&settings.mapping) {
+        expected.push((settings.number.mapping(sub), entry.word()));
+    }
+    expected.into_iter().find_map(|(object, wanted)| {
+        let found = value(object);
+        (found.is_some_and(|found| found != wanted)).then(|| format!("{object} is {found:08X?}, not {wanted:08X}"))
+    })
+}
+
+/// The last value that was written to each object, where writing keeps it.
+pub(super) fn last_writes(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
+    let resets = matches!(
+        spec.command,
+        Command::Store { .. }
+            | Command::Restore { .. }
+            | Command::Assign { .. }
+            | Command::Startup { .. }
+            | Command::Autozero { .. }
+            | Command::Errors { .. }
+            | Command::Minmax { .. }
+    );
+    if resets || spec.is_meddled_with() || spec.lies() || spec.loses_sent() || spec.shares_node_ids() {
+        return;
+    }
+    let mut last: BTreeMap<(u8, ObjectId), Vec<u8>> = BTreeMap::new();
+    for (_, frame) in run.bus.all_sent() {
+        let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.all_eight()) else { continue };
+        if data[0] >> 5 == 1 && data[0] & 3 == 3 && !is_signature(&data[4..8]) {
+            let length = 4 - usize::from(data[0] >> 2 & 3);
+            let object = ObjectId::from_multiplexer([data[1], data[2], data[3]]);
+            last.insert((node.get(), object), data[4..4 + length].to_vec());
+        }
+    }
+    let settled = run.settled;
+    for unruly in run.bus.bus.inner_mut().stations_mut::<Unruly>() {
+        let device = &spec.devices[unruly.place];
+        for ((node, object), bytes) in &last {
+            if device.node != Some(*node) || becomes_another(spec, *node, *object) {
+                continue;
+            }
+            let found = unruly.device.value(*object, settled);
+            if found.as_ref().is_some_and(|found| found != bytes) {
+                broken
+                    .push(("holds what was written", format!("node {node} {object}: {found:02X?}, not {bytes:02X?}")));
+            }
+        }
+    }
+}
+
+/// What was stored is still there after power off and on; what was not changed is as it was.
+pub(super) fn after_power(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
+    let settled = run.settled;
+    let bus = run.bus.bus.inner_mut();
+    bus.stations_mut::<Unruly>().for_each(Unruly::tame);
+    bus.power_cycle();
+    let after: Vec<Holds> = bus.stations::<Unruly>().map(|unruly| holds(&unruly.device)).collect();
+    match &run.result {
+        Ok(Said::Assigned { new, stored: true, .. }) if !spec.lies() => {
+            let meant = (0..after.len()).filter(|place| is_meant(spec, *place)).any(|place| after[place].node == *new);
+            if !meant && new.is_some() {
+                broken.push(("keeps what was stored", format!("node {new:?}, and it is {after:?}")));
+            }
+        }
+        Ok(Said::Mapped(settings)) if !spec.lies() && !spec.is_meddled_with() && !spec.shares_node_ids() => {
+            // What a device is and keeps is known of one that tells its identity.
+            let tells = !spec.vagaries().any(|vagary| matches!(vagary, Vagary::Refuse { .. }));
+            if let (Command::Map { node, keep: true, .. }, true) = (&spec.command, tells) {
+                for unruly in bus.stations_mut::<Unruly>() {
+                    if spec.devices[unruly.place].node == Some(*node)
+                        && let Some(difference) = mapped_otherwise(unruly, settings, settled)
+                    {
+                        broken.push(("keeps what was stored", difference));
+                    }
+                }
+            }
+        }
+        Ok(Said::Stored) if !spec.lies() && !spec.is_meddled_with() && !spec.shares_node_ids() => {
+            heartbeat_kept(spec, bus, settled, broken);
+        }
+        Err(failure) if failure.message.contains("nothing was changed") && !spec.lies() => {
+            let own = |holds: &Holds| (holds.stored, holds.node);
+            let before = run.before.iter().map(own);
+            if is_lss(&spec.command) && !before.eq(after.iter().map(own)) {
+                broken.push(("says what was changed", format!("{failure}: {:?} became {after:?}", run.before)));
+            }
+        }
+        _ => {}
+    }
+}
+
+fn heartbeat_kept(spec: &Spec, bus: &mut cangauge::bus::memory::MemoryBus, now: Mono, broken: &mut Vec<Broken>) {
+    let heartbeat = ObjectId::new(0x1017, 0);
+    for unruly in bus.stations_mut::<Unruly>() {
+        let device = &spec.devices[unruly.place];
+        let model = cangauge::device::catalog::by_name(device.kind).expect("built in");
+        let Some(entry) = model.dictionary.get(heartbeat).filter(|entry| entry.access.is_writable()) else { continue };
+        let Some(period) = unruly.device.value(heartbeat, now).map(|bytes| number(&bytes)) else { continue };
+        let (wanted, group) = match &spec.command {
+            Command::Store { node, group: of, .. } if device.node == Some(*node) => {
+                (device.unsaved_heartbeat.map(u32::from), group(*of))
+            }
+            Command::Restore { node, group: of, .. } if device.node == Some(*node) => {
+                let default = entry.default_bytes(NodeId::new(*node).expect("a node-ID"));
+                (default.map(|bytes| number(&bytes)), group(*of))
+            }
+            _ => continue,
+        };
+        if group != Group::Application && wanted.is_some_and(|wanted| wanted != period) {
+            broken.push(("keeps what was stored", format!("1017h is {period}, not {wanted:?}")));
+        }
+    }
+}
