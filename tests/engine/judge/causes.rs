@@ -41,7 +41,11 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
         let sharing = spec.shares_node_ids() || !spec.others.is_empty();
         let answered = run.bus.frames.iter().any(|(_, passed)| matches!(passed, crate::tap::Passed::Received(_)));
         let retimes = matches!(spec.command, Command::Assign { rate: Some(_), .. });
-        if answered && !sharing && !retimes && !spec.vagaries().any(|vagary| matches!(vagary, Vagary::Hang { .. })) {
+        if answered
+            && !sharing
+            && !retimes
+            && !spec.vagaries().any(|vagary| matches!(vagary, Vagary::Hang { .. } | Vagary::GoneAfterReset))
+        {
             broken.push(("names the cause", format!("the bus works: {}", told())));
         }
     }
