@@ -199,6 +199,14 @@ def begins(rows, record):
         assert row == sent, f"row {number} is {row} and was sent as {sent}"
 
 
+def stands_in(rows, record):
+    """That every row is of the record, in its order: none invented, none changed, none twice. Some may be missing."""
+    assert rows, "no rows"
+    rest = iter(record)
+    for number, row in enumerate(rows):
+        assert any(row == sent for sent in rest), f"row {number}, {row}, was not sent there"
+
+
 class Wire:
     """A raw CAN socket for what no well-behaved participant sends."""
 
