@@ -27,6 +27,9 @@ use sdo::SdoClient;
 use send::Outgoing;
 use std::time::Duration;
 
+/// How much later than the end of a recording a frame may be said to have come that was there already.
+const DRAIN: Duration = Duration::from_secs(1);
+
 /// How long to wait and how often to ask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
@@ -235,6 +238,19 @@ impl<'bus> Master<'bus> {
     /// Time is told by what is received, so that traffic never extends a deadline and a slow program never
     /// shortens one: a frame that came after a deadline is looked at after the deadline.
     pub fn next(&mut self, until: Mono) -> Result<Happening, Error> {
+        self.next_or(until, until)
+    }
+
+    /// The next thing that had been received by the moment `stop`, without waiting for more; at the end
+    /// [`Happening::Deadline`]. A frame counts as received by then as long as nothing says how long it lay
+    /// there: on a busy machine the times of frames are off by what the clocks were read apart. On a bus that
+    /// is never silent `DRAIN` ends it.
+    pub fn drain(&mut self, stop: Mono) -> Result<Happening, Error> {
+        self.next_or(stop, stop + DRAIN)
+    }
+
+    /// Waits until `until`, and takes frames for earlier than that up to `last`.
+    fn next_or(&mut self, until: Mono, last: Mono) -> Result<Happening, Error> {
         loop {
             if let Some((ticket, result)) = self.sdo.pop_finished() {
                 return Ok(Happening::Sdo(ticket, result));
@@ -252,7 +268,7 @@ impl<'bus> Master<'bus> {
                 Event::Frame(received) => {
                     let at = received.at.mono;
                     self.seen = self.seen.max(at);
-                    if at > until {
+                    if at > last {
                         self.put_back = Some(received);
                         return Ok(Happening::Deadline);
                     }

@@ -11,6 +11,7 @@ use cangauge::master::{Master, Timing};
 use cangauge::sim::Bench;
 use cangauge::tasks::log::{Mode, Plan, log};
 use std::collections::{BTreeMap, VecDeque};
+use std::ops::Range;
 use std::path::Path;
 use std::time::Duration;
 
@@ -20,6 +21,8 @@ struct Stalled {
     from: Mono,
     until: Mono,
     waiting: VecDeque<Event>,
+    /// The user asks to stop meanwhile, and the kernel's times can be placed only after that.
+    stopped: bool,
     /// When SYNC was handed over.
     syncs: Vec<Mono>,
 }
@@ -29,8 +32,15 @@ impl Stalled {
         while self.inner.now().mono < self.until {
             match self.inner.receive(self.until)? {
                 Event::Timeout => break,
+                Event::Frame(mut received) if self.stopped => {
+                    received.at.mono = received.at.mono.max(self.until + Duration::from_millis(100));
+                    self.waiting.push_back(Event::Frame(received));
+                }
                 event => self.waiting.push_back(event),
             }
+        }
+        if self.stopped {
+            self.waiting.push_front(Event::Interrupted);
         }
         Ok(())
     }
@@ -75,23 +85,32 @@ impl Bus for Stalled {
     }
 }
 
-#[test]
-fn syncs_that_were_missed_are_left_out() {
-    let text = "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
+fn stalled(text: &str, milliseconds: Range<u64>, stopped: bool) -> Stalled {
     let inner = Bench::from_toml(text, Path::new("")).expect("a bench").open().expect("a bus");
     let at = |milliseconds| Mono::at(Duration::from_millis(milliseconds));
-    let mut bus = Stalled { inner, from: at(1000), until: at(1503), waiting: VecDeque::new(), syncs: Vec::new() };
-    let period = Duration::from_millis(10);
-    let plan = Plan {
+    let (from, until) = (at(milliseconds.start), at(milliseconds.end));
+    Stalled { inner, from, until, waiting: VecDeque::new(), stopped, syncs: Vec::new() }
+}
+
+fn plan(mode: Mode, duration: Duration) -> Plan {
+    Plan {
         nodes: vec![NodeId::new(5).expect("a node-ID")],
         wanted: Vec::new(),
-        mode: Mode::Sync(period),
-        duration: Some(Duration::from_secs(2)),
+        mode,
+        duration: Some(duration),
         count: None,
         nmt: true,
         max_gap: None,
         overrides: BTreeMap::new(),
-    };
+    }
+}
+
+#[test]
+fn syncs_that_were_missed_are_left_out() {
+    let text = "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
+    let mut bus = stalled(text, 1000..1503, false);
+    let period = Duration::from_millis(10);
+    let plan = plan(Mode::Sync(period), Duration::from_secs(2));
     let mut kept = Kept::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
     let syncs = bus.syncs;
@@ -106,4 +125,19 @@ fn syncs_that_were_missed_are_left_out() {
     assert_eq!((outcome.syncs.sent, outcome.rows), (syncs.len() as u64, syncs.len() as u64));
     let said = outcome.remarks.iter().filter(|remark| remark.ends_with("the program was stopped or too slow"));
     assert_eq!(said.count(), 1, "{:?}", outcome.remarks);
+}
+
+#[test]
+fn what_came_before_the_end_is_recorded_whatever_its_time_says() {
+    let text = "clock = \"virtual\"\n[[device]]\nkind = \"dps\"\nnode = 5\n";
+    let mut bus = stalled(text, 1000..1503, true);
+    let plan = plan(Mode::AsSent, Duration::from_secs(60));
+    let mut kept = Kept::default();
+    let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
+    assert!(outcome.interrupted);
+    assert_eq!(bus.waiting.len(), 0);
+    // In half a second it sends five times.
+    let late = kept.rows.iter().filter(|row| row.starts_with("1603000,"));
+    assert!((5..=6).contains(&late.count()), "{:?}", kept.rows);
+    assert!(bus.inner.now().mono < Mono::at(Duration::from_millis(1700)), "and nothing is waited for");
 }

@@ -43,6 +43,8 @@ pub struct SocketCan {
     opened: Instant,
     batch: Batch,
     clocks: Clocks,
+    /// When the last frame was received that has been looked at.
+    passed: Mono,
     /// The socket is empty as far as is known: wait before reading again.
     drained: bool,
     /// A frame has been sent and nothing waited for since: an answer may be on its way.
@@ -106,6 +108,7 @@ impl SocketCan {
             opened: Instant::now(),
             batch: Batch::new(),
             clocks: Clocks::default(),
+            passed: Mono::START,
             drained: false,
             sent: false,
             looked: Cell::new(Mono::START),
@@ -276,6 +279,7 @@ impl SocketCan {
         }
         let opened = self.opened;
         let at = self.clocks.stamp(message.wall, &|| now(opened));
+        self.passed = at.mono;
         match CanFrame::from(message.frame) {
             CanFrame::Error(frame) => {
                 self.ready.extend(faults::faults(frame).into_iter().map(|fault| Event::Fault(fault, at)));
@@ -386,7 +390,7 @@ impl Bus for SocketCan {
                     Some(event) => return Ok(event),
                     None => unwanted = true,
                 }
-            } else if unwanted && self.mono() >= deadline {
+            } else if unwanted && self.passed > deadline {
                 // Frames that nobody sees must not keep the deadline from being reached.
                 return Ok(Event::Timeout);
             } else if !self.drained {

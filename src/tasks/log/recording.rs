@@ -186,12 +186,13 @@ impl Recording {
         plan: &Plan,
         observer: &mut dyn Observer,
     ) -> Result<(), Error> {
-        let mut stop = plan.duration.map(|duration| begin + duration);
+        let end = plan.duration.map(|duration| begin + duration);
         // A recording may begin long before what is looked for in it, and it comes to an end.
         let is_live = master.bus().is_live();
         let patience = if is_live { PATIENCE } else { std::time::Duration::MAX };
         let give_up = begin + plan.duration.unwrap_or(patience).min(patience);
         let mut next_tick = begin + TICK;
+        let mut stopped: Option<Mono> = None;
         loop {
             let mut until = next_tick;
             if self.rows == 0 {
@@ -200,10 +201,13 @@ impl Recording {
             let poll_due = self.poll.as_ref().map(|poll| poll.due(begin));
             let renewal_due = self.renewals.due().filter(|_| self.link_is_up);
             let sync_due = producer.as_ref().map(|producer| producer.due());
-            for due in [stop, sync_due, poll_due, renewal_due].into_iter().flatten() {
+            for due in [end, sync_due, poll_due, renewal_due].into_iter().flatten() {
                 until = until.min(due);
             }
-            let happening = master.next(until)?;
+            let happening = match stopped {
+                Some(at) => master.drain(at)?,
+                None => master.next(until)?,
+            };
             if let Some(producer) = &mut producer {
                 producer.look(master);
             }
@@ -211,8 +215,12 @@ impl Recording {
                 Happening::Frame(received) => self.frame(&received, plan, master, observer)?,
                 Happening::Sdo(ticket, result) => self.answer(ticket, result, plan, master, observer)?,
                 Happening::Deadline => {
+                    if let Some(at) = stopped {
+                        self.end = self.end.max(at);
+                        return Ok(());
+                    }
                     self.end = until;
-                    if stop.is_some_and(|stop| until >= stop) || self.rows == 0 && until >= give_up {
+                    if end.is_some_and(|end| until >= end) || self.rows == 0 && until >= give_up {
                         return Ok(());
                     }
                     if let Some(producer) = &mut producer
@@ -266,7 +274,7 @@ impl Recording {
                 Happening::Interrupted => {
                     // What has been received by now is recorded; who asks twice does not wait for it.
                     self.interrupted = true;
-                    stop = Some(master.now());
+                    stopped = Some(master.now());
                     ControlFlow::Continue(())
                 }
             };
