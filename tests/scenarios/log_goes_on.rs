@@ -373,13 +373,13 @@ impl Bus for Shaky {
     }
 }
 
-/// Records with something that happens to the interface, and a restart of the node at 2.2 s that nobody hears.
+/// Records with something that happens to the interface, and a restart of the node at 2.2 s whose boot-up nobody hears.
 fn shaken(events: &[(u64, Event)]) -> (Kept, Outcome) {
     let text = format!("clock = \"virtual\"\n{DPS}");
     let mut inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
     inner.attach(Other::new(&[(2200, "000#8105")]));
     write(&mut Master::new(&mut inner, Timing::default()), UNIT, &BAR);
-    let mut bus = Shaky::new(inner, events);
+    let mut bus = Shaky { no_heartbeat: at(2100)..at(2400), ..Shaky::new(inner, events) };
     let mut kept = Kept::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(Mode::AsSent), &mut kept);
     (kept, outcome.expect("a recording"))
@@ -452,4 +452,19 @@ fn a_gap_is_what_the_user_says() {
         assert_eq!(outcome.gaps, gaps, "{longest}");
         assert_eq!(outcome.statistics[0].1.gaps(), gaps);
     }
+}
+
+#[test]
+fn a_restart_among_frames_that_were_lost() {
+    let dropped = [(2400, Event::Dropped(30)), (2500, Event::Dropped(3)), (3500, Event::Dropped(1))];
+    let (kept, outcome) = shaken(&dropped);
+    assert_eq!((outcome.dropped, outcome.events.changes, outcome.events.silences), (34 + 7, 1, 0));
+    let units: Vec<&str> = kept.rows.iter().filter_map(|row| row.split(',').nth(4)).collect();
+    let psi = units.iter().filter(|unit| **unit == "psi").count();
+    assert!(psi > 15, "started again, and read by what it is now: {units:?}");
+    let read = kept.notes.iter().filter(|note| matches!(note, Note::ReadAgain(..)));
+    assert_eq!(read.count(), 1, "once a minute is enough: {:?}", kept.notes);
+    let doubt = "node 5 changed while frames were lost: its rows of the ";
+    assert!(outcome.remarks.iter().any(|remark| remark.starts_with(doubt)), "{:?}", outcome.remarks);
+    assert!(!outcome.remarks.iter().any(|remark| remark.contains("read again")), "{:?}", outcome.remarks);
 }

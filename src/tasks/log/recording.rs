@@ -254,8 +254,7 @@ impl Recording {
                     ControlFlow::Continue(())
                 }
                 Happening::Dropped(count) => {
-                    self.dropped += u64::from(count);
-                    observer.note(&Note::Dropped(count), master.bus().now());
+                    self.dropped(count, master, observer);
                     ControlFlow::Continue(())
                 }
                 Happening::Link(up) => {

@@ -17,6 +17,8 @@ use std::time::Duration;
 const SETTLED: Duration = Duration::from_millis(500);
 /// A node that did not answer is asked again after this long.
 const RETRY: Duration = Duration::from_secs(1);
+/// Lost frames make nobody read again so soon after others did: on a bus that is too fast that would go on for ever.
+const MISSED_AGAIN: Duration = Duration::from_secs(60);
 /// TPDOs of a wrong length make nobody read again so soon after they did and nothing had changed.
 const LENGTH_AGAIN: Duration = Duration::from_secs(60);
 
@@ -29,6 +31,9 @@ pub(super) enum Doubt {
     Written,
     /// A TPDO has not the length of its mapping, and was not recorded for that. Others are, meanwhile.
     Length,
+    /// Frames were lost, and with them perhaps what would have made it doubted. That is seldom so, and rows are
+    /// missing already: others are made meanwhile, and if something has changed it is said since when.
+    Missed,
 }
 
 /// A node that is doubted.
@@ -37,6 +42,8 @@ struct Doubted {
     due: Mono,
     again: Option<Again>,
     was_away: bool,
+    /// Since when rows have been made of what it sends although it is doubted.
+    unheld_since: Option<Mono>,
     /// It has been said that it cannot be read.
     said: bool,
 }
@@ -46,6 +53,8 @@ pub(super) struct Renewed {
     pub(super) instrument: Instrument,
     /// Whether it was away, and may have to be started.
     pub(super) was_away: bool,
+    /// Since when rows have been made by what it was before, if they have.
+    pub(super) unheld_since: Option<Mono>,
 }
 
 /// The nodes that are doubted.
@@ -54,11 +63,18 @@ pub(super) struct Renewals {
     doubted: BTreeMap<NodeId, Doubted>,
     /// When TPDOs of a wrong length last made a node doubted.
     lengths: BTreeMap<NodeId, Mono>,
+    /// When nodes were last read, or are to be, because frames were lost.
+    missed: BTreeMap<NodeId, Mono>,
 }
 
 impl Renewals {
     pub(super) fn new(overrides: &Overrides) -> Renewals {
-        Renewals { overrides: overrides.clone(), doubted: BTreeMap::new(), lengths: BTreeMap::new() }
+        Renewals {
+            overrides: overrides.clone(),
+            doubted: BTreeMap::new(),
+            lengths: BTreeMap::new(),
+            missed: BTreeMap::new(),
+        }
     }
 
     /// Doubts a node from now on; what is being read of it is read once more. `false` where there is no reason to.
@@ -69,11 +85,22 @@ impl Renewals {
             }
             self.lengths.insert(node, now);
         }
+        let new = || Doubted { due: now, again: None, was_away: false, unheld_since: None, said: false };
+        if why == Doubt::Missed {
+            self.doubted.entry(node).or_insert_with(|| {
+                let due = self.missed.get(&node).map_or(now, |&before| before + MISSED_AGAIN).max(now + SETTLED);
+                self.missed.insert(node, due);
+                Doubted { due, was_away: true, unheld_since: Some(now), ..new() }
+            });
+            return true;
+        }
         let wait = if why == Doubt::Written { SETTLED } else { Duration::ZERO };
-        let new = || Doubted { due: now, again: None, was_away: false, said: false };
         let doubted = self.doubted.entry(node).or_insert_with(new);
         doubted.due = now + wait;
         doubted.was_away |= why == Doubt::Away;
+        if why != Doubt::Length {
+            doubted.unheld_since = None;
+        }
         if let Some(again) = doubted.again.take() {
             again.cancel(master);
         }
@@ -110,9 +137,9 @@ impl Renewals {
         let (&node, doubted) = self.doubted.iter_mut().find(|(_, doubted)| holds(doubted))?;
         match doubted.again.as_mut()?.take(ticket, result, master)? {
             Ok(instrument) => {
-                let was_away = doubted.was_away;
+                let (was_away, unheld_since) = (doubted.was_away, doubted.unheld_since);
                 self.doubted.remove(&node);
-                Some(Ok(Renewed { instrument, was_away }))
+                Some(Ok(Renewed { instrument, was_away, unheld_since }))
             }
             Err(error) => {
                 doubted.again = None;
@@ -128,9 +155,9 @@ impl Renewals {
         self.lengths.remove(&node);
     }
 
-    /// The nodes that are doubted.
-    pub(super) fn nodes(&self) -> impl Iterator<Item = NodeId> + '_ {
-        self.doubted.keys().copied()
+    /// The nodes of which no rows are made.
+    pub(super) fn held(&self) -> impl Iterator<Item = NodeId> + '_ {
+        self.doubted.iter().filter(|(_, doubted)| doubted.unheld_since.is_none()).map(|(&node, _)| node)
     }
 }
 

@@ -1,6 +1,7 @@
 //! What happens on the way, and how the recording goes on by itself.
 
 use super::{Recording, Rhythm};
+use crate::bus::time::spoken;
 use crate::bus::{Fault, Mono, Received, Stamp};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
@@ -110,7 +111,7 @@ impl Recording {
             return;
         }
         // What has the right length although another has not is what it was: the other is garbage.
-        if why != Doubt::Length {
+        if !matches!(why, Doubt::Length | Doubt::Missed) {
             self.decoder.hold(node);
             if let Some(poll) = &mut self.poll {
                 poll.hold(node);
@@ -118,11 +119,23 @@ impl Recording {
         }
     }
 
-    fn doubt_all(&mut self, now: Mono, master: &mut Master<'_>) {
+    fn doubt_all(&mut self, why: Doubt, now: Mono, master: &mut Master<'_>) {
+        let nodes: Vec<NodeId> = self.instruments.iter().map(|instrument| instrument.node).collect();
+        nodes.into_iter().for_each(|node| self.doubt(node, why, now, master));
+    }
+
+    /// Nothing could be heard until now, boot-ups neither.
+    fn nothing_was_heard(&mut self, now: Mono, master: &mut Master<'_>) {
         self.pulses.values_mut().for_each(|pulse| pulse.excuse(now));
         self.hearts.excuse(now);
-        let nodes: Vec<NodeId> = self.instruments.iter().map(|instrument| instrument.node).collect();
-        nodes.into_iter().for_each(|node| self.doubt(node, Doubt::Away, now, master));
+        self.doubt_all(Doubt::Away, now, master);
+    }
+
+    pub(super) fn dropped(&mut self, count: u32, master: &mut Master<'_>, observer: &mut dyn Observer) {
+        let at = master.bus().now();
+        self.dropped += u64::from(count);
+        observer.note(&Note::Dropped(count), at);
+        self.doubt_all(Doubt::Missed, at.mono, master);
     }
 
     pub(super) fn not_recorded(&mut self, node: NodeId, now: Mono) {
@@ -173,7 +186,7 @@ impl Recording {
         master: &mut Master<'_>,
         observer: &mut dyn Observer,
     ) -> Result<(), Error> {
-        let Renewed { instrument, was_away } = renewed;
+        let Renewed { instrument, was_away, unheld_since } = renewed;
         let (node, at) = (instrument.node, master.bus().now());
         let Some(place) = self.instruments.iter().position(|known| known.node == node) else { return Ok(()) };
         let changes = changes(&self.instruments[place], &instrument);
@@ -201,6 +214,13 @@ impl Recording {
             self.renewals.forget_lengths(node);
             self.wrong_length_said.remove(&node);
         }
+        if let Some(since) = unheld_since.filter(|_| !changes.is_empty()) {
+            let length = spoken(at.mono.since(since));
+            let remark =
+                format!("node {node} changed while frames were lost: its rows of the {length} before are in doubt");
+            observer.note(&Note::Remark(remark.clone()), at);
+            self.remarks.push(remark);
+        }
         observer.note(&Note::ReadAgain(node, changes), at);
         self.tell_contested(at, observer);
         Ok(())
@@ -210,8 +230,8 @@ impl Recording {
         observer.note(&Note::Fault(fault), at);
         match fault {
             Fault::BusOff => self.events.bus_offs += 1,
-            // Nothing was heard meanwhile, boot-ups neither.
-            Fault::Restarted => self.doubt_all(at.mono, master),
+            Fault::Restarted => self.nothing_was_heard(at.mono, master),
+            Fault::ControllerOverflow => self.doubt_all(Doubt::Missed, at.mono, master),
             _ => {}
         }
     }
@@ -221,7 +241,7 @@ impl Recording {
         self.link_is_up = up;
         observer.note(&Note::Link(up), at);
         if up {
-            self.doubt_all(at.mono, master);
+            self.nothing_was_heard(at.mono, master);
         } else {
             self.events.link_losses += 1;
         }

@@ -26,7 +26,7 @@ impl Recording {
                 buffer.wanted / 2
             ));
         }
-        for node in self.renewals.nodes() {
+        for node in self.renewals.held() {
             self.remarks.push(format!("node {node} could not be read again: what it sent since was not recorded"));
         }
         let nothing = (self.rows == 0).then(|| why_nothing(&self.instruments, plan, &self));
