@@ -17,7 +17,7 @@ use libfuzzer_sys::fuzz_target;
 use std::time::Duration;
 
 /// Segments of one object. An upload is given up only after 64 MiB, which takes too long here.
-const SEGMENTS: usize = 100;
+const SEGMENTS: usize = 20;
 
 struct Answerer {
     script: Vec<u8>,
