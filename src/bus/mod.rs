@@ -277,7 +277,7 @@ impl fmt::Display for Fault {
 /// Where the wall time of a received frame comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimestampSource {
-    /// The interface's own clock.
+    /// The interface's own clock, laid upon the computer's.
     Hardware,
     /// The kernel, when the driver handed the frame over.
     Kernel,

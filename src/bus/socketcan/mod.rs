@@ -1,4 +1,5 @@
-//! Linux SocketCAN: kernel filters, kernel timestamps, the kernel's drop counter, error frames.
+//! Linux SocketCAN: kernel filters, timestamps of the interface or the kernel, the kernel's drop counter, error
+//! frames.
 //!
 //! A system call costs more than everything else done for a frame. So one `recvmmsg` serves up to
 //! 64 calls of `receive`, the clock is read once for all of them, and the socket is waited for
@@ -8,6 +9,7 @@ mod clocks;
 mod faults;
 mod interfaces;
 mod netlink;
+mod own_clock;
 mod receive;
 mod setup;
 mod socket;
@@ -19,6 +21,7 @@ use crate::canopen::id::CanId;
 use clocks::Clocks;
 pub use interfaces::{Interface, interfaces};
 pub use netlink::{BitTiming, Link, State};
+use own_clock::OwnClock;
 use receive::{Batch, Message};
 pub use setup::{Change, bring_down, bring_up, link};
 use socket::Bound;
@@ -43,6 +46,7 @@ pub struct SocketCan {
     opened: Instant,
     batch: Batch,
     clocks: Clocks,
+    own_clock: OwnClock,
     /// When the last frame was received that has been looked at.
     passed: Mono,
     /// The socket is empty as far as is known: wait before reading again.
@@ -108,6 +112,7 @@ impl SocketCan {
             opened: Instant::now(),
             batch: Batch::new(),
             clocks: Clocks::default(),
+            own_clock: OwnClock::default(),
             passed: Mono::START,
             drained: false,
             sent: false,
@@ -249,6 +254,7 @@ impl SocketCan {
         }
         (self.socket, self.wanted, self.timestamps) = (bound.socket, bound.wanted, bound.timestamps);
         (self.gone, self.lost, self.drained) = (false, 0, false);
+        self.own_clock = OwnClock::default();
         // What says that it is down is the socket's first error; where there is none it is up.
         match self.socket.as_raw_socket().take_error() {
             Ok(None) => self.link(true),
@@ -278,7 +284,14 @@ impl SocketCan {
             }
         }
         let opened = self.opened;
-        let at = self.clocks.stamp(message.wall, &|| now(opened));
+        let mut at = self.clocks.stamp(message.wall, &|| now(opened));
+        match message.own {
+            Some(own) => {
+                at = self.own_clock.place(own, at);
+                self.timestamps = TimestampSource::Hardware;
+            }
+            None => self.own_clock.pass(at),
+        }
         self.passed = at.mono;
         match CanFrame::from(message.frame) {
             CanFrame::Error(frame) => {

@@ -11,8 +11,8 @@ use std::time::Duration;
 const VECTOR: libc::c_uint = 64;
 /// Frames taken in by one system call at most.
 pub(super) const BATCH: usize = VECTOR as usize;
-/// Room for the control messages of one frame: a timestamp and a counter take 56 bytes.
-const CONTROL: usize = 96;
+/// Room for the control messages of one frame: two timestamps and a counter take 120 bytes.
+const CONTROL: usize = 128;
 
 /// Aligned as the kernel's control message header is.
 #[repr(C, align(8))]
@@ -36,6 +36,8 @@ pub(super) struct Message {
     pub(super) frame: libc::can_frame,
     /// When the kernel received it, since 1970.
     pub(super) wall: Option<Duration>,
+    /// When the interface saw it, by its own clock.
+    pub(super) own: Option<Duration>,
     /// How many frames this socket had lost in all when this one was queued.
     pub(super) lost: Option<u32>,
 }
@@ -61,8 +63,8 @@ impl Batch {
             self.next += 1;
             // Anything else is no classic frame, and no such thing has been asked for.
             if slot.filled == size_of::<libc::can_frame>() {
-                let (wall, lost) = read_control(&slot.control.0[..slot.control_filled.min(CONTROL)]);
-                return Some(Message { frame: slot.frame, wall, lost });
+                let told = read_control(&slot.control.0[..slot.control_filled.min(CONTROL)]);
+                return Some(Message { frame: slot.frame, wall: told.wall, own: told.own, lost: told.lost });
             }
         }
         None
@@ -102,12 +104,20 @@ impl Batch {
     }
 }
 
-/// Reads timestamp and drop counter from the control messages of one frame. Each has the kernel's
+/// What the control messages of a frame tell; see [`Message`].
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Told {
+    wall: Option<Duration>,
+    own: Option<Duration>,
+    lost: Option<u32>,
+}
+
+/// Reads timestamps and drop counter from the control messages of one frame. Each has the kernel's
 /// header (a length of the width of `size_t` that counts the header, level, type) and starts at a
 /// multiple of that width.
-fn read_control(mut control: &[u8]) -> (Option<Duration>, Option<u32>) {
+fn read_control(mut control: &[u8]) -> Told {
     const WORD: usize = size_of::<usize>();
-    let (mut wall, mut lost) = (None, None);
+    let mut told = Told::default();
     while let Some((len, rest)) = control.split_first_chunk::<WORD>() {
         let Some((level, rest)) = rest.split_first_chunk::<4>() else { break };
         let Some((kind, _)) = rest.split_first_chunk::<4>() else { break };
@@ -115,14 +125,19 @@ fn read_control(mut control: &[u8]) -> (Option<Duration>, Option<u32>) {
         let Some(data) = control.get(WORD + 8..len) else { break };
         if i32::from_ne_bytes(*level) == libc::SOL_SOCKET {
             match i32::from_ne_bytes(*kind) {
-                libc::SCM_TIMESTAMPNS => wall = read_timespec(data),
-                libc::SO_RXQ_OVFL => lost = data.first_chunk().map(|bytes| u32::from_ne_bytes(*bytes)),
+                libc::SCM_TIMESTAMPNS => told.wall = read_timespec(data),
+                // Three times: the kernel's, one that is used no more, and that of the hardware, 0 where it has none.
+                libc::SCM_TIMESTAMPING => {
+                    let own = data.get(data.len() / 3 * 2..).and_then(read_timespec);
+                    told.own = own.filter(|own| !own.is_zero());
+                }
+                libc::SO_RXQ_OVFL => told.lost = data.first_chunk().map(|bytes| u32::from_ne_bytes(*bytes)),
                 _ => {}
             }
         }
         control = control.get(len.next_multiple_of(WORD)..).unwrap_or_default();
     }
-    (wall, lost)
+    told
 }
 
 /// A `timespec` of either width.
@@ -158,27 +173,43 @@ mod tests {
     fn timestamp_and_counter_in_either_order() {
         let counter = message(libc::SOL_SOCKET, libc::SO_RXQ_OVFL, &1829u32.to_ne_bytes());
         let time = timestamp(1_436_509_052, 249_713_001);
-        let expected = (Some(Duration::new(1_436_509_052, 249_713_001)), Some(1829));
-        assert_eq!(read_control(&[time.clone(), counter.clone()].concat()), expected);
-        assert_eq!(read_control(&[counter.clone(), time.clone()].concat()), expected);
+        let expected = || Told { wall: Some(Duration::new(1_436_509_052, 249_713_001)), own: None, lost: Some(1829) };
+        assert_eq!(read_control(&[time.clone(), counter.clone()].concat()), expected());
+        assert_eq!(read_control(&[counter.clone(), time.clone()].concat()), expected());
         let other = message(libc::SOL_SOCKET, 37, &[0; 48]);
-        assert_eq!(read_control(&[other, counter, time].concat()), expected);
-        assert_eq!(read_control(&[]), (None, None));
+        assert_eq!(read_control(&[other, counter, time].concat()), expected());
+        assert_eq!(read_control(&[]), Told::default());
+    }
+
+    #[test]
+    fn the_interfaces_own_time() {
+        let times = |numbers: [i64; 6]| {
+            let data: Vec<u8> = numbers.iter().flat_map(|number| number.to_ne_bytes()).collect();
+            message(libc::SOL_SOCKET, libc::SCM_TIMESTAMPING, &data)
+        };
+        let wall = timestamp(1_436_509_052, 5);
+        let told = read_control(&[wall.clone(), times([0, 0, 0, 0, 12, 345])].concat());
+        assert_eq!(
+            told,
+            Told { wall: Some(Duration::new(1_436_509_052, 5)), own: Some(Duration::new(12, 345)), lost: None }
+        );
+        assert_eq!(read_control(&times([7, 7, 7, 7, 0, 0])), Told::default(), "it has none");
+        assert_eq!(read_control(&times([7, 7, 7, 7, -1, 0])).own, Some(Duration::new(u64::MAX, 0)));
     }
 
     #[test]
     fn control_messages_that_lie_are_passed_over() {
         let time = timestamp(1, 2);
         for end in 0..time.len() {
-            assert_eq!(read_control(&time[..end]), (None, None), "{end}");
+            assert_eq!(read_control(&time[..end]), Told::default(), "{end}");
         }
         for len in [0usize, 1, 15, 16, 1000, usize::MAX] {
             let mut wrong = time.clone();
             wrong[..size_of::<usize>()].copy_from_slice(&len.to_ne_bytes());
-            assert_eq!(read_control(&wrong), (None, None), "{len}");
+            assert_eq!(read_control(&wrong), Told::default(), "{len}");
         }
-        assert_eq!(read_control(&timestamp(1, 1_000_000_000)), (None, None));
-        assert_eq!(read_control(&timestamp(1, -1)), (None, None));
+        assert_eq!(read_control(&timestamp(1, 1_000_000_000)), Told::default());
+        assert_eq!(read_control(&timestamp(1, -1)), Told::default());
     }
 
     #[test]

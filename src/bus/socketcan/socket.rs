@@ -19,11 +19,7 @@ pub(super) struct Bound {
     pub(super) socket: CanSocket,
     /// The identifiers wanted, where they are too many for the kernel.
     pub(super) wanted: Option<HashSet<CanId>>,
-    /// Where the times of its frames come from.
-    ///
-    /// Not from the interface's own clock, even where there is one: drivers start it at the wall time and let it
-    /// run freely, some start it at 0, and none tells how far it has drifted since. In a recording of a weekend
-    /// that is seconds, in a column that is to be the time.
+    /// Where the times of its frames come from, until the interface tells its own.
     pub(super) timestamps: TimestampSource,
 }
 
@@ -39,6 +35,8 @@ pub(super) fn bind(name: &str, filters: &Filters, limit: Duration) -> Result<Bou
         Ok(()) => TimestampSource::Kernel,
         Err(_) => TimestampSource::Program,
     };
+    let own_times = libc::SOF_TIMESTAMPING_RX_HARDWARE | libc::SOF_TIMESTAMPING_RAW_HARDWARE;
+    let _ = socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_TIMESTAMPING, own_times.cast_signed());
     let _ = socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RXQ_OVFL, 1);
     if socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUFFORCE, RECEIVE_BUFFER).is_err() {
         let _ = socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUF, RECEIVE_BUFFER);

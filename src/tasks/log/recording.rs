@@ -167,6 +167,7 @@ impl Recording {
             _ => None,
         };
         let result = self.go_on(begin, producer.as_mut(), master, plan, observer);
+        self.timestamps = master.bus().timestamps();
         if let Some(producer) = &mut producer {
             self.syncs = producer.finish(master);
         }
