@@ -448,6 +448,9 @@ pub struct SimEntry {
     pub serial: u32,
     /// How often a new value is there, in microseconds; 1 ms if the manual does not say.
     pub sample_us: Option<u32>,
+    /// Whether a repeating average is that of the samples since the last PDO, instead of 61A1h samples.
+    #[serde(default)]
+    pub mean_until_pdo: bool,
     /// How far beyond the measuring range an overload begins, in percent of the range.
     #[serde(default)]
     pub overload_percent: f64,

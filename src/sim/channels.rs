@@ -1,6 +1,7 @@
 //! The measuring channels of a simulated device: the quantity behind each, and the objects that show it
 //! (CiA 404: x100h, x130h, 6150h and what belongs to them).
 
+use super::filter::{self, Filter};
 use super::model::{Direction, Overload, Quantity};
 use super::number;
 use super::objects::Objects;
@@ -58,6 +59,7 @@ pub(super) struct Channels {
 struct Channel {
     signal: SignalEntry,
     quantity: Quantity,
+    filter: Filter,
     /// The lowest and highest value that was looked at.
     seen: Option<(f64, f64)>,
     /// Other objects in its unit.
@@ -136,9 +138,12 @@ impl Channels {
 
     /// The measured value at `time` in the numbers of the object (an integer counts its digits), without
     /// marker and rounding.
-    pub(super) fn number(&self, objects: &Objects, object: ObjectId, time: Duration) -> Option<f64> {
-        let (channel, data_type) = self.value_of(objects, object)?;
-        Some(channel.scaled(objects, data_type, channel.value(objects, channel.quantity.at(time))))
+    pub(super) fn number(&mut self, objects: &Objects, object: ObjectId, time: Duration) -> Option<f64> {
+        let (index, Shows::Value) = *self.shown.get(&object)? else { return None };
+        let channel = self.list.get_mut(index)?;
+        let data_type = objects.spec(object)?.data_type;
+        let raw = channel.filtered(time);
+        Some(channel.scaled(objects, data_type, channel.value(objects, raw)))
     }
 
     /// The lowest and highest number that [`Channels::number`] can come to.
@@ -171,11 +176,12 @@ impl Channels {
     }
 
     /// The present value becomes zero: the offset takes it up. `false` if the channel has none.
-    pub(super) fn autozero(&self, objects: &mut Objects, number: u8, time: Duration) -> bool {
-        let Some(channel) = self.by_number(number) else { return false };
+    pub(super) fn autozero(&mut self, objects: &mut Objects, number: u8, time: Duration) -> bool {
+        let Some(channel) = self.list.iter_mut().find(|channel| channel.signal.channel == number) else { return false };
         let Some(object) = channel.offset_object(objects) else { return false };
         let offset = channel.pv(objects, object).unwrap_or(0.0);
-        channel.put_pv(objects, object, offset - channel.value(objects, channel.quantity.at(time)));
+        let raw = channel.filtered(time);
+        channel.put_pv(objects, object, offset - channel.value(objects, raw));
         true
     }
 
@@ -207,17 +213,39 @@ impl Channels {
         true
     }
 
-    /// A damping that was written makes a constant of the moving average (MH-4, 4.3.7). How is not printed:
-    /// the steps of the sample time that it lasts.
-    pub(super) fn damp(&self, objects: &mut Objects, object: ObjectId) {
-        if objects.spec(object).is_none_or(|spec| spec.name != "damping") {
-            return;
+    /// Every filter begins anew: the device has started.
+    pub(super) fn begin(&mut self, objects: &Objects, time: Duration) {
+        self.list.iter_mut().for_each(|channel| channel.filter.begin(objects, &channel.quantity, time));
+    }
+
+    /// An object was written: if it sets a filter, that begins anew.
+    pub(super) fn refilter(&mut self, objects: &mut Objects, written: ObjectId, time: Duration) {
+        let constant = self.damp(objects, written);
+        let sets = |channel: &&mut Channel| channel.filter.is_set_by(constant.unwrap_or(written));
+        for channel in self.list.iter_mut().filter(sets) {
+            channel.filter.begin(objects, &channel.quantity, time);
         }
+    }
+
+    /// A PDO with these objects has been sent.
+    pub(super) fn sent(&mut self, mapped: &[ObjectId]) {
+        for (index, _) in mapped.iter().filter_map(|object| self.shown.get(object)) {
+            if let Some(channel) = self.list.get_mut(*index) {
+                channel.filter.sent();
+            }
+        }
+    }
+
+    /// A damping that was written makes a constant of the moving average (MH-4, 4.3.7); the object that it
+    /// has changed.
+    fn damp(&self, objects: &mut Objects, object: ObjectId) -> Option<ObjectId> {
+        objects.spec(object).filter(|spec| spec.name == "damping")?;
         let [kind, constant] = [0x61a0, 0x61a1].map(|index| ObjectId::new(index, object.sub));
-        let Some(channel) = self.by_number(object.sub).filter(|_| objects.number(kind) == 1) else { return };
-        let steps = Duration::from_millis(objects.number(object).into()).as_micros() / channel.quantity.sample_us();
-        let steps = u16::try_from(steps).unwrap_or(u16::MAX).max(1);
+        let channel = self.by_number(object.sub).filter(|_| objects.number(kind) == 1)?;
+        let damping = Duration::from_millis(objects.number(object).into());
+        let steps = filter::constant_for(damping, channel.quantity.sample_us());
         objects.put(constant, steps.to_le_bytes().to_vec());
+        Some(constant)
     }
 
     fn by_number(&self, number: u8) -> Option<&Channel> {
@@ -240,7 +268,8 @@ impl Channel {
             .chain(described.map(|object| (object, Kind::Distance)))
             .filter(|(object, _)| objects.has(*object))
             .collect();
-        Channel { signal: signal.clone(), quantity, seen: None, follows }
+        let filter = Filter::new(&model.description, sub);
+        Channel { signal: signal.clone(), quantity, filter, seen: None, follows }
     }
 
     /// The objects that show this channel.
@@ -269,7 +298,7 @@ impl Channel {
     }
 
     fn read(&mut self, objects: &Objects, shows: Shows, data_type: DataType, time: Duration) -> Vec<u8> {
-        let raw = self.quantity.at(time);
+        let raw = self.filtered(time);
         let (low, high) = self.seen.unwrap_or((raw, raw));
         let (low, high) = (low.min(raw), high.max(raw));
         self.seen = Some((low, high));
@@ -283,10 +312,15 @@ impl Channel {
             Shows::Field => {
                 let channel = self.quantity.channel();
                 let [start, end] = channel.field.unwrap_or([0.0, 10_000.0]);
-                let part = (raw - channel.start) / (channel.end - channel.start);
+                let part = (self.quantity.at(time) - channel.start) / (channel.end - channel.start);
                 number::to_bytes(start + part * (end - start), data_type)
             }
         }
+    }
+
+    /// The measured quantity at `time` behind the filter.
+    fn filtered(&mut self, time: Duration) -> f64 {
+        self.filter.value(&self.quantity, time)
     }
 
     /// A measured quantity as a value in the current unit, with factor and offset.

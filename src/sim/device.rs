@@ -177,6 +177,7 @@ impl Device {
         let by_other = other.is_some_and(|other| self.memory.objects.number(other.object) == other.auto);
         let starts = self.setup.start || by_other || startup & 0b1100 == 0b1000;
         self.enter(if starts { State::Operational } else { State::PreOperational }, now);
+        self.memory.channels.begin(&self.memory.objects, now.since_start());
         self.memory.emergencies.publish(&mut self.memory.objects);
         self.look_for_overload(now);
         self.send_emergencies(now, out);
@@ -197,7 +198,7 @@ impl Device {
 
     fn start_tpdos(&mut self, now: Mono) {
         for tpdo in &mut self.tpdos {
-            tpdo.start(&self.memory.objects, &self.memory.channels, now);
+            tpdo.start(&self.memory.objects, &mut self.memory.channels, now);
         }
     }
 
@@ -293,10 +294,10 @@ impl Device {
         let measuring = object.index >= 0x6000;
         for tpdo in &mut self.tpdos {
             if tpdo.is_configured_by(object.index) {
-                tpdo.start(&self.memory.objects, &self.memory.channels, now);
+                tpdo.start(&self.memory.objects, &mut self.memory.channels, now);
             } else if measuring {
                 // A limit, a unit, an offset: what can cause an event is worked out anew.
-                tpdo.watch(&self.memory.objects, &self.memory.channels, now);
+                tpdo.watch(&self.memory.objects, &mut self.memory.channels, now);
             }
         }
     }
@@ -338,9 +339,10 @@ impl Device {
             mapping.iter().filter_map(|object| Some((*object, self.memory.value(*object, time)?))).collect();
         let data: Vec<u8> = values.iter().flat_map(|(_, bytes)| bytes.iter().copied()).collect();
         let Ok(frame) = Frame::new(id, &data) else { return };
-        if !tpdo.note(cause, &data, &self.memory.objects, &self.memory.channels, now) {
+        if !tpdo.note(cause, &data, &self.memory.objects, &mut self.memory.channels, now) {
             return;
         }
+        self.memory.channels.sent(&mapping);
         out.send(frame);
         if self.recorder.is_some() {
             self.under_way.push_back((frame, self.lines(&values, time)));
@@ -461,7 +463,7 @@ impl Station for Device {
         self.send_emergencies(now, out);
         if self.is_operational() {
             for index in 0..self.tpdos.len() {
-                if let Some(cause) = self.tpdos[index].wake(&self.memory.objects, &self.memory.channels, now) {
+                if let Some(cause) = self.tpdos[index].wake(&self.memory.objects, &mut self.memory.channels, now) {
                     self.transmit(index, cause, now, out);
                 }
             }

@@ -81,7 +81,7 @@ impl Memory {
             None if self.objects.asks_for_default(object, bytes) => self.objects.put_default(object, self.node),
             None => {
                 self.objects.put(object, bytes.to_vec());
-                self.channels.damp(&mut self.objects, object);
+                self.channels.refilter(&mut self.objects, object, time);
             }
         }
         self.settings.keep(object, &self.objects);

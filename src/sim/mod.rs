@@ -13,6 +13,7 @@ mod bench;
 mod channels;
 mod device;
 mod emergency;
+mod filter;
 pub mod host;
 mod lss;
 mod memory;

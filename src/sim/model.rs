@@ -59,7 +59,7 @@ impl Quantity {
     }
 
     /// The number of the sample that is current at `time`.
-    fn index(&self, time: Duration) -> u64 {
+    pub(super) fn index(&self, time: Duration) -> u64 {
         u64::try_from(time.as_nanos() / self.sample.as_nanos()).unwrap_or(u64::MAX)
     }
 
@@ -75,7 +75,11 @@ impl Quantity {
 
     /// What is measured at `time`, in the unit of the channel.
     pub(super) fn at(&self, time: Duration) -> f64 {
-        let index = self.index(time);
+        self.sample(self.index(time))
+    }
+
+    /// A sample by its number.
+    pub(super) fn sample(&self, index: u64) -> f64 {
         let sampled = self.sample_time(index);
         let channel = &self.channel;
         // Clearly beyond the limit, whatever the noise does.
@@ -106,7 +110,11 @@ impl Quantity {
 
     /// Whether the quantity is beyond its limits at `time`, and on which side.
     pub(super) fn overload(&self, time: Duration) -> Option<Direction> {
-        let value = self.at(time);
+        self.beyond(self.at(time))
+    }
+
+    /// On which side a value is beyond the limits.
+    pub(super) fn beyond(&self, value: f64) -> Option<Direction> {
         if value > self.channel.end + self.margin {
             Some(Direction::High)
         } else if value < self.channel.start - self.margin {

@@ -109,14 +109,14 @@ impl Tpdo {
     }
 
     /// The node has become OPERATIONAL, or a parameter was written: begins anew. Nothing is sent by that.
-    pub(super) fn start(&mut self, objects: &Objects, channels: &Channels, now: Mono) {
+    pub(super) fn start(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
         *self = Tpdo::new(self.number);
         self.timer = self.event_timer(objects).map(|period| now + period);
         self.watch(objects, channels, now);
     }
 
     /// Works out which values can cause an event from now on.
-    pub(super) fn watch(&mut self, objects: &Objects, channels: &Channels, now: Mono) {
+    pub(super) fn watch(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
         self.watches.clear();
         if self.is_event_driven(objects) && self.cob_id(objects).is_some() {
             for object in self.mapping(objects) {
@@ -131,7 +131,7 @@ impl Tpdo {
         *self = Tpdo::new(self.number);
     }
 
-    fn plan_look(&mut self, objects: &Objects, channels: &Channels, now: Mono) {
+    fn plan_look(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
         let next = |watch: &Watch| channels.next_sample(objects, watch.object, now.since_start());
         self.look = self.watches.iter().filter_map(next).min().map(Mono::at);
     }
@@ -149,7 +149,7 @@ impl Tpdo {
     }
 
     /// Time has come to `now`: whether timer or event is a reason to send.
-    pub(super) fn wake(&mut self, objects: &Objects, channels: &Channels, now: Mono) -> Option<Cause> {
+    pub(super) fn wake(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) -> Option<Cause> {
         let mut event = self.held_back.is_some_and(|due| due <= now);
         if self.look.is_some_and(|due| due <= now) {
             for watch in &mut self.watches {
@@ -181,7 +181,7 @@ impl Tpdo {
         cause: Cause,
         data: &[u8],
         objects: &Objects,
-        channels: &Channels,
+        channels: &mut Channels,
         now: Mono,
     ) -> bool {
         if cause == Cause::IfChanged && self.sent.as_deref() == Some(data) {
@@ -199,7 +199,7 @@ impl Tpdo {
 
 impl Watch {
     /// `None` where nothing can ever happen, so that nobody has to look.
-    fn new(objects: &Objects, channels: &Channels, object: ObjectId, time: Duration) -> Option<Watch> {
+    fn new(objects: &Objects, channels: &mut Channels, object: ObjectId, time: Duration) -> Option<Watch> {
         let value = channels.number(objects, object, time)?;
         let parameter = |offset| objects.real(ObjectId::new(object.index.saturating_add(offset), object.sub));
         // Only x130h has its parameters at x133h.
@@ -222,7 +222,7 @@ impl Watch {
     }
 
     /// Whether the value has changed by delta, or has just passed a limit outwards.
-    fn look(&mut self, objects: &Objects, channels: &Channels, time: Duration) -> bool {
+    fn look(&mut self, objects: &Objects, channels: &mut Channels, time: Duration) -> bool {
         let Some(value) = channels.number(objects, self.object, time) else { return false };
         let mut event = self.delta > 0.0 && (value - self.reference).abs() >= self.delta;
         if let Some((lower, upper)) = self.limits {
