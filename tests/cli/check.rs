@@ -336,3 +336,19 @@ fn a_check_that_is_cut_short_says_nothing() {
     assert!(rest.ends_with("cangauge: interrupted\n"), "{rest}");
     assert!(bench.text("r.xml").contains(" errors=\"1\""));
 }
+
+/// Filters smooth: noise of 0.5 bar, evenly spread (0.29 bar), at the output of an MH-4.
+#[test]
+fn a_filter_takes_the_noise_out() {
+    let noisy = |set: &str| {
+        Bench::described(&format!(
+            "[[device]]\nkind = \"mh4\"\nnode = 5\nset = {{ {set} }}\n\
+             [[device.channel]]\nchannel = 1\nbase = 5.0\namplitude = 0.0\nnoise = 0.5\n"
+        ))
+    };
+    let words = ["5", "noise(pressure) < 0.1", "--for", "2s", "--sync", "20ms"];
+    check(&noisy(""), &words).exit(1);
+    check(&noisy("\"0x61A0:1\" = 1, \"0x61A1:1\" = 100"), &words).exit(0);
+    check(&noisy("\"0x61A0:1\" = 2, \"0x61A1:1\" = 30"), &words).exit(0);
+    check(&noisy("\"0x61A0:1\" = 0, \"0x61A1:1\" = 100"), &words).exit(1);
+}

@@ -123,7 +123,7 @@ fn filters() {
     // A damping is written, and shown by the constant that comes of it.
     let done = bench.run("filter 5 --type moving --damping 100ms -f json").exit(0);
     let filter = &done.json()[0];
-    assert_eq!((&filter["constant"], &filter["damping_shown"]), (&json!(156), &json!(true)));
+    assert_eq!((&filter["constant"], &filter["damping_shown"]), (&json!(34), &json!(true)));
     assert!(done.frames_of("605").contains(&"2B23200164000000"), "{:?}", done.frames_of("605"));
     let done = bench.run("filter 5 --damping 100ms").exit(2);
     assert_eq!(

@@ -9,6 +9,7 @@ use crate::sim::model::Overload;
 use std::sync::Arc;
 use std::sync::Mutex;
 
+mod filter;
 mod lss;
 mod stored;
 mod tpdo;
