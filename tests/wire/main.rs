@@ -6,10 +6,16 @@
 //! > 67F#4031610100000000     what the client must send next
 //! < 5FF#423161010000AB00     what the bus delivers
 //! ! timeout                  nothing more comes in time
+//! : 3s                       nothing more comes until then, counted from power on (simulated device)
 //! ~ early answer             what has not been sent yet is dropped, because an answer comes before
 //! = 11206656                 the value, "done", or the error in words
 //! ```
 //! After the last line nothing else may have been sent.
+//!
+//! `nmt`, `sync`: a frame that is only sent. `life` and `tpdo` hear: what each frame tells, one after the other; what
+//! stands at `after` is sent before.
+//!
+//! Behind a line `device KIND@NODE KEY=VALUE…` the same lines run on a simulated device, too ([`simulated`]).
 //!
 //! Block transfers have long runs of segments. `fill=LENGTH` names bytes 0, 1, … 250, 0, 1, …, `zeros=LENGTH`
 //! zeros. `segments 605 1-127 at 889` stands for the frames with these sequence numbers that carry the fill
@@ -18,11 +24,14 @@
 //! LSS collects answers until the time is over, which `=` says; `! ask again` is the repetition, `sent` the result
 //! of what nobody answers. Of a fastscan, every `<` and every `!` ends a step.
 
+mod simulated;
+
 use cangauge::canopen::frame::Frame;
-use cangauge::canopen::id::NodeId;
+use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::lss::{self, Answer, Exchange, ExchangeError, Fastscan, Part, Request};
-use cangauge::canopen::nmt::NmtCommand;
+use cangauge::canopen::nmt::{Life, NmtCommand};
 use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::pdo::{Field, MappingEntry, lay_out};
 use cangauge::canopen::sdo::{
     BlockDownload, BlockSize, BlockUpload, Download, DownloadSize, Progress, TransferError, Upload, Uploaded, fit,
 };
@@ -34,7 +43,9 @@ enum Machine {
     Download(Download),
     BlockUpload(BlockUpload, Option<DataType>),
     BlockDownload(BlockDownload),
-    Nmt,
+    Sent,
+    Life(NodeId),
+    Tpdo(CanId, Vec<Field>, Vec<DataType>),
     Lss(Exchange),
     Fastscan(Fastscan),
 }
@@ -44,6 +55,7 @@ struct Case {
     fill: Vec<u8>,
     sent: VecDeque<Frame>,
     outcome: Option<String>,
+    heard: Vec<String>,
 }
 
 impl Case {
@@ -97,7 +109,11 @@ impl Case {
             }
             other => panic!("no such case: {other}"),
         };
-        Case { machine, fill, sent: VecDeque::from([request]), outcome: None }
+        Case { machine, fill, sent: VecDeque::from([request]), outcome: None, heard: Vec::new() }
+    }
+
+    fn other(machine: Machine, sent: impl Into<VecDeque<Frame>>) -> Case {
+        Case { machine, fill: Vec::new(), sent: sent.into(), outcome: None, heard: Vec::new() }
     }
 
     /// Cases that are no SDO transfers.
@@ -105,18 +121,33 @@ impl Case {
         let number = |key: &str| keys[key].parse().expect("a number");
         let request = match kind {
             "nmt" => {
-                let command = match keys["command"] {
-                    "preop" => NmtCommand::EnterPreOperational,
-                    "reset" => NmtCommand::ResetNode,
-                    other => panic!("no such command: {other}"),
-                };
-                let sent = VecDeque::from([command.frame(Some(keys["node"].parse().expect("a node-ID")))]);
-                return Some(Case { machine: Machine::Nmt, fill: Vec::new(), sent, outcome: None });
+                return Some(Case::other(Machine::Sent, [nmt(keys["command"], keys["node"])]));
+            }
+            "sync" => return Some(Case::other(Machine::Sent, [Frame::empty(CanId::SYNC)])),
+            "life" => {
+                let node = keys["node"];
+                let sent = keys.get("after").map(|command| nmt(command, keys.get("of").unwrap_or(&node)));
+                let machine = Machine::Life(node.parse().expect("a node-ID"));
+                return Some(Case::other(machine, sent.into_iter().collect::<VecDeque<_>>()));
+            }
+            "tpdo" => {
+                let id = u16::from_str_radix(keys["id"], 16).expect("an identifier");
+                let parts = |key: &str| keys[key].split(',').map(str::to_owned).collect::<Vec<_>>();
+                let word = |text: &String| u32::from_str_radix(text, 16).expect("a mapping word");
+                let entries: Vec<_> = parts("mapping").iter().map(|text| MappingEntry::from_word(word(text))).collect();
+                let types = parts("types").iter().map(|name| name.parse().expect("a type")).collect();
+                let id = CanId::standard(id).expect("an identifier");
+                let sent = keys.get("after").map(|cause| match *cause {
+                    "sync" => Frame::empty(CanId::SYNC),
+                    command => nmt(command, keys["node"]),
+                });
+                let machine = Machine::Tpdo(id, lay_out(&entries), types);
+                return Some(Case::other(machine, sent.into_iter().collect::<VecDeque<_>>()));
             }
             "lss-fastscan" => {
                 let scan = Fastscan::new(1);
-                let sent = VecDeque::from([scan.step().request.frame()]);
-                return Some(Case { machine: Machine::Fastscan(scan), fill: Vec::new(), sent, outcome: None });
+                let sent = [scan.step().request.frame()];
+                return Some(Case::other(Machine::Fastscan(scan), sent));
             }
             "lss-select" => return Some(Case::of(Exchange::select(&keys["address"].parse().expect("an address")))),
             "lss-identify" => return Some(Case::of(Exchange::identify(&keys["range"].parse().expect("a range")))),
@@ -140,13 +171,14 @@ impl Case {
     }
 
     fn of(mut exchange: Exchange) -> Case {
-        let sent = exchange.ask().into();
-        Case { machine: Machine::Lss(exchange), fill: Vec::new(), sent, outcome: None }
+        let sent = exchange.ask();
+        Case::other(Machine::Lss(exchange), sent)
     }
 
     fn outcome(&self) -> Option<String> {
         match &self.machine {
-            Machine::Nmt => Some("sent".to_owned()),
+            Machine::Sent => Some("sent".to_owned()),
+            Machine::Life(_) | Machine::Tpdo(..) => Some(self.heard.join("; ")),
             Machine::Lss(exchange) if !exchange.is_answered() => Some("sent".to_owned()),
             Machine::Lss(exchange) => Some(match exchange.one() {
                 Ok(Answer::Acknowledge(_) | Answer::Selected | Answer::Here) => "done".to_owned(),
@@ -221,7 +253,21 @@ impl Case {
                 Progress::Done(()) => Some("done".to_owned()),
                 other => outcome(other),
             },
-            Machine::Nmt => None,
+            Machine::Sent => None,
+            Machine::Life(node) => {
+                let (of, life) = Life::parse(frame).expect("a sign of life");
+                assert_eq!(of, *node, "{frame}");
+                self.heard.push(match life {
+                    Life::BootUp => "boot-up".to_owned(),
+                    Life::State(state) => state.to_string(),
+                });
+                None
+            }
+            Machine::Tpdo(id, fields, types) => {
+                assert_eq!(frame.id(), *id, "{frame}");
+                self.heard.push(values(frame, fields, types));
+                None
+            }
             Machine::Lss(exchange) => {
                 exchange.on_frame(frame);
                 None
@@ -242,7 +288,7 @@ impl Case {
             Machine::Download(download) => Some(download.on_timeout(&mut out)),
             Machine::BlockUpload(upload, _) => upload.on_timeout(&mut out),
             Machine::BlockDownload(download) => Some(download.on_timeout(&mut out)),
-            Machine::Nmt => None,
+            Machine::Sent | Machine::Life(_) | Machine::Tpdo(..) => None,
             Machine::Lss(exchange) => {
                 out.extend(exchange.ask());
                 None
@@ -252,6 +298,28 @@ impl Case {
         self.sent.extend(out);
         self.outcome = error.map(failure);
     }
+}
+
+/// An NMT command to a node or `all`.
+fn nmt(command: &str, node: &str) -> Frame {
+    let command = match command {
+        "start" => NmtCommand::Start,
+        "stop" => NmtCommand::Stop,
+        "preop" => NmtCommand::EnterPreOperational,
+        "reset" => NmtCommand::ResetNode,
+        "reset-comm" => NmtCommand::ResetCommunication,
+        other => panic!("no such command: {other}"),
+    };
+    command.frame((node != "all").then(|| node.parse().expect("a node-ID")))
+}
+
+/// What stands in a TPDO.
+fn values(frame: &Frame, fields: &[Field], types: &[DataType]) -> String {
+    let values = fields.iter().zip(types).map(|(field, data_type)| {
+        let (bytes, length) = field.bytes(frame.data()).expect("a field");
+        data_type.decode(&bytes[..length]).expect("a value").to_string()
+    });
+    values.collect::<Vec<_>>().join(" ")
 }
 
 fn fill_or_value(fill: &[u8], data_type: Option<DataType>, uploaded: &Uploaded) -> String {
@@ -288,16 +356,21 @@ fn failure(error: TransferError) -> String {
     }
 }
 
-#[test]
-fn transcripts() {
-    let mut cases = 0;
+/// The transcripts, in the order of their names.
+fn files() -> Vec<std::path::PathBuf> {
     let mut files: Vec<_> = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/wire"))
         .expect("the folder of transcripts")
         .map(|entry| entry.expect("a file").path())
         .filter(|path| path.extension().is_some_and(|extension| extension == "can"))
         .collect();
     files.sort();
-    for path in files {
+    files
+}
+
+#[test]
+fn transcripts() {
+    let mut cases = 0;
+    for path in files() {
         let text = std::fs::read_to_string(&path).expect("a transcript");
         let mut case: Option<Case> = None;
         for (number, line) in text.lines().enumerate() {
@@ -305,7 +378,8 @@ fn transcripts() {
             let (mark, rest) = line.split_at(line.len().min(1));
             let rest = rest.trim();
             match mark {
-                "" | "#" => {}
+                "" | "#" | ":" => {}
+                _ if line.starts_with("device ") => {}
                 ">" => {
                     let case = case.as_mut().expect("a case");
                     for frame in case.frames(rest) {

@@ -1,0 +1,130 @@
+//! The same transcripts from the other end: what a master sends, and what a simulated device answers.
+//!
+//! `device KIND@NODE` puts one on a bus of its own, until the next such line or the end of the file; `device none` takes it away.
+//! Its quantities stand still at `base=VALUE`, or swing around it by `amplitude=` with a period of `period=` seconds;
+//! `quirk=` names a deviation that it has besides. A `<` may say how long
+//! after the frame before it comes: `+100ms`, on a millisecond. Where that is not said it comes within 5 ms. At the
+//! end of a case nothing else comes at once.
+
+use super::files;
+use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::bus::time::Mono;
+use cangauge::bus::{Bus, Event};
+use cangauge::canopen::frame::Frame;
+use cangauge::device::catalog::Model;
+use cangauge::sim::{Device, Setup};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A device, and when the last frame was complete.
+struct Played {
+    bus: MemoryBus,
+    last: Duration,
+}
+
+impl Played {
+    /// `None` for `none`.
+    fn new(line: &str) -> Option<Played> {
+        let mut words = line.split_whitespace();
+        let (kind, node) = words.next().filter(|word| *word != "none")?.split_once('@').expect("KIND@NODE");
+        let keys: Vec<(&str, &str)> = words.map(|word| word.split_once('=').expect("KEY=VALUE")).collect();
+        let path = format!("{}/src/device/devices/{kind}.toml", env!("CARGO_MANIFEST_DIR"));
+        let mut text = std::fs::read_to_string(path).expect("a description");
+        if let Some((_, quirk)) = keys.iter().find(|(key, _)| *key == "quirk") {
+            assert!(!text.contains("\nquirks ="), "one list of quirks");
+            text = text.replacen("\nname", &format!("\nquirks = [\"{quirk}\"]\nname"), 1);
+        }
+        let model = Model::from_toml(&text).expect("a description");
+        let mut setup = Setup::new(Arc::new(model), node.parse().expect("a node-ID"));
+        setup.channels.iter_mut().for_each(|channel| (channel.amplitude, channel.noise) = (0.0, 0.0));
+        for (key, value) in keys {
+            let number = || -> f64 { value.parse().expect("a number") };
+            match key {
+                "base" => setup.channels.iter_mut().for_each(|channel| channel.base = number()),
+                "amplitude" => setup.channels.iter_mut().for_each(|channel| channel.amplitude = number()),
+                "period" => setup.channels.iter_mut().for_each(|channel| channel.period_s = number()),
+                "quirk" => {}
+                other => panic!("no such key: {other}"),
+            }
+        }
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(Device::new(setup).expect("a device"));
+        Some(Played { bus, last: Duration::ZERO })
+    }
+
+    /// The next frame until `until`.
+    fn hear(&mut self, until: Duration) -> Option<(Duration, Frame)> {
+        loop {
+            match self.bus.receive(Mono::at(until)).expect("a memory bus never fails") {
+                Event::Frame(received) => return Some((received.at.mono.since_start(), received.frame)),
+                Event::Timeout => return None,
+                _ => {}
+            }
+        }
+    }
+
+    fn now(&self) -> Duration {
+        self.bus.now().mono.since_start()
+    }
+
+    fn line(&mut self, mark: &str, rest: &str, place: &str) {
+        match mark {
+            ">" => {
+                let frame = rest.split_whitespace().next().unwrap_or_default();
+                self.bus.send(&frame.parse().expect("a frame")).expect("room");
+                self.last = self.now();
+            }
+            "<" => {
+                let (frame, after) = rest.split_once(" +").unwrap_or((rest, ""));
+                let after = (!after.is_empty()).then(|| duration(after));
+                let until = self.last.max(self.now()) + after.unwrap_or_default() + Duration::from_millis(5);
+                let (at, heard) = self.hear(until).unwrap_or_else(|| panic!("{place}: silence"));
+                assert_eq!(heard.to_string(), frame, "{place}: sent by the device");
+                if let Some(after) = after {
+                    let waited = at - self.last;
+                    assert!(waited.abs_diff(after) <= Duration::from_millis(1), "{place}: after {waited:?}");
+                }
+                self.last = at;
+            }
+            ":" => {
+                let heard = self.hear(duration(rest));
+                assert_eq!(heard, None, "{place}: silent until then");
+                self.last = self.now();
+            }
+            "=" => {
+                let heard = self.hear(self.now() + Duration::from_millis(1));
+                assert_eq!(heard, None, "{place}: and nothing else comes");
+            }
+            "!" | "~" => panic!("{place}: not with a device"),
+            _ => {}
+        }
+    }
+}
+
+fn duration(text: &str) -> Duration {
+    let milliseconds = match text.strip_suffix("ms") {
+        Some(number) => number.parse().expect("a number"),
+        None => 1000 * text.strip_suffix('s').expect("ms or s").parse::<u64>().expect("a number"),
+    };
+    Duration::from_millis(milliseconds)
+}
+
+#[test]
+fn simulated_devices_answer_as_printed() {
+    let mut answers = 0;
+    for path in files() {
+        let text = std::fs::read_to_string(&path).expect("a transcript");
+        let mut played = None;
+        for (number, line) in text.lines().enumerate() {
+            let place = format!("{}:{}", path.display(), number + 1);
+            if let Some(spec) = line.strip_prefix("device ") {
+                played = Played::new(spec);
+            } else if let Some(played) = &mut played {
+                let (mark, rest) = line.split_at(line.len().min(1));
+                played.line(mark, rest.trim(), &place);
+                answers += usize::from(mark == "<");
+            }
+        }
+    }
+    assert!(answers > 60, "only {answers} answers were compared");
+}
