@@ -3,8 +3,8 @@
 //! `device KIND@NODE` puts one on a bus of its own, until the next such line or the end of the file; `device none` takes it away.
 //! Its quantities stand still at `base=VALUE`, or swing around it by `amplitude=` with a period of `period=` seconds;
 //! `quirk=` names a deviation that it has besides. A `<` may say how long
-//! after the frame before it comes: `+100ms`, on a millisecond. Where that is not said it comes within 5 ms. At the
-//! end of a case nothing else comes at once.
+//! after the frame before it comes: `+100ms`, give or take two, or `+<100ms` at most. Where that is not said it comes within 5 ms. Between
+//! the cases nothing else comes at once.
 
 use super::files;
 use cangauge::bus::memory::{Clock, MemoryBus};
@@ -20,6 +20,8 @@ use std::time::Duration;
 struct Played {
     bus: MemoryBus,
     last: Duration,
+    /// Whether a case has come to its end.
+    is_over: bool,
 }
 
 impl Played {
@@ -35,6 +37,8 @@ impl Played {
             text = text.replacen("\nname", &format!("\nquirks = [\"{quirk}\"]\nname"), 1);
         }
         let model = Model::from_toml(&text).expect("a description");
+        let mut bus =
+            MemoryBus::new(Clock::Virtual).with_bit_rate(model.description.factory.bit_rate.unwrap_or(125_000));
         let mut setup = Setup::new(Arc::new(model), node.parse().expect("a node-ID"));
         setup.channels.iter_mut().for_each(|channel| (channel.amplitude, channel.noise) = (0.0, 0.0));
         for (key, value) in keys {
@@ -47,9 +51,8 @@ impl Played {
                 other => panic!("no such key: {other}"),
             }
         }
-        let mut bus = MemoryBus::new(Clock::Virtual);
         bus.attach(Device::new(setup).expect("a device"));
-        Some(Played { bus, last: Duration::ZERO })
+        Some(Played { bus, last: Duration::ZERO, is_over: false })
     }
 
     /// The next frame until `until`.
@@ -67,23 +70,32 @@ impl Played {
         self.bus.now().mono.since_start()
     }
 
+    /// After the end of a case nothing comes for a millisecond, unless the next one waits for it.
+    fn expect_silence(&mut self, place: &str) {
+        if std::mem::take(&mut self.is_over) {
+            let heard = self.hear(self.now() + Duration::from_millis(1));
+            assert_eq!(heard, None, "{place}: before that nothing else comes");
+        }
+    }
+
     fn line(&mut self, mark: &str, rest: &str, place: &str) {
         match mark {
             ">" => {
+                self.expect_silence(place);
                 let frame = rest.split_whitespace().next().unwrap_or_default();
                 self.bus.send(&frame.parse().expect("a frame")).expect("room");
                 self.last = self.now();
             }
             "<" => {
-                let (frame, after) = rest.split_once(" +").unwrap_or((rest, ""));
-                let after = (!after.is_empty()).then(|| duration(after));
-                let until = self.last.max(self.now()) + after.unwrap_or_default() + Duration::from_millis(5);
+                self.is_over = false;
+                let (frame, after) = rest.split_once(" +").unwrap_or((rest, "<5ms"));
+                let (within, after) = after.strip_prefix('<').map_or((false, after), |after| (true, after));
+                let (after, tolerance) = (duration(after), Duration::from_millis(2));
+                let until = self.last.max(self.now()) + after + tolerance;
                 let (at, heard) = self.hear(until).unwrap_or_else(|| panic!("{place}: silence"));
                 assert_eq!(heard.to_string(), frame, "{place}: sent by the device");
-                if let Some(after) = after {
-                    let waited = at - self.last;
-                    assert!(waited.abs_diff(after) <= Duration::from_millis(1), "{place}: after {waited:?}");
-                }
+                let waited = at - self.last;
+                assert!(within || waited + tolerance >= after, "{place}: after {waited:?} already");
                 self.last = at;
             }
             ":" => {
@@ -91,10 +103,7 @@ impl Played {
                 assert_eq!(heard, None, "{place}: silent until then");
                 self.last = self.now();
             }
-            "=" => {
-                let heard = self.hear(self.now() + Duration::from_millis(1));
-                assert_eq!(heard, None, "{place}: and nothing else comes");
-            }
+            "=" => self.is_over = true,
             "!" | "~" => panic!("{place}: not with a device"),
             _ => {}
         }
@@ -118,6 +127,7 @@ fn simulated_devices_answer_as_printed() {
         for (number, line) in text.lines().enumerate() {
             let place = format!("{}:{}", path.display(), number + 1);
             if let Some(spec) = line.strip_prefix("device ") {
+                played.iter_mut().for_each(|played: &mut Played| played.expect_silence(&place));
                 played = Played::new(spec);
             } else if let Some(played) = &mut played {
                 let (mark, rest) = line.split_at(line.len().min(1));
