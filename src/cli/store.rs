@@ -37,7 +37,7 @@ pub(crate) struct Store {
 /// Give devices their settings as delivered (1011h); node-ID and bit rate stay
 ///
 /// "load" goes out once; at least 3 s are left for the answer, and a command that got none is not repeated. The
-/// settings come into force at the next reset of the node.
+/// settings come into force at the next reset of the node only: a store before that may keep the old ones.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim restore 1 --reset\n  cangauge -b sim restore 1 --group comm --reset\n  cangauge -b sim restore 127"

@@ -29,7 +29,12 @@ pub fn restore(master: &mut Master<'_>, device: &Instrument, group: Group, reset
     let mut done = Done { groups: vec![group], verified: Verified::Ack, notes: Vec::new() };
     if !reset {
         done.notes.push(format!(
-            "the defaults come into force at its next reset; a store before that would keep what it has now: cangauge nmt reset {node}"
+            "the defaults hold only after its next reset, and a store before that may keep the old values; to finish: \
+             cangauge nmt reset {node}, or cangauge restore {node}{} --reset, which compares, too",
+            match group {
+                Group::All => String::new(),
+                _ => format!(" --group {}", group.as_str()),
+            }
         ));
         return Ok(done);
     }

@@ -34,6 +34,32 @@ fn storing_restoring_and_what_a_reset_does_to_each() {
     play(&mut bus, &[("605#4031610100000000", "585#4331610100004E00")]);
 }
 
+/// Why a restore without a reset ends with a warning: nothing shows it, and the store takes it back.
+#[test]
+fn a_store_between_restore_and_reset_keeps_the_old_values() {
+    for (kind, answers) in [("mh4", "43"), ("d20", "42"), ("dps", "42")] {
+        let mut bus = bus([still(kind, 5, 5.0)]);
+        hear(&mut bus, ms(1));
+        let kpa = if kind == "dps" { "00002203" } else { "0000AB00" };
+        let [unit, save, load] =
+            [format!("605#22316101{kpa}"), "605#2210100173617665".into(), "605#221110016C6F6164".into()];
+        let read = |bus: &mut MemoryBus| ask(bus, "605#4031610100000000").pop().expect("an answer");
+        let as_delivered = read(&mut bus);
+        for frame in [unit, save, load] {
+            let answer = ask(&mut bus, &frame).pop().expect("an answer");
+            assert!(answer.starts_with("585#60"), "{kind}: {answer}");
+        }
+        assert_eq!(read(&mut bus), format!("585#{answers}316101{kpa}"), "{kind}: restored, and works on as before");
+        ask(&mut bus, "605#2210100173617665");
+        assert_eq!(reset(&mut bus, "000#8105"), ["705#00"]);
+        assert_eq!(read(&mut bus), format!("585#{answers}316101{kpa}"), "{kind}: the store took the restore back");
+        // Without the store it holds.
+        ask(&mut bus, "605#221110016C6F6164");
+        assert_eq!(reset(&mut bus, "000#8105"), ["705#00"]);
+        assert_eq!(read(&mut bus), as_delivered, "{kind}");
+    }
+}
+
 #[test]
 fn saving_everything_loses_the_identifiers_of_an_mh4() {
     for (sub, after) in [("01", "4300180185010040"), ("02", "43001801AA010040")] {
