@@ -237,3 +237,16 @@ fn wrong_words_are_refused_before_the_bus_is_opened() {
         .run("lss activate all 66s")
         .refuses("the delay goes from 1ms to 65.535s (CiA 305 has 16 bits for milliseconds)");
 }
+
+#[test]
+fn objects_are_not_set_without_storing_them() {
+    let what = "what stands in its objects comes into force once it is stored (0x1010:1) and reset, so that --no-store \
+                cannot be: nothing was changed\nhint: leave --no-store out, or by LSS where it has it: --via lss\n";
+    let done = Bench::of(ALL).run("lss set-id 1 12 --via sdo --no-store").exit(2);
+    assert_eq!(done.stderr, format!("cangauge: node 1: {what}"));
+    assert!(done.frames_of("601").iter().all(|frame| frame.starts_with('4')), "only read: {:?}", done.frames_of("601"));
+    assert_eq!((done.frames_of("000"), done.frames_of("7E5")), (vec![], vec![]));
+    // Where it is said what the device is, the bus is not opened for it.
+    let done = Bench::of(ALL).run("lss set-bitrate 1 125k --via sdo --no-store --device mh4").exit(2);
+    assert_eq!((done.stderr, done.frames.len()), (format!("cangauge: {what}"), 0));
+}

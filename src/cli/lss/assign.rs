@@ -8,7 +8,7 @@ use crate::cli::{Format, Global};
 use crate::output::json_lss;
 use crate::tasks::failure::together;
 use crate::tasks::host::by_hand;
-use crate::tasks::lss::{Job, PlannedRate, Rate, Report, Target, Via, assign, check_rate};
+use crate::tasks::lss::{Job, PlannedRate, Rate, Report, Target, Via, assign, check_rate, check_store};
 use crate::tasks::{Failure, Kind};
 use clap::{Args, ValueEnum};
 use std::io::{self, Write};
@@ -163,11 +163,12 @@ impl Options {
             ViaArg::Sdo => Via::Sdo,
         };
         let (overrides, given) = descriptions.named();
-        // What the user says of the device is enough to refuse a bit rate before anything is sent.
+        // What the user says of the device is enough to refuse a bit rate, and a way, before anything is sent.
         let model = match target {
             Target::Node(node) => overrides.get(node),
             _ => given,
         };
+        model.map_or(Ok(()), |model| check_store(&model.description, !self.no_store, via))?;
         for rate in wanted.iter().filter_map(|(_, rate, _)| *rate) {
             model.map_or(Ok(()), |model| check_rate(&model.description, rate, via))?;
         }

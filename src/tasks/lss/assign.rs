@@ -91,7 +91,7 @@ pub struct Report {
 pub fn assign(master: &mut Master<'_>, job: &Job<'_>, tell: Tell<'_>) -> Result<Report, Failure> {
     let knowledge = Knowledge { overrides: job.overrides, given: job.given.as_ref() };
     let subject = subject(master, &job.target, &knowledge, (job.via, job.force), tell)?;
-    let way = way(&subject, job.via, tell)?;
+    let way = way(&subject, job.via, job.store, tell)?;
     let description = subject.model.as_ref().map(|model| &model.description);
     let rate = job.rate.map(|rate| plan_rate(description, rate, way.way)).transpose()?;
     if let (Some(Rate::Bits(_)), RateSource::Standard) = (job.rate, RateTable::of(description).source) {

@@ -23,7 +23,7 @@ pub use cob_ids::{CobIds, Stale};
 pub use confirm::Confirmed;
 pub use find::{Slave, identify, scan};
 pub use single::{Inquired, Named, activate, inquire, store};
-pub use ways::{PlannedRate, Rate, check_rate};
+pub use ways::{PlannedRate, Rate, check_rate, check_store};
 
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddressError;

@@ -45,7 +45,7 @@ pub fn inquire(
     tell: Tell<'_>,
 ) -> Result<Inquired, Failure> {
     let subject = find(master, target, named, false, tell)?;
-    let way = way(&subject, Via::Lss, tell)?;
+    let way = way(&subject, Via::Lss, true, tell)?;
     let session = prepared(master, &subject, &way, tell, |lss| {
         let failed = |error| subject.lss_failure(error);
         let address = unless_silent(lss.inquire_address()).map_err(failed)?;
@@ -118,7 +118,7 @@ fn service(
     mut work: impl FnMut(&mut Lss<'_, '_>) -> Result<(), LssError>,
 ) -> Result<(), Failure> {
     let subject = find(master, target, named, force, tell)?;
-    let way = way(&subject, Via::Lss, tell)?;
+    let way = way(&subject, Via::Lss, true, tell)?;
     let session = prepared(master, &subject, &way, tell, |lss| work(lss).map_err(|error| subject.lss_failure(error)))?;
     put_back(master, session.before, tell);
     Ok(())

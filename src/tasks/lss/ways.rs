@@ -49,13 +49,16 @@ impl fmt::Display for PlannedRate {
     }
 }
 
+const STORE_IT: &str = "leave --no-store out, or by LSS where it has it: --via lss";
+
 const STORE_ALL: ObjectId = ObjectId::new(0x1010, 1);
 
-/// The way to take.
+/// The way to take. `store` is whether what is set is to last.
 ///
 /// # Errors
-/// A device without the objects that were asked for, or where they cannot be reached.
-pub(super) fn way(subject: &Subject, via: Via, tell: Tell<'_>) -> Result<AssignEntry, Failure> {
+/// A device without the objects that were asked for, or where they cannot be reached; objects that cannot be set
+/// without being stored.
+pub(super) fn way(subject: &Subject, via: Via, store: bool, tell: Tell<'_>) -> Result<AssignEntry, Failure> {
     let description = subject.model.as_ref().map(|model| &model.description);
     let entry = match via {
         Via::Auto => description.and_then(Description::assign_way).cloned(),
@@ -76,6 +79,7 @@ pub(super) fn way(subject: &Subject, via: Via, tell: Tell<'_>) -> Result<AssignE
             "its objects cannot be reached: SDO under its node-ID does not reach it alone; nothing was changed";
         return Err(subject.failure(Kind::CheckFailed, message).hint("connect it alone, or by LSS: --via lss"));
     }
+    check_lasts(&entry, store).map_err(|message| subject.failure(Kind::Usage, message).hint(STORE_IT))?;
     if entry.unverified {
         let message = format!("{}: no source prints this way: {}", subject.name(), entry.doubt);
         tell(Note::Warning(message));
@@ -136,6 +140,31 @@ pub fn check_rate(description: &Description, rate: Rate, via: Via) -> Result<(),
         Via::Sdo => AssignWay::Objects,
     };
     plan_rate(Some(description), rate, way).map(|_| ())
+}
+
+/// Refuses to set objects of a device of this description without storing them; to be asked before the bus is opened.
+///
+/// # Errors
+/// [`Kind::Usage`] where only what is stored comes into force, or where it lasts as soon as it is written.
+pub fn check_store(description: &Description, store: bool, via: Via) -> Result<(), Failure> {
+    let entry = match via {
+        Via::Auto => description.assign_way(),
+        Via::Lss => None,
+        Via::Sdo => description.assign_by(AssignWay::Objects),
+    };
+    let checked = entry.map_or(Ok(()), |entry| check_lasts(entry, store));
+    checked.map_err(|message| Failure::new(Kind::Usage, message).hint(STORE_IT))
+}
+
+fn check_lasts(entry: &AssignEntry, store: bool) -> Result<(), String> {
+    if store || entry.way != AssignWay::Objects {
+        return Ok(());
+    }
+    let why = match entry.store {
+        Some(object) => format!("what stands in its objects comes into force once it is stored ({object}) and reset"),
+        None => "what is written to its objects lasts".to_owned(),
+    };
+    Err(format!("{why}, so that --no-store cannot be: nothing was changed"))
 }
 
 /// The object that takes a number by this way.

@@ -99,7 +99,5 @@ fn may_be_odd(spec: &Spec, message: &str) -> bool {
         ]
         .iter()
         .any(|part| message.contains(part))
-        || matches!(spec.command, Command::Assign { store: false, via: Via::Sdo, .. })
-            && message.contains("it has been reset and is still")
         || is_lss(&spec.command) && spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
 }

@@ -228,6 +228,24 @@ fn by_objects_of_its_own() {
 }
 
 #[test]
+fn objects_that_cannot_be_set_for_a_while_are_not_touched() {
+    // MH-4: in force "after 1010h and a reset". A HYDAC of the old kind keeps what is written.
+    for (kind, device, why) in [
+        ("mh4", None, "once it is stored (0x1010:1)"),
+        ("hydac", None, "once it is stored (0x1010:4)"),
+        ("hydac-old", Some("hydac-old"), "lasts"),
+    ] {
+        let mut bus = bus(&format!("device = [{{ kind = '{kind}', node = 5 }}]"));
+        let expected = all_held(&bus);
+        let done = run(&mut bus, "5", &Wanted { via: Via::Sdo, no_store: true, device, ..id(12) });
+        let (failure, message) = done.failure();
+        assert!(message.contains(why) && message.contains("nothing was changed"), "{failure:?} {message}");
+        assert_eq!(all_held(&bus), expected);
+        assert!(!done.warns("1010h:1"), "{:?}", done.notes);
+    }
+}
+
+#[test]
 fn what_is_not_stored_is_gone_with_the_power() {
     let mut bus = bus(ALL);
     let expected = all_held(&bus);
