@@ -12,7 +12,7 @@ use std::io::{self, Write};
 
 /// Tell everything about one device on one page
 ///
-/// Identity, versions, bit rate, monitoring, errors, signals with unit, range and status, their settings,
+/// Identity, versions, bit rate, NMT state where something tells it, monitoring, errors, signals with unit, range and status, their settings,
 /// TPDOs, the manufacturer's objects, what 1010h keeps and what not. What the device has not is left out.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b sim info 1\n  cangauge -b sim info 127 --format json")]

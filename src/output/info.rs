@@ -42,6 +42,7 @@ pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
     section(out, "identity", &identity(info))?;
     let mut rows: Rows = Vec::new();
     rows.extend(info.bit_rate.map(|rate| row("bit rate", format!("{} kbit/s", f64::from(rate) / 1000.0))));
+    rows.push(row("state", state(info)));
     rows.push(row("monitoring", &info.monitoring));
     rows.extend(info.communication.iter().map(|setting| row(&setting.name, &setting.text)));
     section(out, "communication", &rows)?;
@@ -55,6 +56,15 @@ pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
     rows.extend(info.own.iter().map(|setting| row(&full_name(setting), &setting.text)));
     section(out, "of the manufacturer", &rows)?;
     section(out, "stored by 1010h", &store(info))
+}
+
+/// The NMT state and what told it, or how it is found out.
+fn state(info: &Info) -> String {
+    match info.state.map(|report| (report.state, report.by)) {
+        Some((Some(state), by)) => format!("{state} ({})", by.as_str()),
+        Some((None, _)) => format!("not known: cangauge nmt state {} --probe finds it out", info.instrument.node),
+        None => format!("not waited for: cangauge nmt state {}", info.instrument.node),
+    }
 }
 
 fn identity(info: &Info) -> Rows {

@@ -24,6 +24,7 @@ fn a_page_of_an_mh4() {
         "node 5: WIKA MH-4-CAN",
         "  revision     0x00010007 1.7",
         "  bit rate                 250 kbit/s",
+        "  state                    pre-operational (heartbeat)",
         "  monitoring               heartbeat every 1000 ms",
         "  emcy-inhibit-time        0.0 ms",
         "  nmt-startup              0 the master starts the device",
@@ -67,6 +68,27 @@ fn every_device_has_its_page_and_one_object() {
         let asked_in_vain = |frame: &&&str| frame.starts_with("80");
         assert_eq!(done.frames_of(&format!("{:X}", 0x580 + node)).iter().filter(asked_in_vain).count(), 0, "{node}");
     }
+}
+
+#[test]
+fn the_state_where_something_tells_it() {
+    let line = |done: &super::Done| {
+        let line = done.stdout.lines().find(|line| line.starts_with("  state ")).expect("a state");
+        line.split_once(' ').map(|_| line.trim_start().trim_start_matches("state").trim().to_owned()).expect("text")
+    };
+    let bench = Bench::of(ALL);
+    // The MH-4 has neither heartbeat nor guarding as delivered; the D-20-9 can be guarded, which arms nothing.
+    assert_eq!(line(&bench.run("info 1").exit(0)), "not known: cangauge nmt state 1 --probe finds it out");
+    let done = bench.run("info 2").exit(0);
+    assert_eq!(line(&done), "pre-operational (guarding)");
+    assert_eq!(done.frames_of("702").iter().filter(|frame| frame.starts_with('R')).count(), 1);
+    assert_eq!(bench.run("info 1 -f json").exit(0).json()[0]["state"], Value::Null);
+    assert_eq!(bench.run("info 2 -f json").exit(0).json()[0]["state"], "pre-operational");
+    // A page does not wait a minute for a heartbeat, and does not guard beside one.
+    let bench = Bench::described("[[device]]\nkind = \"d20\"\nnode = 5\nstart = true\nset = { \"0x1017\" = 60000 }\n");
+    let done = bench.run("info 5").exit(0);
+    assert_eq!(line(&done), "not waited for: cangauge nmt state 5");
+    assert!(!done.frames_of("705").iter().any(|frame| frame.starts_with('R')), "{:?}", done.frames_of("705"));
 }
 
 #[test]

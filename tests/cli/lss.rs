@@ -244,7 +244,11 @@ fn objects_are_not_set_without_storing_them() {
                 cannot be: nothing was changed\nhint: leave --no-store out, or by LSS where it has it: --via lss\n";
     let done = Bench::of(ALL).run("lss set-id 1 12 --via sdo --no-store").exit(2);
     assert_eq!(done.stderr, format!("cangauge: node 1: {what}"));
-    assert!(!done.frames_of("601").iter().any(|frame| frame.starts_with('2')), "only read: {:?}", done.frames_of("601"));
+    assert!(
+        !done.frames_of("601").iter().any(|frame| frame.starts_with('2')),
+        "only read: {:?}",
+        done.frames_of("601")
+    );
     assert_eq!((done.frames_of("000"), done.frames_of("7E5")), (vec![], vec![]));
     // Where it is said what the device is, the bus is not opened for it.
     let done = Bench::of(ALL).run("lss set-bitrate 1 125k --via sdo --no-store --device mh4").exit(2);

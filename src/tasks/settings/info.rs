@@ -9,8 +9,10 @@ use crate::master::Master;
 use crate::measure::instrument::{Instrument, Signal};
 use crate::measure::sample::Sample;
 use crate::tasks::Failure;
+use crate::tasks::nmt;
 use crate::tasks::read::{requests, sample, targets};
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
 /// The page.
 #[derive(Clone, Debug)]
@@ -23,6 +25,8 @@ pub struct Info {
     pub software: Option<String>,
     /// Of the bus, or what the device is set to, in bit/s.
     pub bit_rate: Option<u32>,
+    /// The NMT state, and what told it; `None` where nothing was asked, since the heartbeat is too slow to wait for.
+    pub state: Option<nmt::Report>,
     /// How it is noticed that the device is gone.
     pub monitoring: String,
     /// The communication objects.
@@ -93,6 +97,9 @@ const COMMUNICATION: [u16; 9] = [0x1005, 0x1006, 0x100c, 0x100d, 0x1014, 0x1015,
 /// Objects of a channel, as indices without the first digit; the rest of CiA 404 stands in all families.
 const SCALING: [u16; 5] = [0x120, 0x121, 0x122, 0x123, 0x124];
 
+/// A slower heartbeat is not waited for: a page is to be there at once.
+const PATIENCE: Duration = Duration::from_secs(2);
+
 /// Reads the page. What the device lacks or refuses is left out.
 ///
 /// # Errors
@@ -128,6 +135,7 @@ pub fn read(master: &mut Master<'_>, device: &Device) -> Result<Info, Failure> {
         Err(failure) if failure.object.is_none() && failure.kind == crate::tasks::Kind::Unexpected => None,
         Err(failure) => return Err(failure),
     };
+    let state = state(master, device, &values)?;
     let text = |object: ObjectId| values.get(&object).map(Value::to_string);
     let setting = |signal: Option<&Signal>, object: ObjectId| {
         let value = values.get(&object)?.clone();
@@ -147,6 +155,7 @@ pub fn read(master: &mut Master<'_>, device: &Device) -> Result<Info, Failure> {
         hardware: text(HARDWARE),
         software: text(SOFTWARE),
         bit_rate: page::bit_rate(device, &values).or(master.bus().bit_rate()),
+        state,
         monitoring: monitoring(&values),
         communication: communication.into_iter().filter_map(|object| setting(None, object)).collect(),
         errors,
@@ -235,6 +244,21 @@ fn samples(master: &mut Master<'_>, device: &Device) -> Result<Vec<Option<Sample
         });
     }
     Ok(samples)
+}
+
+/// The NMT state, where heartbeat or guarding tell it soon.
+fn state(
+    master: &mut Master<'_>,
+    device: &Device,
+    values: &BTreeMap<ObjectId, Value>,
+) -> Result<Option<nmt::Report>, Failure> {
+    let number = |object: ObjectId| values.get(&object).and_then(Value::as_u64);
+    let heartbeat = number(HEARTBEAT).filter(|&time| time > 0).map(Duration::from_millis);
+    if heartbeat.is_some_and(|period| period > PATIENCE) {
+        return Ok(None);
+    }
+    let may_guard = number(GUARD_TIME) == Some(0) && number(LIFE_TIME) == Some(0);
+    Ok(nmt::state_of(master, device.instrument.node, heartbeat, may_guard)?)
 }
 
 /// How it is noticed that the device is gone: heartbeat or node guarding, of which CiA 301 allows one.
