@@ -571,7 +571,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
-            [CompletionResult]::new('scan', 'scan', [CompletionResultType]::ParameterValue, 'List who can be given a node-ID: those that have one by SDO, one that has none by fastscan')
+            [CompletionResult]::new('scan', 'scan', [CompletionResultType]::ParameterValue, 'List who can be given a node-ID: those that have one by SDO, those that have none by fastscan')
             [CompletionResult]::new('inquire', 'inquire', [CompletionResultType]::ParameterValue, 'Ask a device for its identity and node-ID by LSS')
             [CompletionResult]::new('set-id', 'set-id', [CompletionResultType]::ParameterValue, 'Give a device its node-ID: checked to be free, configured, stored, reset, and confirmed')
             [CompletionResult]::new('set-bitrate', 'set-bitrate', [CompletionResultType]::ParameterValue, 'Give a device its bit rate, by its own table')
@@ -784,7 +784,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;lss;help' {
-            [CompletionResult]::new('scan', 'scan', [CompletionResultType]::ParameterValue, 'List who can be given a node-ID: those that have one by SDO, one that has none by fastscan')
+            [CompletionResult]::new('scan', 'scan', [CompletionResultType]::ParameterValue, 'List who can be given a node-ID: those that have one by SDO, those that have none by fastscan')
             [CompletionResult]::new('inquire', 'inquire', [CompletionResultType]::ParameterValue, 'Ask a device for its identity and node-ID by LSS')
             [CompletionResult]::new('set-id', 'set-id', [CompletionResultType]::ParameterValue, 'Give a device its node-ID: checked to be free, configured, stored, reset, and confirmed')
             [CompletionResult]::new('set-bitrate', 'set-bitrate', [CompletionResultType]::ParameterValue, 'Give a device its bit rate, by its own table')

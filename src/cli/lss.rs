@@ -32,7 +32,7 @@ pub(crate) struct LssCommand {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// List who can be given a node-ID: those that have one by SDO, one that has none by fastscan
+    /// List who can be given a node-ID: those that have one by SDO, those that have none by fastscan
     Scan,
     /// Ask a device for its identity and node-ID by LSS
     Inquire(TargetArgs),

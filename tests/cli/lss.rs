@@ -211,6 +211,19 @@ fn who_is_there_and_who_he_is() {
     );
     let done = bench.run("lss scan -f json").exit(0);
     assert_eq!(done.json()[1]["node"], serde_json::Value::Null);
+    // Each is set aside while the next one is looked for, and nobody is changed by it.
+    let several = [30, 10, 20].map(|serial| format!("[[device]]\nkind = \"mh4\"\nserial = {serial}\n")).concat();
+    let done = Bench::described(&several).run("lss scan -f csv").exit(0);
+    let serials: Vec<_> = done.stdout.lines().skip(1).map(|line| line.rsplit(',').next().unwrap_or_default()).collect();
+    assert_eq!((serials, done.stderr.as_str()), (vec!["10", "20", "30"], ""));
+    let services: Vec<&str> = done.frames_of("7E5").into_iter().map(|frame| &frame[..2]).collect();
+    assert!(!services.iter().any(|service| ["11", "13", "15", "17"].contains(service)), "{services:?}");
+    assert_eq!(done.frames_of("7E5").last(), Some(&"0400000000000000"), "left again");
+    // One that takes part in configuration state, too, hides the others, which is said.
+    let hides = "[[device]]\nkind = \"mh4\"\nserial = 10\nlss = { scans_for_ever = true }\n";
+    let done = Bench::described(&format!("{hides}[[device]]\nkind = \"dps\"\n")).run("lss scan -f json").exit(0);
+    assert_eq!((done.json().len(), done.json()[0]["serial"].clone()), (1, 10.into()), "{}", done.stdout);
+    assert!(done.stderr.contains("whether there are more devices"), "{}", done.stderr);
     Bench::of(ALL).run("lss inquire 1").prints("0x47:0x1:0x10007:10001  node 1\n");
     Bench::of(ALL).run("lss inquire 1 -f json").prints(
         "{\"target\":\"1\",\"node\":1,\"unconfigured\":false,\"vendor\":71,\"product\":1,\"revision\":65543,\"serial\":10001}\n",

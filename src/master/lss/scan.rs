@@ -49,7 +49,8 @@ impl Pace {
 
 impl Lss<'_, '_> {
     /// 51h: finds a slave without a node-ID and takes it to configuration state; `None` where there is none.
-    /// Several slaves are found one after the other, each given a node-ID before the next is looked for.
+    /// Several slaves are found one after the other, each given a node-ID before the next is looked for, or set
+    /// aside: see [`Lss::fastscan_beside`].
     ///
     /// Everybody is sent to waiting state first. That the slave in configuration state is the one found is
     /// confirmed by its own words, or where it has none by addressing it.
@@ -57,6 +58,15 @@ impl Lss<'_, '_> {
     /// # Errors
     /// Slaves that answer and have no address that holds; what stops everything.
     pub fn fastscan(&mut self) -> Result<Option<LssAddress>, LssError> {
+        self.fastscan_beside(&[])
+    }
+
+    /// The same with slaves set aside: they are addressed and wait in configuration state, where they are not to take
+    /// part (CiA 305, 7.5.3.5). Nothing is changed in them. One that takes part all the same is found again.
+    ///
+    /// # Errors
+    /// As [`Lss::fastscan`], and one of `aside` that does not answer.
+    pub fn fastscan_beside(&mut self, aside: &[LssAddress]) -> Result<Option<LssAddress>, LssError> {
         let mut scan = Fastscan::new(self.master.timing.retries);
         let mut pace = Pace { slowest: Duration::ZERO, timeout: self.master.timing.timeout };
         self.is_configuring = true;
@@ -66,15 +76,19 @@ impl Lss<'_, '_> {
             if step.wait == Wait::Everybody {
                 self.switch_global(Mode::Waiting)?;
                 self.is_configuring = true;
+                for address in aside {
+                    self.switch_selective(address)?;
+                }
             }
             let answers = self.step(step, &mut pace)?;
             match scan.on_end(answers) {
                 Progress::Continue => {}
                 Progress::Nobody => {
-                    self.is_configuring = false;
+                    self.is_configuring = !aside.is_empty();
                     return Ok(None);
                 }
-                Progress::Found(address) => return self.confirm(address).map(|()| Some(address)),
+                Progress::Found(address) if aside.is_empty() => return self.confirm(address).map(|()| Some(address)),
+                Progress::Found(address) => return self.readdress(address).map(|()| Some(address)),
                 Progress::Failed(error) => return Err(LssError::Fastscan(error)),
             }
         }
@@ -111,12 +125,16 @@ impl Lss<'_, '_> {
             Ok(told) if told == found => Ok(()),
             Ok(told) => Err(LssError::Mistaken { found, told }),
             // It need not know the service.
-            Err(LssError::NoAnswer { .. }) => {
-                self.switch_global(Mode::Waiting)?;
-                self.switch_selective(&found)
-            }
+            Err(LssError::NoAnswer { .. }) => self.readdress(found),
             Err(error) => Err(error),
         }
+    }
+
+    /// Addresses the slave that was found. An answer is one to this address, and nobody else stays in configuration
+    /// state.
+    fn readdress(&mut self, found: LssAddress) -> Result<(), LssError> {
+        self.switch_global(Mode::Waiting)?;
+        self.switch_selective(&found)
     }
 }
 

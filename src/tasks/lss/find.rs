@@ -6,7 +6,7 @@ use crate::bus::Filters;
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::{LssAddress, LssRange};
 use crate::device::catalog::{self, Model};
-use crate::master::Master;
+use crate::master::{Lss, LssError, Master};
 use crate::tasks::Failure;
 use std::sync::Arc;
 
@@ -21,11 +21,11 @@ pub struct Slave {
     pub model: Option<Arc<Model>>,
 }
 
-/// Everybody who has a node-ID, by SDO, and one who has none, by fastscan: the next one shows itself when that one has
-/// been given a node-ID.
+/// Everybody who has a node-ID, by SDO, and those who have none, by fastscan. Each of these is set aside in
+/// configuration state while the next one is looked for; nothing is changed in any of them.
 ///
 /// # Errors
-/// What stops everything. Nobody there is an empty list.
+/// What stops everything, and a first fastscan that fails: a later one is said. Nobody there is an empty list.
 pub fn scan(master: &mut Master<'_>, tell: Tell<'_>) -> Result<Vec<Slave>, Failure> {
     let mut found: Vec<Slave> = everybody_described(master)?
         .into_iter()
@@ -43,19 +43,40 @@ pub fn scan(master: &mut Master<'_>, tell: Tell<'_>) -> Result<Vec<Slave>, Failu
         .collect();
     master.listen(&Filters::All)?;
     let mut lss = master.lss();
-    let unconfigured = lss.fastscan();
+    let unconfigured = unconfigured(&mut lss, tell);
     let left = lss.leave();
     let unconfigured = unconfigured?;
     left?;
-    if let Some(address) = unconfigured {
-        tell(Note::Step(
-            "fastscan finds one device without a node-ID at a time: once that one has been given one, ask again"
-                .to_owned(),
-        ));
+    found.extend(unconfigured.into_iter().map(|address| {
         let model = catalog::by_identity(address.vendor, address.product);
-        found.push(Slave { node: None, address: Some(address), model });
-    }
+        Slave { node: None, address: Some(address), model }
+    }));
     Ok(found)
+}
+
+/// One after the other, until nobody answers any more.
+fn unconfigured(lss: &mut Lss<'_, '_>, tell: Tell<'_>) -> Result<Vec<LssAddress>, LssError> {
+    let mut found: Vec<LssAddress> = Vec::new();
+    loop {
+        let more = match lss.fastscan_beside(&found) {
+            Ok(None) => return Ok(found),
+            Ok(Some(address)) if !found.contains(&address) => {
+                found.push(address);
+                continue;
+            }
+            Ok(Some(_)) => "it answers again although it has been found".to_owned(),
+            // What stops everything does; with nothing found the error is the answer.
+            Err(error @ (LssError::Master(_) | LssError::Disturbed(_))) => return Err(error),
+            Err(error) if found.is_empty() => return Err(error),
+            Err(error) => error.to_string(),
+        };
+        let last = found.last().map(ToString::to_string).unwrap_or_default();
+        tell(Note::Warning(format!(
+            "whether there are more devices without a node-ID than {last} cannot be told ({more}): \
+             once that one has been given one, ask again"
+        )));
+        return Ok(found);
+    }
 }
 
 /// Whether there are slaves whose numbers lie within the limits.

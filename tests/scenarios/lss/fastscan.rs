@@ -55,6 +55,30 @@ fn slow_devices_are_found_in_their_own_time() {
 }
 
 #[test]
+fn three_are_found_and_none_is_changed() {
+    let identities = [DPS, [0x362, 0x0044_3150, 0x0001_0000, 20003], [0x47, 1, 0x0001_0007, 99]];
+    for latencies in [[300, 300, 300], [200, 900, 1600], [100, 3000, 200], [5000, 100, 100]] {
+        let slaves = identities.iter().zip(latencies).map(|(&it, latency)| Slave::new(it, 0xff).slow(&[latency]));
+        let mut bus = bus_of(slaves.chain([Slave::new([0x47, 1, 1, 1], 5)]));
+        let mut master = Master::new(&mut bus, Timing::default());
+        let mut lss = master.lss();
+        let mut found: Vec<LssAddress> = Vec::new();
+        while let Some(address) = lss.fastscan_beside(&found).unwrap() {
+            assert!(!found.contains(&address), "{address} twice");
+            found.push(address);
+        }
+        lss.leave().unwrap();
+        drop(lss);
+        drop(master);
+        let mut expected = identities.map(address).to_vec();
+        (expected.sort_by_key(|it| it.parts()), found.sort_by_key(|it| it.parts()));
+        assert_eq!(found, expected, "{latencies:?}");
+        assert_eq!(bus.stations::<Slave>().map(|slave| slave.node).collect::<Vec<_>>(), [0xff, 0xff, 0xff, 5]);
+        assert_eq!(configuring(&mut bus), [[0; 4]; 0], "all are back in waiting state");
+    }
+}
+
+#[test]
 fn three_are_found_one_after_the_other() {
     let identities = [DPS, [0x362, 0x0044_3150, 0x0001_0000, 20003], [0x47, 1, 0x0001_0007, 99]];
     for latencies in [[300, 300, 300], [200, 900, 1600], [100, 3000, 200], [5000, 100, 100]] {
