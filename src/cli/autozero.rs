@@ -34,7 +34,7 @@ pub(crate) struct Autozero {
     channel: Option<u8>,
     /// The largest reading that is taken for zero: 0.1 in the present unit, 100mbar, 2% of the measuring range
     /// [default: 1%]
-    #[arg(long, value_name = "VALUE", value_parser = parse_limit)]
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true, value_parser = parse_limit)]
     limit: Option<Limit>,
     /// How many readings, 100 ms apart, before and after
     #[arg(long, value_name = "N", default_value = "10", value_parser = clap::value_parser!(u32).range(2..=10_000))]

@@ -264,7 +264,9 @@ impl StartupArgs {
             global.console().warn(&format!("node {}: {}", self.node, report.doubt));
         }
         if set.is_some() {
-            global.console().note(&format!("node {}: kept after power off only when it is stored (1010h)", self.node));
+            let node = self.node;
+            let note = format!("node {node}: kept after power off only when it is stored: cangauge store {node}");
+            global.console().note(&note);
         }
         Ok(())
     }

@@ -157,7 +157,12 @@ fn what_is_refused_is_named_and_the_old_mapping_is_back() {
     let message = "node 1: write 0x1A00:2 (0x6132:1/8): refused by the device (0x06040041, the object cannot be mapped \
                    to a PDO): TPDO1 has its old mapping and parameters";
     assert_eq!(error["message"], message);
-    assert!(error["hint"].as_str().is_some_and(|hint| hint.starts_with("it can map: 0x6130:1/32")), "{error}");
+    assert!(
+        error["hint"].as_str().is_some_and(
+            |hint| hint.starts_with("it can map: 0x6130:1/32") && hint.ends_with("0x9130:1/32 0x9130:2/32")
+        ),
+        "{error}"
+    );
     // As it was, entry for entry, and on again.
     let all = steps(&done, 1);
     assert_eq!(all.last(), Some(&"581#6000180100000000"));

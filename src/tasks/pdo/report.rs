@@ -10,6 +10,9 @@ use crate::device::description::Remap;
 use crate::master::Error;
 use crate::tasks::{Failure, Kind};
 
+/// So many objects that can be mapped are named.
+const SHOWN: usize = 16;
+
 impl Change<'_, '_, '_> {
     /// What was being done, at a write, as a part of a message.
     fn what(trouble: &Trouble, at: Option<&Write>) -> String {
@@ -70,10 +73,13 @@ impl Change<'_, '_, '_> {
         let model = self.instrument.model.as_ref()?;
         let entries = model.dictionary.iter().filter(|entry| entry.pdo);
         let entry = |object, bits| mend::entry_text(MappingEntry { object, bits });
-        let names: Vec<String> = entries
+        let mut names: Vec<String> = entries
             .filter_map(|known| Some(entry(known.object, u8::try_from(8 * known.data_type.width()?).ok()?)))
-            .take(8)
             .collect();
+        if let Some(more) = names.len().checked_sub(SHOWN).filter(|&more| more > 0) {
+            names.truncate(SHOWN);
+            names.push(format!("and {more} more"));
+        }
         (!names.is_empty()).then(|| format!("it can map: {}", names.join(" ")))
     }
 
