@@ -164,8 +164,13 @@ fn tpdos(info: &Info) -> Rows {
     for (tpdo, inhibit) in instrument.tpdos.iter().zip(&info.inhibit_100us) {
         let id = tpdo.cob_id.can_id().number();
         let valid = if tpdo.cob_id.is_valid() { "" } else { " off" };
-        let mut terms = vec![tpdo.transmission.map(|kind| kind.to_string()).unwrap_or_default()];
-        terms.extend(tpdo.event_timer_ms.filter(|&timer| timer > 0).map(|timer| format!("timer {timer} ms")));
+        let kind = tpdo.transmission.map(|kind| kind.to_string()).unwrap_or_default();
+        let mut terms = match (kind.as_str(), tpdo.event_timer_ms) {
+            ("timer", Some(0)) => vec!["timer off".to_owned()],
+            ("timer", Some(timer)) => vec![format!("timer {timer} ms")],
+            (_, Some(timer)) if timer > 0 => vec![kind, format!("timer {timer} ms")],
+            _ => vec![kind],
+        };
         let inhibit = inhibit.filter(|&inhibit| inhibit > 0);
         terms.extend(inhibit.map(|inhibit| format!("inhibit {}.{} ms", inhibit / 10, inhibit % 10)));
         let mapping = tpdo.mapping.iter().map(|entry| mapped(info, entry.object.to_string(), entry.bits));
