@@ -65,8 +65,9 @@ impl Reading {
     }
 }
 
-/// The marker of an integer in overload (MH-4: -32768, -2147483648): the smallest number of the type.
-fn is_smallest(value: &Value, data_type: DataType) -> bool {
+/// The marker of an integer in overload (MH-4: -32768, -2147483648): the smallest number of the type. Only where the
+/// signal has markers.
+pub fn is_smallest(value: &Value, data_type: DataType) -> bool {
     match (value, data_type) {
         (Value::Integer(number), DataType::Integer(width)) => {
             *number == i64::MIN >> (64 - 8 * u32::from(width.clamp(1, 8)))

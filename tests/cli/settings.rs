@@ -62,6 +62,25 @@ fn table_19_and_what_the_new_unit_rescales() {
     assert!(answers[at + 1..].contains(&"42306101770D0000"), "{answers:?}");
 }
 
+/// MH-4, 4.2.15: NaN, -32768 and -2147483648 stand for no value, and are none in any unit.
+#[test]
+fn a_value_that_is_none_is_not_converted() {
+    let bench = Bench::described(
+        "[[device]]\nkind = \"mh4\"\nnode = 5\n\
+         [[device.overload]]\nchannel = 1\nfrom = \"0ms\"\nuntil = \"900s\"\ndirection = \"low\"\n",
+    );
+    let done = bench.run("unit 5 pressure psi").exit(0);
+    for name in ["ai-input-pv:1", "ai-input-pv-i16:1", "ai-input-pv-i32:1"] {
+        let words = done.stdout.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+        assert!(words.into_iter().any(|words| words == [name, "-", "->", "-"]), "{name} in {}", done.stdout);
+    }
+    assert!(done.stdout.contains("ai-span-end:1                   10 bar       ->  145.03773 psi"), "{}", done.stdout);
+    let done = bench.run("unit 5 pressure psi -f json").exit(0);
+    let rescaled = done.json()[0]["rescaled"].as_array().expect("a list").clone();
+    let pressure = rescaled.iter().find(|item| item["object"] == "0x9130:1").expect("the process value");
+    assert_eq!((&pressure["before"], &pressure["after"]), (&json!(null), &json!(null)));
+}
+
 /// The same with answers as the table prints them: reads answered with 60h.
 #[test]
 fn table_19_with_its_60h() {

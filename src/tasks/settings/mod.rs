@@ -18,6 +18,7 @@ use crate::device::dictionary::Entry;
 use crate::device::standard;
 use crate::device::unit::Unit;
 use crate::master::{BlockMode, Master, Request, SdoError, SdoFailure};
+use crate::measure::decode::is_smallest;
 use crate::measure::instrument::{Instrument, PROCESS_VALUES, Signal};
 use crate::measure::sample::Number;
 use crate::measure::survey::{Overrides, instruments, read_all};
@@ -183,8 +184,15 @@ impl Device {
 
     /// A value of an object in the unit of its signal.
     pub fn quantity(&self, signal: &Signal, value: &Value) -> Option<Quantity> {
-        let number = Number::from_value(value, signal.digits.unwrap_or(0))?;
+        let number =
+            Number::from_value(value, signal.digits.unwrap_or(0)).filter(|number| number.as_f64().is_finite())?;
         Some(Quantity { number, unit: signal.unit })
+    }
+
+    /// The same of an object that may show the measured value: none where that is the marker of an overload.
+    fn measured(&self, signal: &Signal, object: ObjectId, value: &Value) -> Option<Quantity> {
+        let marked = signal.marker && signal.is_value(object) && is_smallest(value, self.data_type(object));
+        self.quantity(signal, value).filter(|_| !marked)
     }
 }
 

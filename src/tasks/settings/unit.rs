@@ -152,12 +152,13 @@ pub fn set(
     let rescaled = objects
         .iter()
         .zip(before.iter().zip(&after))
-        .filter_map(|(&(object, scale), (before, after))| {
-            let before = before.as_ref().and_then(|value| device.quantity(&signal, value));
-            let after = after.as_ref().and_then(|value| device.quantity(&renewed, value));
+        .filter(|(_, (before, after))| before.is_some() || after.is_some())
+        .map(|(&(object, scale), (before, after))| {
+            let before = before.as_ref().and_then(|value| device.measured(&signal, object, value));
+            let after = after.as_ref().and_then(|value| device.measured(&renewed, object, value));
             let stale = before.zip(after).is_some_and(|(before, after)| is_stale(before, after, scale));
             let name = device.name(object);
-            (before.is_some() || after.is_some()).then_some(Rescaled { object, name, before, after, stale })
+            Rescaled { object, name, before, after, stale }
         })
         .collect();
     if let Some(kept) = device.instrument.signals.iter_mut().find(|kept| kept.name == signal.name) {
