@@ -58,13 +58,10 @@ pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
     section(out, "stored by 1010h", &store(info))
 }
 
-/// The NMT state and what told it, or how it is found out.
+/// The NMT state, or how it is found out.
 fn state(info: &Info) -> String {
-    match info.state.map(|report| (report.state, report.by)) {
-        Some((Some(state), by)) => format!("{state} ({})", by.as_str()),
-        Some((None, _)) => format!("not known: cangauge nmt state {} --probe finds it out", info.instrument.node),
-        None => format!("not waited for: cangauge nmt state {}", info.instrument.node),
-    }
+    let ask = || format!("no heartbeat tells it: cangauge nmt state {} (--probe)", info.instrument.node);
+    info.state.map_or_else(ask, |state| format!("{state}, by its heartbeat"))
 }
 
 fn identity(info: &Info) -> Rows {

@@ -170,7 +170,7 @@ pub fn object(out: &mut dyn Write, info: &Info) -> io::Result<()> {
                 software: info.software.as_deref(),
             },
             bit_rate: info.bit_rate,
-            state: info.state.and_then(|report| report.state).map(|state| state.to_string()),
+            state: info.state.map(|state| state.to_string()),
             monitoring: &info.monitoring,
             communication: JsonSetting::all(&info.communication),
             errors,

@@ -153,27 +153,8 @@ fn means(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId, M
 /// # Errors
 /// What stops everything. A node that shows nothing is `present: false`.
 pub fn states(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<Vec<Report>, Error> {
-    let means = means(master, nodes)?;
-    states_by(master, nodes, &means)
-}
-
-/// The state of a node that answers SDO, whose 1017h is known, and whether guarding it would arm nothing (100Ch and
-/// 100Dh were read as 0).
-///
-/// # Errors
-/// What stops everything.
-pub(super) fn state_of(
-    master: &mut Master<'_>,
-    node: NodeId,
-    heartbeat: Option<Duration>,
-    may_guard: bool,
-) -> Result<Option<Report>, Error> {
-    let means = BTreeMap::from([(node, Means { answers_sdo: true, heartbeat, may_guard })]);
-    Ok(states_by(master, &[node], &means)?.pop())
-}
-
-fn states_by(master: &mut Master<'_>, nodes: &[NodeId], means: &BTreeMap<NodeId, Means>) -> Result<Vec<Report>, Error> {
     let mut watch = Watch::default();
+    let means = means(master, nodes)?;
     let patience = master.timing().timeout;
     let wait = nodes.iter().filter_map(|node| means[node].heartbeat).max().unwrap_or(Duration::ZERO);
     // A stopped node may send heartbeats that 1017h could not be asked about: one timeout for those.
@@ -182,7 +163,7 @@ fn states_by(master: &mut Master<'_>, nodes: &[NodeId], means: &BTreeMap<NodeId,
     let expected: Vec<NodeId> =
         nodes.iter().copied().filter(|node| means[node].heartbeat.is_some() || !means[node].answers_sdo).collect();
     watch.wait(master, until, &|watch| expected.iter().all(|node| watch.lives.contains_key(node)))?;
-    let guarded = guard(master, nodes, means, &mut watch)?;
+    let guarded = guard(master, nodes, &means, &mut watch)?;
     Ok(nodes
         .iter()
         .map(|&node| {
@@ -199,6 +180,20 @@ fn states_by(master: &mut Master<'_>, nodes: &[NodeId], means: &BTreeMap<NodeId,
             }
         })
         .collect())
+}
+
+/// The state that the heartbeat of a node tells, whose period (1017h) is known. Sends nothing.
+///
+/// # Errors
+/// What stops everything.
+pub(super) fn by_heartbeat(master: &mut Master<'_>, node: NodeId, period: Duration) -> Result<Option<NmtState>, Error> {
+    let mut watch = Watch::default();
+    let until = master.now() + period + master.timing().timeout;
+    watch.wait(master, until, &|watch| matches!(watch.lives.get(&node), Some(Life::State(_))))?;
+    Ok(match watch.lives.get(&node) {
+        Some(Life::State(state)) => Some(*state),
+        Some(Life::BootUp) | None => None,
+    })
 }
 
 /// Asks by node guarding where that is harmless: no heartbeat, no life guarding, nobody else guards.

@@ -70,12 +70,11 @@ pub fn watch(
         numbers.extend(valid.map(|tpdo| (tpdo.cob_id.can_id(), tpdo.number)));
     }
     let nothing = || {
-        let hint = match nodes {
-            [only] => format!(
-                "is it started, and does somebody send SYNC? cangauge pdo show {only}; cangauge nmt start {only}"
-            ),
-            _ => "are they started, and does somebody send SYNC? cangauge pdo show; cangauge nmt start".to_owned(),
-        };
+        let are = if nodes.len() == 1 { "is it" } else { "are they" };
+        let all = nodes.iter().map(NodeId::to_string).collect::<Vec<_>>().join(",");
+        let first = nodes.first().map(NodeId::to_string).unwrap_or_default();
+        let hint =
+            format!("{are} started, and does somebody send SYNC? cangauge pdo show {first}; cangauge nmt start {all}");
         Failure::new(Kind::NoAnswer, "not one TPDO came").hint(hint)
     };
     let ids = numbers.keys().copied().chain(nodes.iter().map(|&node| CanId::heartbeat(node)));

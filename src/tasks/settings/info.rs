@@ -3,6 +3,7 @@
 use super::errors::{Errors, read as read_errors};
 use super::limits::Limit;
 use super::{Device, Quantity, filter, page};
+use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::master::Master;
@@ -25,8 +26,8 @@ pub struct Info {
     pub software: Option<String>,
     /// Of the bus, or what the device is set to, in bit/s.
     pub bit_rate: Option<u32>,
-    /// The NMT state, and what told it; `None` where nothing was asked, since the heartbeat is too slow to wait for.
-    pub state: Option<nmt::Report>,
+    /// The NMT state, where a heartbeat told it.
+    pub state: Option<NmtState>,
     /// How it is noticed that the device is gone.
     pub monitoring: String,
     /// The communication objects.
@@ -246,19 +247,18 @@ fn samples(master: &mut Master<'_>, device: &Device) -> Result<Vec<Option<Sample
     Ok(samples)
 }
 
-/// The NMT state, where heartbeat or guarding tell it soon.
+/// The NMT state, where a heartbeat tells it soon. Guarding could tell it, too, but another master that guards would miss
+/// a toggle of the answer.
 fn state(
     master: &mut Master<'_>,
     device: &Device,
     values: &BTreeMap<ObjectId, Value>,
-) -> Result<Option<nmt::Report>, Failure> {
-    let number = |object: ObjectId| values.get(&object).and_then(Value::as_u64);
-    let heartbeat = number(HEARTBEAT).filter(|&time| time > 0).map(Duration::from_millis);
-    if heartbeat.is_some_and(|period| period > PATIENCE) {
-        return Ok(None);
+) -> Result<Option<NmtState>, Failure> {
+    let period = values.get(&HEARTBEAT).and_then(Value::as_u64).map(Duration::from_millis);
+    match period.filter(|period| !period.is_zero() && *period <= PATIENCE) {
+        Some(period) => Ok(nmt::by_heartbeat(master, device.instrument.node, period)?),
+        None => Ok(None),
     }
-    let may_guard = number(GUARD_TIME) == Some(0) && number(LIFE_TIME) == Some(0);
-    Ok(nmt::state_of(master, device.instrument.node, heartbeat, may_guard)?)
 }
 
 /// How it is noticed that the device is gone: heartbeat or node guarding, of which CiA 301 allows one.
