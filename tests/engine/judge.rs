@@ -17,7 +17,6 @@ use cangauge::canopen::nmt::NmtState;
 use cangauge::canopen::object::ObjectId;
 use cangauge::sim::State;
 use cangauge::tasks::Kind;
-use cangauge::tasks::lss::Via;
 use cangauge::tasks::pdo::Settings;
 use cangauge::tasks::sdo::is_signature;
 use cangauge::tasks::store::Group;
