@@ -1,0 +1,68 @@
+"""Every row of a recording is a value that was sent, in order, none twice."""
+
+import csv
+import os
+
+from scenario.relay import IN
+
+# As the simulator's record has them.
+COLUMNS = ("node", "signal", "value", "unit", "status", "raw")
+
+
+def rows_of(path_or_text, columns=COLUMNS):
+    """The whole lines of a table; one that a kill cut off is no row."""
+    if os.path.exists(path_or_text):
+        with open(path_or_text, encoding="utf-8") as file:
+            path_or_text = file.read()
+    whole = path_or_text[: path_or_text.rfind("\n") + 1]
+    return [tuple(row[column] for column in columns) for row in csv.DictReader(whole.splitlines())]
+
+
+def judge(scenario, run, truth):
+    rows = run.rows
+    told = []
+    count = scenario.wanted["count"]
+    if count is not None and len(rows) > count:
+        told.append(f"{len(rows)} rows of {count}")
+    if scenario.wanted["poll"]:
+        return told + polled(rows, run.record)
+    return told + sent(scenario, rows, truth)
+
+
+def polled(rows, record):
+    """Each is an answer of its node."""
+    answers = {}
+    for _, direction, _, _, identifier, data in record:
+        if direction == IN and data and 0x580 < identifier < 0x600 and len(data) == 8 and data[0] >> 5 == 2:
+            for end in range(5, 9):
+                answers.setdefault(identifier & 0x7F, set()).add(data[4:end])
+    return [f"nobody answered {row}" for row in rows if bytes.fromhex(row[5][2:]) not in answers.get(int(row[0]), ())][:1]
+
+
+def sent(scenario, rows, truth):
+    """As they stand in the record; what could not be read (a unit, the digits) may be empty."""
+    disordered = scenario.is_disordered()
+    rest, twice = list(truth), 8 * sum(kind == "double" for _, _, kind, _ in scenario.faults)
+    troubled = scenario.is_troubled()
+    at = 0
+    for number, row in enumerate(rows):
+        places = range(len(rest)) if disordered else range(at, len(rest))
+        place = next((place for place in places if rest[place] and is_same(row, rest[place], troubled)), None)
+        if place is None and twice and any(is_same(row, line, troubled) for line in truth):
+            twice -= 1
+        elif place is None:
+            like = [line for line in truth if line[0] == row[0] and line[5] == row[5]][:2]
+            return [f"row {number}, {row}, was not sent there; like it: {like}"]
+        else:
+            rest[place] = None
+            at = place + 1
+    return []
+
+
+def is_same(row, line, troubled):
+    node, signal, value, unit, status, raw = row
+    if (node, raw) != (line[0], line[5]):
+        return False
+    if row == line:
+        return True
+    return troubled and signal == line[1] and value in ("", line[2]) and unit in ("", line[3]) and status in ("", line[4])

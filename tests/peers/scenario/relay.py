@@ -1,0 +1,284 @@
+"""The wire between the program and the devices: a relay that forwards both ways, keeps a record, and makes
+what goes wrong.
+
+Frames that the program sends are all that arrive on its side: the relay does not hear itself. So its record
+tells what came from the program, and what came from the devices or from another master on their side.
+"""
+
+import errno
+import heapq
+import itertools
+import os
+import random
+import select
+import signal
+import socket
+import struct
+import subprocess
+import threading
+import time
+
+FRAME = struct.Struct("=IB3x8s")
+REMOTE, EXTENDED = socket.CAN_RTR_FLAG, socket.CAN_EFF_FLAG
+# Directions: what the program sends, what it receives.
+OUT, IN = "out", "in"
+
+
+def can_socket(interface, own=False):
+    """A raw socket for classic frames, with room for what comes while nobody reads."""
+    sock = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+    sock.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, int(own))
+    sock.bind((interface,))
+    sock.setblocking(False)
+    return sock
+
+
+def pack(identifier, data):
+    return FRAME.pack(identifier, len(data), bytes(data))
+
+
+def unpack(raw):
+    """Identifier with its flags, and data: None for a remote frame."""
+    identifier, length, data = FRAME.unpack(raw)
+    return identifier, None if identifier & REMOTE else data[:length]
+
+
+def text(identifier, data):
+    """As candump writes it."""
+    number = identifier & 0x1FFFFFFF
+    name = f"{number:08X}" if identifier & EXTENDED else f"{number:03X}"
+    return f"{name}#{'R' if data is None else data.hex().upper()}"
+
+
+class Relay(threading.Thread):
+    """Forwards between the two interfaces while it is `open`, and makes the faults of a scenario.
+
+    Faults of single frames, (direction, number, kind, milliseconds): lose, double, delay, garble, truncate.
+    Happenings, (milliseconds after the program's first frame, function, remark), are done when they are due.
+    """
+
+    def __init__(self, here, there):
+        super().__init__(daemon=True)
+        self.interface = here
+        self.sides = {OUT: can_socket(here), IN: can_socket(there)}
+        self.rival = can_socket(there)
+        self.lock = threading.Lock()
+        self.ticket = itertools.count()
+        self.wake_reader, self.wake_writer = os.pipe()
+        self.is_open, self.is_cut, self.running = False, False, True
+        self.begin([], {}, 0, [])
+        self.start()
+
+    def begin(self, faults, loss, seed, happenings):
+        """A new record, new faults; `loss` tells how many frames of a hundred vanish each way."""
+        with self.lock:
+            self.faults = {(direction, number): (kind, ms) for direction, number, kind, ms in faults}
+            self.loss, self.random = dict(loss), random.Random(seed)
+            self.happenings = sorted(happenings, key=lambda happening: happening[0])
+            self.count = {OUT: 0, IN: 0}
+            self.stalled = {OUT: 0.0, IN: 0.0}
+            self.delayed = []
+            self.record = []
+            self.first = None
+            self.is_cut = False
+            # What waits in the sockets is of the last scenario.
+            for side in self.sides.values():
+                drain(side)
+
+    def open(self):
+        self.is_open = True
+
+    def close(self):
+        """Nothing is forwarded any more, and what was delayed is lost."""
+        with self.lock:
+            self.is_open, self.delayed, self.happenings = False, [], []
+
+    def calm(self):
+        """No more faults; what was delayed still comes."""
+        with self.lock:
+            self.faults, self.loss, self.happenings, self.is_cut = {}, {}, [], False
+
+    def first_frame(self):
+        return self.first
+
+    def begin_now(self):
+        """A program that sends nothing has begun, too."""
+        with self.lock:
+            self.first = self.first or time.monotonic()
+        os.write(self.wake_writer, b"!")
+
+    def end(self):
+        self.running = False
+        os.write(self.wake_writer, b"!")
+        self.join()
+
+    def run(self):
+        poller = select.poll()
+        ways = {side.fileno(): direction for direction, side in self.sides.items()}
+        for number in (*ways, self.wake_reader):
+            poller.register(number, select.POLLIN)
+        while self.running:
+            events = poller.poll(self._wait())
+            for number, _ in events:
+                if number == self.wake_reader:
+                    os.read(number, 64)
+                else:
+                    self._read(ways[number])
+            self._due()
+
+    def _wait(self):
+        with self.lock:
+            due = [self.delayed[0][0]] if self.delayed else []
+            if self.first and self.happenings:
+                due.append(self.first + self.happenings[0][0] / 1000)
+        return max(0, (min(due) - time.monotonic()) * 1000) if due else None
+
+    def _read(self, direction):
+        side = self.sides[direction]
+        for _ in range(64):
+            try:
+                raw = side.recv(FRAME.size)
+            except BlockingIOError:
+                return
+            except OSError as error:
+                # The interface went down: told once, and nothing else is lost.
+                if error.errno != errno.ENETDOWN:
+                    raise
+                continue
+            with self.lock:
+                self._pass(direction, *unpack(raw))
+
+    def _pass(self, direction, identifier, data):
+        now = time.monotonic()
+        if self.first is None and direction == OUT and self.is_open:
+            self.first = now
+        number = self.count[direction]
+        self.count[direction] += 1
+        kind, ms = self.faults.get((direction, number), (None, 0))
+        if not self.is_open:
+            kind = "closed"
+        elif self.is_cut:
+            kind = "cut"
+        elif self.loss.get(direction) and self.random.random() * 100 < self.loss[direction]:
+            kind = "lose"
+        at, copies = now, 1
+        sent = data
+        if kind in ("lose", "cut", "closed"):
+            copies = 0
+        elif kind == "double":
+            copies = 2
+        elif kind == "delay":
+            at += ms / 1000
+            # What the program sends keeps its order: a queue is slow as a whole.
+            if direction == OUT:
+                self.stalled[OUT] = at
+        elif kind == "garble":
+            sent = garbled(identifier, data, ms)
+        elif kind == "truncate":
+            sent = truncated(identifier, data, ms)
+        if sent is data and kind in ("garble", "truncate"):
+            kind = None
+        if direction == OUT:
+            at = max(at, self.stalled[OUT])
+        if kind != "closed":
+            self.record.append((now, direction, kind, ms, identifier, data))
+        for _ in range(copies):
+            if at <= now:
+                self._send(direction, identifier, sent)
+            else:
+                heapq.heappush(self.delayed, (at, next(self.ticket), direction, identifier, sent))
+
+    def _send(self, direction, identifier, data):
+        other = self.sides[IN if direction == OUT else OUT]
+        for _ in range(1000):
+            try:
+                other.send(FRAME.pack(identifier, 0, b"") if data is None else pack(identifier, data))
+                return
+            except OSError as error:
+                if error.errno == errno.ENETDOWN:
+                    return
+                if error.errno != errno.ENOBUFS:
+                    raise
+                time.sleep(0.001)
+
+    def _due(self):
+        while True:
+            now = time.monotonic()
+            with self.lock:
+                while self.delayed and self.delayed[0][0] <= now:
+                    self._send(*heapq.heappop(self.delayed)[2:])
+                if not (self.first and self.happenings and self.first + self.happenings[0][0] / 1000 <= now):
+                    return
+                _, act, remark = self.happenings.pop(0)
+                self.record.append((now, "", remark, 0, None, None))
+            act()
+
+    # What may happen.
+
+    def cut(self, is_cut):
+        self.is_cut = is_cut
+
+    def link(self, state):
+        subprocess.run(["ip", "link", "set", self.interface, state], check=True)
+
+    def rival_sends(self, identifier, data):
+        """Another master, on the devices' side: the program hears it and the answers."""
+        self.rival.send(pack(identifier, data))
+
+    def device_resets(self, node):
+        """As if its power failed: nobody else hears why."""
+        self.sides[IN].send(pack(0, bytes([0x81, node])))
+
+    def lines(self, last=None):
+        """The record, one line a frame."""
+        first = self.record[0][0] if self.record else 0
+        told = []
+        for at, direction, kind, ms, identifier, data in self.record[-last:] if last else self.record:
+            if identifier is None:
+                told.append(f"{(at - first) * 1000:9.1f}  -- {kind}")
+            else:
+                arrow = {OUT: "->", IN: "<-"}[direction]
+                fault = f"  {kind} {ms or ''}" if kind else ""
+                told.append(f"{(at - first) * 1000:9.1f}  {arrow} {text(identifier, data)}{fault}")
+        return told
+
+
+def drain(sock):
+    while True:
+        try:
+            sock.recv(FRAME.size)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            if error.errno != errno.ENETDOWN:
+                raise
+
+
+def garbled(identifier, data, turned):
+    """Another frame that a receiver can tell from a true one, or the same where there is none.
+
+    Only command bytes and, towards the program, object addresses: of data bytes that change nobody could
+    notice anything; a request with another address would be a true request."""
+    number = identifier & 0x7FF
+    if identifier & (REMOTE | EXTENDED) or not data:
+        return data
+    if 0x580 < number < 0x600 and turned % 2 and data[0] >> 5 in (2, 3) and len(data) == 8:
+        place = 1 + turned % 3
+        return data[:place] + bytes([data[place] ^ (turned | 0x40)]) + data[place + 1 :]
+    if 0x580 < number < 0x680:
+        return b"\xe0" + data[1:]
+    return b"\xf7" + data[1:] if number == 0x7E4 else data
+
+
+def truncated(identifier, data, length):
+    """A frame that is shorter, where that can be noticed: TPDOs, and SDO answers whose address is not whole."""
+    number = identifier & 0x7FF
+    if identifier & (REMOTE | EXTENDED) or not data or not (0x180 <= number < 0x580 or 0x580 < number < 0x600):
+        return data
+    return data[: min(length, 3, len(data) - 1)]
+
+
+def stop(process, is_stopped):
+    """The simulator hangs, or goes on."""
+    process.send_signal(signal.SIGSTOP if is_stopped else signal.SIGCONT)

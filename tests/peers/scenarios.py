@@ -1,0 +1,222 @@
+"""Scenarios without number through the real program: a seed gives devices, faults, a command, an interruption.
+
+    scenarios.py [--seed N] [--count N] [--seconds N] [--verbose] BINARY HERE THERE
+
+The simulated devices are on THERE, the program is on HERE, and between them a relay makes what goes wrong
+(scenario/relay.py). Judged from the devices' own side, once the command has ended and nothing is wrong any
+more (scenario/judge.py). Without --seed a fresh one is taken and printed, and those behind it follow.
+
+    tests/socketcan/vcan -t 900 -i vcan0,vcan1 target/peers/bin/python tests/peers/scenarios.py target/debug/cangauge vcan0 vcan1
+"""
+
+import argparse
+import collections
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+
+from scenario import judge
+from scenario.foreign import Foreign
+from scenario.make import Scenario
+from scenario.probe import Probe
+from scenario.recording import rows_of
+from scenario.relay import Relay, stop
+
+# Longer than any command needs that gets an answer now and then.
+DEADLINE = 90
+TOLD = 60
+
+
+class Look:
+    """What the devices hold, and their NMT states, at a moment."""
+
+    def __init__(self, held, states):
+        self.held, self.states = held, states
+
+
+class Run:
+    """What there is to judge."""
+
+    exit, out, err, overran, rows, configuring = None, "", "", False, [], []
+
+
+class Bed:
+    """The program, the devices and the relay between them."""
+
+    def __init__(self, binary, here, there):
+        self.binary, self.here, self.there = os.path.abspath(binary), here, there
+        self.relay, self.probe = Relay(here, there), Probe(there)
+
+    def simulator(self, scenario, directory):
+        """Devices in a process of their own, started up."""
+        bench = os.path.join(directory, "bench.toml")
+        with open(bench, "w", encoding="ascii") as file:
+            file.write(scenario.bench(os.path.join(directory, "truth.csv")))
+        with open(os.path.join(directory, "simulator"), "w") as err:
+            process = subprocess.Popen([self.binary, "--bus", self.there, "sim", bench], stderr=err, stdin=subprocess.DEVNULL)
+        expected = sum(bool(device["node"]) for device in scenario.devices)
+        came = self.probe.boot_ups(expected)
+        if len(came) != expected:
+            process.kill()
+            raise RuntimeError(f"boot-ups of {came} only: {open(err.name).read()}")
+        return process
+
+    def look(self, scenario):
+        """States first: who is stopped is woken, so that it can be asked."""
+        devices = list(scenario.devices)
+        if scenario.command == "set-id":
+            # One of them may have gone there.
+            devices += [{**device, "node": scenario.wanted["new"]} for device in devices if device["node"] in (scenario.named[0], None)
+                        and not scenario.at(scenario.wanted["new"])]
+        states = self.probe.states(devices)
+        for node, state in states.items():
+            if state == "stopped":
+                self.probe.nmt(0x80, node)
+        return Look(self.probe.snapshot(devices), states)
+
+    def happenings(self, scenario, simulator, program):
+        """What happens on the way, for the relay."""
+        relay = self.relay
+        acts = {"down": lambda _: relay.link("down"), "up": lambda _: relay.link("up"), "stopped": lambda _: stop(simulator, True),
+                "continued": lambda _: stop(simulator, False), "power": relay.device_resets, "cut": lambda _: relay.cut(True),
+                "joined": lambda _: relay.cut(False)}
+        planned = [(at, lambda what=what, of=of: acts[what](of), f"{what} {of or ''}".strip()) for at, what, of in scenario.happenings]
+        planned += [(at, lambda frame=frame: relay.rival_sends(*frame), "rival") for at, _, frame in scenario.rival]
+        if scenario.signal:
+            name, at = scenario.signal
+            planned.append((at, lambda: program().send_signal(getattr(signal, name)), name))
+        return planned
+
+    def execute(self, scenario, simulator, directory, name):
+        """Runs the command to its end."""
+        run, process = Run(), []
+        paths = [os.path.join(directory, f"{name}.{end}") for end in ("out", "err", "csv")]
+        line = [self.binary, "--bus", self.here, *scenario.line()]
+        if scenario.wanted.get("file"):
+            line += ["--output", paths[2]]
+        clean = name != "run"
+        self.relay.begin([] if clean else scenario.faults, {} if clean else scenario.loss, scenario.seed,
+                         [] if clean else self.happenings(scenario, simulator, lambda: process[0]))
+        self.relay.open()
+        with open(paths[0], "w") as out, open(paths[1], "w") as err:
+            process.append(subprocess.Popen(line, stdout=out, stderr=err, stdin=subprocess.DEVNULL))
+            begun = time.monotonic()
+            try:
+                process[0].wait(0.25)
+            except subprocess.TimeoutExpired:
+                self.relay.begin_now()
+                try:
+                    process[0].wait(DEADLINE)
+                except subprocess.TimeoutExpired:
+                    run.overran = True
+                    process[0].kill()
+                    process[0].wait()
+        run.exit, run.seconds = process[0].returncode, time.monotonic() - begun
+        self.calm(simulator)
+        run.record, run.lines = list(self.relay.record), self.relay.lines()
+        run.out, run.err = (open(path, encoding="utf-8", errors="replace").read() for path in paths[:2])
+        if scenario.command == "log":
+            file = paths[2] if scenario.wanted["file"] and os.path.exists(paths[2]) else run.out
+            run.rows = rows_of(file) if not scenario.wanted["file"] or os.path.exists(paths[2]) else []
+        return run
+
+    def calm(self, simulator):
+        """Nothing goes wrong any more; what is on its way comes."""
+        self.relay.calm()
+        stop(simulator, False)
+        self.relay.link("up")
+        until = time.monotonic() + 5
+        while self.relay.delayed and time.monotonic() < until:
+            time.sleep(0.02)
+        # Whoever was reset last is back after 0.1 s.
+        time.sleep(0.25)
+        self.relay.close()
+
+    def carry_out(self, scenario, directory):
+        """One scenario; the run and the complaints."""
+        simulator = self.simulator(scenario, directory)
+        told = []
+        try:
+            fresh = scenario.fresh = self.look(scenario)
+            for device in scenario.devices:
+                if device["unsaved"] and device["node"]:
+                    self.probe.write(device["node"], (0x1017, 0), device["unsaved"], 2)
+            before = scenario.before = Look(self.probe.snapshot(scenario.devices), fresh.states)
+            run = self.execute(scenario, simulator, directory, "run")
+            run.fresh, run.before = fresh, before
+            run.configuring = self.probe.configuring()
+            self.probe.leave_configuration()
+            run.after = self.look(scenario)
+            with Foreign(self.there) as foreign:
+                told += judge.claim(scenario, run, foreign)
+                if run.exit == -9:
+                    told += self.again(scenario, simulator, directory, foreign, run)
+                self.probe.reset(sum(bool(device["node"]) for device in scenario.devices))
+                run.reset = Look(self.probe.snapshot(scenario.devices), {})
+                if run.exit == 0:
+                    told += [f"after a reset: {complaint}" for complaint in judge.claims.after_reset(scenario, run, foreign)]
+            told += judge.judge(scenario, run)
+        finally:
+            simulator.send_signal(signal.SIGINT)
+            simulator.wait(20)
+        if scenario.command == "log":
+            told += judge.rows(scenario, run, rows_of(os.path.join(directory, "truth.csv")))
+        return run, told
+
+    def again(self, scenario, simulator, directory, foreign, killed):
+        """The same command once more where nothing is wrong: it succeeds truly, or refuses honestly."""
+        run = self.execute(scenario, simulator, directory, "again")
+        run.before, run.after = killed.after, self.look(scenario)
+        told = judge.claim(scenario, run, foreign)
+        if run.exit not in judge.EXITS - {5, 130} or "panicked" in run.err:
+            told.append(f"exit code {run.exit}: {run.err}")
+        return [f"the same again: {complaint}" for complaint in told]
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seed", type=int)
+    parser.add_argument("--count", type=int)
+    parser.add_argument("--seconds", type=float)
+    parser.add_argument("--verbose", action="store_true")
+    parser.add_argument("binary")
+    parser.add_argument("here")
+    parser.add_argument("there")
+    options = parser.parse_args()
+    os.environ.update(LC_ALL="C", TERM="dumb")
+    os.environ.pop("CANGAUGE_BUS", None)
+    seed = options.seed if options.seed is not None else random.SystemRandom().randrange(1 << 32)
+    count = options.count or (None if options.seconds else 1 if options.seed is not None else 100)
+    print(f"from seed {seed}", flush=True)
+    bed, begun, done, failed, exits = Bed(options.binary, options.here, options.there), time.monotonic(), 0, [], collections.Counter()
+    while (count is None or done < count) and (options.seconds is None or time.monotonic() - begun < options.seconds):
+        scenario, since = Scenario(seed + done), time.monotonic()
+        with tempfile.TemporaryDirectory() as directory:
+            try:
+                run, told = bed.carry_out(scenario, directory)
+            # A judge that stumbles has not judged.
+            except Exception:
+                run, told = None, [traceback.format_exc()]
+        done += 1
+        exits[scenario.command, run and run.exit] += 1
+        if options.verbose:
+            print(f"{scenario.seed} exit {run and run.exit} {time.monotonic() - since:.1f} s: {' '.join(scenario.arguments)}", flush=True)
+        if told:
+            failed.append(scenario.seed)
+            print(scenario)
+            if run:
+                print(f"exit {run.exit} after {run.seconds:.2f} s\n--- stdout\n{run.out[-2000:]}--- stderr\n{run.err}--- frames", *run.lines[-TOLD:], sep="\n")
+            print(*(f"BROKEN {scenario.seed}: {complaint}" for complaint in told), sep="\n", flush=True)
+    print(", ".join(f"{command} {code}: {number}" for (command, code), number in sorted(exits.items(), key=str)))
+    print(f"{done} scenarios from seed {seed} in {time.monotonic() - begun:.0f} s, {len(failed)} failed {failed or ''}")
+    bed.relay.end()
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
