@@ -133,8 +133,10 @@ class Bed:
         until = time.monotonic() + 5
         while self.relay.delayed and time.monotonic() < until:
             time.sleep(0.02)
-        # Whoever was reset last is back after 0.1 s.
-        time.sleep(0.25)
+        # Whoever is reset is away for 0.1 s.
+        resets = any(identifier == 0 and data[:1] in (b"\x81", b"\x82") or kind and kind.startswith("power")
+                     for _, _, kind, _, identifier, data in self.relay.record)
+        time.sleep(0.25 if resets else 0.05)
         self.relay.close()
 
     def carry_out(self, scenario, directory):
@@ -153,13 +155,14 @@ class Bed:
             self.probe.leave_configuration()
             run.after = self.look(scenario)
             with Foreign(self.there) as foreign:
-                told += judge.claim(scenario, run, foreign)
-                if run.exit == -9:
-                    told += self.again(scenario, simulator, directory, foreign, run)
-                self.probe.reset(sum(bool(device["node"]) for device in scenario.devices))
-                run.reset = Look(self.probe.snapshot(scenario.devices), {})
-                if run.exit == 0:
-                    told += [f"after a reset: {complaint}" for complaint in judge.claims.after_reset(scenario, run, foreign)]
+                told += named("", judge.claim(scenario, run, foreign), foreign)
+            if run.exit == -9:
+                told += self.again(scenario, simulator, directory, run)
+            self.probe.reset(sum(bool(device["node"]) for device in scenario.devices))
+            run.reset = Look(self.probe.snapshot(scenario.devices), {})
+            if run.exit == 0:
+                with Foreign(self.there) as foreign:
+                    told += named("after a reset: ", judge.claims.after_reset(scenario, run, foreign), foreign)
             told += judge.judge(scenario, run)
         finally:
             simulator.send_signal(signal.SIGINT)
@@ -168,14 +171,21 @@ class Bed:
             told += judge.rows(scenario, run, rows_of(os.path.join(directory, "truth.csv")))
         return run, told
 
-    def again(self, scenario, simulator, directory, foreign, killed):
+    def again(self, scenario, simulator, directory, killed):
         """The same command once more where nothing is wrong: it succeeds truly, or refuses honestly."""
         run = self.execute(scenario, simulator, directory, "again")
         run.before, run.after = killed.after, self.look(scenario)
-        told = judge.claim(scenario, run, foreign)
+        with Foreign(self.there) as foreign:
+            told = named("", judge.claim(scenario, run, foreign), foreign)
         if run.exit not in judge.EXITS - {5, 130} or "panicked" in run.err:
             told.append(f"exit code {run.exit}: {run.err}")
         return [f"the same again: {complaint}" for complaint in told]
+
+
+def named(when, complaints, foreign):
+    """Complaints with what the judge itself could not read."""
+    trouble = f" ({foreign.trouble})" if foreign.trouble else ""
+    return [f"{when}{complaint}{trouble}" for complaint in complaints]
 
 
 def main():

@@ -7,10 +7,12 @@ from scenario import kinds
 
 
 class Foreign:
-    """A network on the devices' side."""
+    """A network on the devices' side, for a while: it would take the answers to the probe for its own."""
 
     def __init__(self, interface):
         self.interface = interface
+        # Why the last read failed that did.
+        self.trouble = None
 
     def __enter__(self):
         self.network = canopen.Network()
@@ -28,7 +30,8 @@ class Foreign:
         client.RESPONSE_TIMEOUT = patience
         try:
             return bytes(client.upload(*place))
-        except (SdoAbortedError, SdoCommunicationError):
+        except (SdoAbortedError, SdoCommunicationError) as error:
+            self.trouble = error
             return None
 
     def number(self, kind, node, place):

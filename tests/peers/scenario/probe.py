@@ -1,6 +1,6 @@
 """Looks into the devices from their own side: what they hold, which NMT state they are in.
 
-Plain sockets, one request at a time for every node and all nodes side by side; SDO as CiA 301 prints it.
+Plain sockets, all nodes side by side; SDO as CiA 301 prints it.
 """
 
 import select
@@ -11,7 +11,10 @@ from scenario.relay import can_socket, drain, pack, unpack
 
 # The simulator answers within milliseconds; a machine that is slower is taken for silent once more.
 PATIENCE = 5.0
-SILENCE = 0.4
+SILENCE = 0.3
+# So many requests at once.
+WINDOW = 12
+HEARTBEAT = (0x1017, 0)
 STATES = {4: "stopped", 5: "operational", 0x7F: "pre-operational"}
 
 
@@ -31,22 +34,24 @@ class Probe:
 
     def exchange(self, requests, patience=PATIENCE):
         """Sends one request for each node, {node: bytes}; the answers that have the same address."""
+        return {node: answers[0] for node, answers in self.ask({node: [request] for node, request in requests.items()}, patience).items()}
+
+    def ask(self, requests, patience=PATIENCE):
+        """Sends some requests for each node at once, {node: [bytes]}; the answers, those that have the same
+        address, of every node that has answered all. The simulator's servers take them one after the other."""
         drain(self.socket)
-        for node, request in requests.items():
-            self.send(0x600 + node, request)
-        answers, missing = {}, dict(requests)
-        for identifier, data in self.frames(patience):
-            node = identifier - 0x580
-            if node in missing and data and len(data) == 8 and data[1:4] == missing[node][1:4]:
-                answers[node] = data
-                del missing[node]
+        missing, answers = {}, {node: [None] * len(asked) for node, asked in requests.items()}
+        for node, asked in requests.items():
+            for number, request in enumerate(asked):
+                self.send(0x600 + node, request)
+                missing[node, request[1:4]] = number
+        for identifier, data in self.frames(patience) if missing else ():
+            key = identifier - 0x580, data and data[1:4]
+            if key in missing and len(data) == 8:
+                answers[key[0]][missing.pop(key)] = data
                 if not missing:
                     break
-        return answers
-
-    def read(self, node, place, patience=PATIENCE):
-        """The data bytes of a number; None where it is refused or nobody answers."""
-        return value(self.exchange({node: upload(place)}, patience).get(node))
+        return {node: found for node, found in answers.items() if None not in found}
 
     def snapshot(self, devices):
         """What the devices hold, {node: {(index, sub): bytes}}: those that answer."""
@@ -54,46 +59,36 @@ class Probe:
         held = {node: {} for node in plans}
         there = self.exchange({node: upload((0x1000, 0)) for node in plans}, 3 * SILENCE)
         plans = {node: places for node, places in plans.items() if node in there}
-        while plans:
-            step = {node: upload(places[0]) for node, places in plans.items()}
-            answers = self.exchange(step)
-            for node in list(plans):
-                place = plans[node].pop(0)
-                if node in answers:
-                    held[node][place] = value(answers[node])
+        while plans := {node: places for node, places in plans.items() if places}:
+            step = {node: places[:WINDOW] for node, places in plans.items()}
+            answers = self.ask({node: [upload(place) for place in places] for node, places in step.items()})
+            for node, places in step.items():
                 # Who is silent once is not asked further.
-                if not plans[node] or node not in answers:
-                    del plans[node]
+                held[node].update(zip(places, map(value, answers.get(node, ()))))
+                plans[node] = plans[node][WINDOW:] if node in answers else []
         return held
 
     def states(self, devices):
-        """The NMT states, {node: name}: who answers no SDO is stopped (or away: None where it should not be)."""
+        """The NMT states, {node: name}: who answers no SDO is stopped. None where nothing tells it."""
         nodes = [device["node"] for device in devices if device["node"]]
-        return {node: self.state(node) for node in nodes}
-
-    def state(self, node):
-        period = self.read(node, (0x1017, 0), SILENCE)
-        if period is None:
-            # Or slow.
-            period = self.read(node, (0x1017, 0), SILENCE)
-        if period is None:
-            return "stopped"
-        now = int.from_bytes(period[:2], "little")
-        changed = not 0 < now <= 250
-        if changed and self.exchange({node: b"\x2b\x17\x10\x00" + bytes([40, 0, 0, 0])}).get(node, b"\x80")[0] != 0x60:
-            return None
-        found = None
-        for identifier, data in self.frames(PATIENCE):
-            if identifier == 0x700 + node and data and data[0] & 0x7F in STATES:
-                found = STATES[data[0] & 0x7F]
+        periods = self.exchange({node: upload(HEARTBEAT) for node in nodes}, SILENCE)
+        # Or slow.
+        periods |= self.exchange({node: upload(HEARTBEAT) for node in nodes if node not in periods}, SILENCE)
+        periods = {node: int.from_bytes(value(answer)[:2], "little") for node, answer in periods.items() if value(answer)}
+        changed = {node: period for node, period in periods.items() if not 0 < period <= 100}
+        self.exchange({node: download(HEARTBEAT, 25, 2) for node in changed})
+        states = {node: None if node in periods else "stopped" for node in nodes}
+        for identifier, data in self.frames(PATIENCE if periods else 0):
+            node = identifier - 0x700
+            if node in periods and data and data[0] & 0x7F in STATES:
+                states[node] = STATES[data[0] & 0x7F]
+            if None not in states.values():
                 break
-        if changed:
-            self.exchange({node: b"\x2b\x17\x10\x00" + period[:2] + bytes(2)})
-        return found
+        self.exchange({node: download(HEARTBEAT, period, 2) for node, period in changed.items()})
+        return states
 
     def write(self, node, place, number, width):
-        request = bytes([0x23 | (4 - width) << 2]) + upload(place)[1:4] + number.to_bytes(4, "little")
-        return self.exchange({node: request}).get(node, b"\x80")[0] == 0x60
+        return self.exchange({node: download(place, number, width)}).get(node, b"\x80")[0] == 0x60
 
     def nmt(self, specifier, node):
         self.send(0, bytes([specifier, node]))
@@ -126,6 +121,10 @@ class Probe:
 def upload(place):
     index, sub = place
     return b"\x40" + index.to_bytes(2, "little") + bytes([sub]) + bytes(4)
+
+
+def download(place, number, width):
+    return bytes([0x23 | (4 - width) << 2]) + upload(place)[1:4] + number.to_bytes(4, "little")
 
 
 def value(answer):

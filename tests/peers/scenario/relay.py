@@ -64,6 +64,8 @@ class Relay(threading.Thread):
         self.sides = {OUT: can_socket(here), IN: can_socket(there)}
         self.rival = can_socket(there)
         self.lock = threading.Lock()
+        # Held while something happens, so that nothing does behind calm().
+        self.acting = threading.Lock()
         self.ticket = itertools.count()
         self.wake_reader, self.wake_writer = os.pipe()
         self.is_open, self.is_cut, self.running = False, False, True
@@ -96,7 +98,7 @@ class Relay(threading.Thread):
 
     def calm(self):
         """No more faults; what was delayed still comes."""
-        with self.lock:
+        with self.acting, self.lock:
             self.faults, self.loss, self.happenings, self.is_cut = {}, {}, [], False
 
     def first_frame(self):
@@ -203,16 +205,18 @@ class Relay(threading.Thread):
                 time.sleep(0.001)
 
     def _due(self):
+        now = time.monotonic()
+        with self.lock:
+            while self.delayed and self.delayed[0][0] <= now:
+                self._send(*heapq.heappop(self.delayed)[2:])
         while True:
-            now = time.monotonic()
-            with self.lock:
-                while self.delayed and self.delayed[0][0] <= now:
-                    self._send(*heapq.heappop(self.delayed)[2:])
-                if not (self.first and self.happenings and self.first + self.happenings[0][0] / 1000 <= now):
-                    return
-                _, act, remark = self.happenings.pop(0)
-                self.record.append((now, "", remark, 0, None, None))
-            act()
+            with self.acting:
+                with self.lock:
+                    if not (self.first and self.happenings and self.first + self.happenings[0][0] / 1000 <= time.monotonic()):
+                        return
+                    _, act, remark = self.happenings.pop(0)
+                    self.record.append((time.monotonic(), "", remark, 0, None, None))
+                act()
 
     # What may happen.
 
