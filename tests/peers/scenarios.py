@@ -1,6 +1,6 @@
 """Scenarios without number through the real program: a seed gives devices, faults, a command, an interruption.
 
-    scenarios.py [--seed N] [--count N] [--seconds N] [--verbose] BINARY HERE THERE
+    scenarios.py [--seed N] [--count N] [--seconds N] [--verbose] [--command NAME] [--forge NAME] BINARY HERE THERE
 
 The simulated devices are on THERE, the program is on HERE, and between them a relay makes what goes wrong
 (scenario/relay.py). Judged from the devices' own side, once the command has ended and nothing is wrong any
@@ -11,6 +11,7 @@ more (scenario/judge.py). Without --seed a fresh one is taken and printed, and t
 
 import argparse
 import collections
+import itertools
 import os
 import random
 import signal
@@ -21,6 +22,7 @@ import time
 import traceback
 
 from scenario import judge
+from scenario.forge import FORGERIES
 from scenario.foreign import Foreign
 from scenario.make import Scenario
 from scenario.probe import Probe
@@ -48,9 +50,9 @@ class Run:
 class Bed:
     """The program, the devices and the relay between them."""
 
-    def __init__(self, binary, here, there):
+    def __init__(self, binary, here, there, forgery=None):
         self.binary, self.here, self.there = os.path.abspath(binary), here, there
-        self.relay, self.probe = Relay(here, there), Probe(there)
+        self.relay, self.probe = Relay(here, there, forgery), Probe(there)
 
     def simulator(self, scenario, directory):
         """Devices in a process of their own, started up."""
@@ -194,6 +196,8 @@ def main():
     parser.add_argument("--count", type=int)
     parser.add_argument("--seconds", type=float)
     parser.add_argument("--verbose", action="store_true")
+    parser.add_argument("--command", help="leave out the seeds of others")
+    parser.add_argument("--forge", choices=FORGERIES)
     parser.add_argument("binary")
     parser.add_argument("here")
     parser.add_argument("there")
@@ -203,9 +207,11 @@ def main():
     seed = options.seed if options.seed is not None else random.SystemRandom().randrange(1 << 32)
     count = options.count or (None if options.seconds else 1 if options.seed is not None else 100)
     print(f"from seed {seed}", flush=True)
-    bed, begun, done, failed, exits = Bed(options.binary, options.here, options.there), time.monotonic(), 0, [], collections.Counter()
+    bed = Bed(options.binary, options.here, options.there, FORGERIES.get(options.forge))
+    begun, done, forged, failed, exits = time.monotonic(), 0, 0, [], collections.Counter()
+    seeds = (each for each in itertools.count(seed) if options.command in (None, Scenario(each).command))
     while (count is None or done < count) and (options.seconds is None or time.monotonic() - begun < options.seconds):
-        scenario, since = Scenario(seed + done), time.monotonic()
+        scenario, since = Scenario(next(seeds)), time.monotonic()
         with tempfile.TemporaryDirectory() as directory:
             try:
                 run, told = bed.carry_out(scenario, directory)
@@ -214,6 +220,7 @@ def main():
                 run, told = None, [traceback.format_exc()]
         done += 1
         exits[scenario.command, run and run.exit] += 1
+        forged += bool(bed.relay.forged)
         if options.verbose:
             print(f"{scenario.seed} exit {run and run.exit} {time.monotonic() - since:.1f} s: {' '.join(scenario.arguments)}", flush=True)
         if told:
@@ -224,6 +231,8 @@ def main():
             print(*(f"BROKEN {scenario.seed}: {complaint}" for complaint in told), sep="\n", flush=True)
     print(", ".join(f"{command} {code}: {number}" for (command, code), number in sorted(exits.items(), key=str)))
     print(f"{done} scenarios from seed {seed} in {time.monotonic() - begun:.0f} s, {len(failed)} failed {failed or ''}")
+    if options.forge:
+        print(f"{options.forge}: forged in {forged}")
     bed.relay.end()
     return 1 if failed else 0
 

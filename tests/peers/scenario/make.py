@@ -27,9 +27,9 @@ class Scenario:
         self.devices = [device(rng, place) for place in range(rng.choice((1, 1, 2, 2, 3, 4)))]
         self.still = False
         self.command, self.arguments, self.named, self.wanted = command(rng, self)
-        self.timing = (rng.choice((100, 300, 500)), rng.choice((0, 1, 1, 2)))
+        self.timing = (rng.choice((100, 300, 300, 500)), rng.choice((0, 1, 1, 2)))
         self.faults, self.loss, self.happenings, self.rival, self.signal = [], {}, [], [], None
-        if rng.random() < 0.8:
+        if rng.random() < 0.75:
             trouble(rng, self)
         if not self.is_troubled():
             # Whoever has nothing in the way must not fail because the machine is slow.
@@ -98,27 +98,21 @@ class Scenario:
 
 def device(rng, place):
     kind = rng.choice(("mh4", "mh4", *kinds.KINDS))
-    objects = kinds.objects(kind)
     settings = {}
     if rng.random() < 0.5:
         settings[0x1017, 0] = rng.choice((50, 100, 200))
-    if rng.random() < 0.4 and (0x1800, 5) in objects and objects[0x1800, 5].access == "rw":
-        settings[0x1800, 5] = rng.choice((20, 50, 100))
-        # Timers do nothing where SYNC is waited for.
-        if rng.random() < 0.5 and kind in ("mh4", "d20"):
-            settings[0x1800, 2] = 254
     lss = []
     if rng.random() < 0.1:
         service = rng.choice(LSS_SERVICES)
         lss = [rng.choice((f"lose = [{service}]", f'late = {{ "{service}" = "{rng.choice((60, 300, 900))}ms" }}',
                            f'refuse = {{ "{rng.choice((0x11, 0x13, 0x17))}" = 1 }}', "scans_for_ever = true"))]
-    return {
+    made = {
         "kind": kind,
         # Never two the same: all different modulo 11.
         "node": rng.choice((1, 5, 7, 33, 80)) + 11 * place,
         "serial": 1000 + place,
         "start": rng.random() < 0.2,
-        "latency": rng.choice((0, 0, 0, 1, 3, 20)),
+        "latency": rng.choice((0, 0, 0, 0, 0, 1, 1, 3, 3, 20)),
         "set": settings,
         # Written to 1017h before the command, and not stored.
         "unsaved": rng.choice((60, 150)) if rng.random() < 0.2 else None,
@@ -126,6 +120,16 @@ def device(rng, place):
         "channels": [],
         "overload": kinds.signals(kind)[0]["channel"] if rng.random() < 0.15 else None,
     }
+    if rng.random() < 0.3:
+        timed(rng, made)
+    return made
+
+
+def timed(rng, device):
+    """It sends by its timer, not on SYNC."""
+    device["set"][0x1800, 5] = rng.choice((20, 50, 100))
+    if device["kind"] in ("mh4", "d20"):
+        device["set"][0x1800, 2] = 254
 
 
 def hold_still(scenario, share=None):
@@ -193,12 +197,12 @@ def command(rng, scenario):
         return name, ["autozero", str(node), "--format", "json", *samples, *options], [node], {}
     if name == "store":
         one["unsaved"] = 150
-        group = rng.choice(("all", "comm", "app"))
+        group = rng.choice(("all", "all", "comm", "app"))
         verify = ["--verify"] if rng.random() < 0.4 else []
         return name, ["store", str(node), "--group", group, *verify], [node], {"group": group}
     if name == "restore":
         one["set"].setdefault((0x1017, 0), 100)
-        group = rng.choice(("all", "comm", "app"))
+        group = rng.choice(("all", "all", "comm", "app"))
         reset = ["--reset"] if rng.random() < 0.7 else []
         return name, ["restore", str(node), "--group", group, *reset], [node], {"group": group, "reset": bool(reset)}
     if name == "unit":
@@ -268,6 +272,9 @@ def lss(rng, scenario, name, one):
 def log(rng, scenario):
     nodes = some(rng, scenario)
     how = rng.choice(([], [], [], ["--sync", "20ms"], ["--sync", "50ms"], ["--poll", "50ms"], ["--poll", "20ms"], ["--no-nmt"], ["--passive"]))
+    if not how and rng.random() < 0.8:
+        for one in filter(None, map(scenario.at, nodes)):
+            timed(rng, one)
     if how == ["--passive"]:
         how = how + [option for node in nodes if scenario.at(node) for option in ("--device", f"{node}={scenario.at(node)['kind']}")]
     ends = rng.choice((["--count", str(rng.choice((1, 10, 40)))], ["--duration", f"{rng.choice((300, 700, 1500))}ms"]))
@@ -278,19 +285,20 @@ def log(rng, scenario):
         {"poll": "--poll" in how, "file": rng.random() < 0.4, "passive": "--passive" in how, "count": int(ends[1]) if ends[0] == "--count" else None}
 
 
-def when(rng):
-    """A moment in milliseconds after the first frame; early ones more often."""
-    return round(rng.uniform(0, rng.choice((3, 20, 100, 600, 1500))), 1)
+def when(rng, command):
+    """A moment in milliseconds after the first frame; early ones more often, but in what takes its time."""
+    moments = (100, 600, 1500, 2500) if command in ("log", "check") else (3, 20, 100, 600, 1500)
+    return round(rng.uniform(0, rng.choice(moments)), 1)
 
 
 def trouble(rng, scenario):
     nodes = [device["node"] for device in scenario.devices if device["node"]]
-    kinds_of = rng.sample(("frames", "loss", "rival", "link", "stop", "power", "cut"), rng.choice((0, 1, 1, 1, 2, 3)))
+    kinds_of = rng.sample(("frames", "loss", "rival", "link", "stop", "power", "cut"), rng.choice((0, 1, 1, 1, 1, 2)))
     if "frames" in kinds_of:
         for _ in range(rng.randint(1, 5)):
             kind = rng.choice(("lose", "lose", "double", "delay", "garble", "truncate"))
             ms = {"delay": rng.choice((2, 10, 60, 150, 700, 1500)), "garble": rng.randint(1, 63), "truncate": rng.randint(0, 3)}.get(kind, 0)
-            number = rng.randint(0, rng.choice((3, 10, 40, 120)))
+            number = rng.randint(0, rng.choice((3, 10, 40, 120, 300)))
             scenario.faults.append((rng.choice((OUT, IN, IN)) if kind != "truncate" else IN, number, kind, ms))
     if "loss" in kinds_of:
         scenario.loss = {rng.choice((OUT, IN)): rng.choice((2, 5, 20))}
@@ -301,19 +309,19 @@ def trouble(rng, scenario):
             frame = {"reads": lambda: (0x600 + node, b"\x40" + rng.choice((b"\x00\x10\x00", b"\x17\x10\x00", b"\x18\x10\x04")) + bytes(4)),
                      "writes": lambda: (0x600 + node, b"\x2b\x17\x10\x00" + rng.choice((b"\x00", b"\x4d")) + bytes(3)),
                      "commands": lambda: (0, bytes([rng.choice((1, 2, 0x80, 0x81, 0x82)), rng.choice((node, node, 0))]))}[act]()
-            scenario.rival.append((when(rng), act, frame))
+            scenario.rival.append((when(rng, scenario.command), act, frame))
     if "link" in kinds_of:
-        begin = when(rng)
+        begin = when(rng, scenario.command)
         scenario.happenings += [(begin, "down", None), (begin + rng.choice((5, 100, 600)), "up", None)]
     if "stop" in kinds_of:
-        begin = when(rng)
+        begin = when(rng, scenario.command)
         scenario.happenings += [(begin, "stopped", None), (begin + rng.choice((20, 150, 800, 2500)), "continued", None)]
     if "power" in kinds_of and nodes:
-        scenario.happenings.append((when(rng), "power", rng.choice(nodes)))
+        scenario.happenings.append((when(rng, scenario.command), "power", rng.choice(nodes)))
     if "cut" in kinds_of:
-        begin = when(rng)
+        begin = when(rng, scenario.command)
         scenario.happenings.append((begin, "cut", None))
         if rng.random() < 0.6:
             scenario.happenings.append((begin + rng.choice((5, 50, 300, 1500)), "joined", None))
-    if rng.random() < 0.4:
-        scenario.signal = (rng.choice(("SIGINT", "SIGTERM", "SIGKILL")), when(rng))
+    if rng.random() < 0.3:
+        scenario.signal = (rng.choice(("SIGINT", "SIGTERM", "SIGKILL")), when(rng, scenario.command))

@@ -58,8 +58,10 @@ class Relay(threading.Thread):
     Happenings, (milliseconds after the program's first frame, function, remark), are done when they are due.
     """
 
-    def __init__(self, here, there):
+    def __init__(self, here, there, forgery=None):
         super().__init__(daemon=True)
+        # Of scenario/forge.py; how many frames it changed.
+        self.forgery, self.forged = forgery, 0
         self.interface = here
         self.sides = {OUT: can_socket(here), IN: can_socket(there)}
         self.rival = can_socket(there)
@@ -82,6 +84,7 @@ class Relay(threading.Thread):
             self.stalled = {OUT: 0.0, IN: 0.0}
             self.delayed = []
             self.record = []
+            self.forged = 0
             self.first = None
             self.is_cut = False
             # What waits in the sockets is of the last scenario.
@@ -148,8 +151,12 @@ class Relay(threading.Thread):
                 if error.errno != errno.ENETDOWN:
                     raise
                 continue
+            identifier, data = unpack(raw)
+            forged = self.forgery(direction, identifier, data) if self.forgery and self.is_open else None
+            self.forged += forged is not None
             with self.lock:
-                self._pass(direction, *unpack(raw))
+                for frame in [(direction, identifier, data)] if forged is None else forged:
+                    self._pass(*frame)
 
     def _pass(self, direction, identifier, data):
         now = time.monotonic()
