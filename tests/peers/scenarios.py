@@ -44,7 +44,9 @@ class Look:
 class Run:
     """What there is to judge."""
 
-    exit, out, err, overran, rows, configuring = None, "", "", False, [], []
+    exit, out, err, overran, configuring = None, "", "", False, []
+    # Of a recording; whether its last line is whole.
+    rows, is_whole = [], True
 
 
 class Bed:
@@ -123,8 +125,10 @@ class Bed:
         run.record, run.lines = list(self.relay.record), self.relay.lines()
         run.out, run.err = (open(path, encoding="utf-8", errors="replace").read() for path in paths[:2])
         if scenario.command == "log":
-            file = paths[2] if scenario.wanted["file"] and os.path.exists(paths[2]) else run.out
-            run.rows = rows_of(file) if not scenario.wanted["file"] or os.path.exists(paths[2]) else []
+            table = run.out
+            if scenario.wanted["file"]:
+                table = open(paths[2], encoding="utf-8").read() if os.path.exists(paths[2]) else ""
+            run.rows, run.is_whole = rows_of(table), table == "" or table.endswith("\n")
         return run
 
     def calm(self, simulator):
@@ -170,7 +174,7 @@ class Bed:
             simulator.send_signal(signal.SIGINT)
             simulator.wait(20)
         if scenario.command == "log":
-            told += judge.rows(scenario, run, rows_of(os.path.join(directory, "truth.csv")))
+            told += judge.rows(scenario, run, rows_of(open(os.path.join(directory, "truth.csv"), encoding="utf-8").read()))
         return run, told
 
     def again(self, scenario, simulator, directory, killed):

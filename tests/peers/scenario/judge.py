@@ -26,6 +26,7 @@ def judge(scenario, run):
     """The rules that were broken, in words, by what stands there right after the command."""
     told = ends(scenario, run) + wire.judge(scenario, run.record)
     told += others(scenario, run) + own(scenario, run) + states(scenario, run) + configuring(scenario, run)
+    told += mapping(scenario, run)
     return told
 
 
@@ -41,6 +42,8 @@ def ends(scenario, run):
         told.append(f"exit code {run.exit}")
     if run.exit == 130 and not interrupted:
         told.append("nobody interrupted it")
+    if run.exit == 130 and run.rows:
+        told.append("a recording has a result")
     if run.exit == 5 and "down" not in scenario.kinds_of_trouble():
         told.append("the bus works")
     if not run.overran and run.exit and run.exit > 0 and not run.err.strip() and run.exit != 1:
@@ -139,6 +142,19 @@ def configuring(scenario, run):
         return []
     excused = scenario.is_commanded_by_others() or any(device["lss"] for device in scenario.devices) or "stopped" in scenario.kinds_of_trouble()
     return [] if excused else [f"in configuration state: {[answer.hex() for answer in run.configuring]}"]
+
+
+def mapping(scenario, run):
+    """`pdo map` that failed has left the old mapping or the new one, or says how it was left and what mends it."""
+    node, wanted = scenario.named[0], scenario.wanted
+    if scenario.command != "pdo map" or run.exit in (0, -9) or scenario.restarts(node) or node not in run.before.held:
+        return []
+    offset, after = wanted["pdo"] - 1, run.after.held[node]
+    half = differences(run.before.held[node], after)
+    right = [((0x1800 + offset, 2), wanted["code"]), ((0x1800 + offset, 5), wanted["timer"])]
+    right += [((0x1A00 + offset, sub), word) for sub, word in enumerate([len(wanted["words"]), *wanted["words"]])] if wanted["words"] else []
+    is_new = all(number is None or int.from_bytes(after.get(place) or b"", "little") == number for place, number in right)
+    return [] if is_new or re.search("half changed|is not known|cangauge pdo map", run.err) else half
 
 
 def rows(scenario, run, truth):

@@ -1,7 +1,6 @@
 """Every row of a recording is a value that was sent, in order, none twice."""
 
 import csv
-import os
 
 from scenario.relay import IN
 
@@ -9,13 +8,10 @@ from scenario.relay import IN
 COLUMNS = ("node", "signal", "value", "unit", "status", "raw")
 
 
-def rows_of(path_or_text, columns=COLUMNS):
+def rows_of(table):
     """The whole lines of a table; one that a kill cut off is no row."""
-    if os.path.exists(path_or_text):
-        with open(path_or_text, encoding="utf-8") as file:
-            path_or_text = file.read()
-    whole = path_or_text[: path_or_text.rfind("\n") + 1]
-    return [tuple(row[column] for column in columns) for row in csv.DictReader(whole.splitlines())]
+    whole = table[: table.rfind("\n") + 1]
+    return [tuple(row[column] for column in COLUMNS) for row in csv.DictReader(whole.splitlines())]
 
 
 def judge(scenario, run, truth):
@@ -24,6 +20,8 @@ def judge(scenario, run, truth):
     count = scenario.wanted["count"]
     if count is not None and len(rows) > count:
         told.append(f"{len(rows)} rows of {count}")
+    if not run.is_whole and run.exit != -9:
+        told.append("the last line is cut off")
     if scenario.wanted["poll"]:
         return told + polled(rows, run.record)
     return told + sent(scenario, rows, truth)
