@@ -17,7 +17,6 @@ class Object:
     def __init__(self, index, sub, entry):
         self.index, self.sub, self.type, self.access = index, sub, entry["type"], entry["access"]
         self.default, self.is_plain = entry.get("default"), "signature" not in entry
-        self.limits = entry.get("low"), entry.get("high")
 
     @property
     def at(self):

@@ -23,9 +23,8 @@ class Scenario:
 
     def __init__(self, seed):
         self.seed = seed
-        self.random = rng = random.Random(seed)
+        rng = random.Random(seed)
         self.devices = [device(rng, place) for place in range(rng.choice((1, 1, 2, 2, 3, 4)))]
-        self.still = False
         self.command, self.arguments, self.named, self.wanted = command(rng, self)
         self.timing = (rng.choice((100, 300, 300, 500)), rng.choice((0, 1, 1, 2)))
         self.faults, self.loss, self.happenings, self.rival, self.signal = [], {}, [], [], None
@@ -134,7 +133,6 @@ def timed(rng, device):
 
 def hold_still(scenario, share=None):
     """Measured values do not change, so that what was read can be read again. With `share`, near zero."""
-    scenario.still = True
     for device in scenario.devices:
         device["overload"] = None
         for channel in kinds.description(device["kind"])["sim"]["channel"]:

@@ -20,6 +20,8 @@ def judge(scenario, run, truth):
     count = scenario.wanted["count"]
     if count is not None and len(rows) > count:
         told.append(f"{len(rows)} rows of {count}")
+    if run.exit == 0 and count is not None and len(rows) < count and not scenario.is_troubled() and run.seconds < 3:
+        told.append(f"{len(rows)} rows of {count}, and it ended")
     if not run.is_whole and run.exit != -9:
         told.append("the last line is cut off")
     if scenario.wanted["poll"]:

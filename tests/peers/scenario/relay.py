@@ -104,9 +104,6 @@ class Relay(threading.Thread):
         with self.acting, self.lock:
             self.faults, self.loss, self.happenings, self.is_cut = {}, {}, [], False
 
-    def first_frame(self):
-        return self.first
-
     def begin_now(self):
         """A program that sends nothing has begun, too."""
         with self.lock:
