@@ -125,7 +125,9 @@ def states(scenario, run):
         if switches and (not is_told(scenario, node) or lost(run) or scenario.is_disordered() or
                          {"lose", "cut", "garble", "truncate", "stopped"} & scenario.kinds_of_trouble()):
             continue
-        if not re.search("not put back|stays|state|left", run.err):
+        # What could not be put back is said of that node.
+        said = [line for line in run.err.splitlines() if re.search(rf"\b{node}\b", line)]
+        if not re.search("not put back|stays?\b|state|left", "\n".join(said)):
             told.append(f"node {node} was {before} and is {after}")
     return told
 
@@ -133,7 +135,7 @@ def states(scenario, run):
 def is_told(scenario, node):
     """Whether a heartbeat told the state all the time."""
     device = scenario.at(node)
-    return device is not None and HEARTBEAT in device["set"] and not device["unsaved"] and scenario.command not in wire.LSS
+    return device is not None and (HEARTBEAT in device["set"] or device["unsaved"]) and scenario.command not in wire.LSS
 
 
 def configuring(scenario, run):
