@@ -152,7 +152,7 @@ def mapping(scenario, run):
     if scenario.command != "pdo map" or run.exit in (0, -9) or scenario.restarts(node) or node not in run.before.held:
         return []
     offset, after = wanted["pdo"] - 1, run.after.held[node]
-    half = differences(run.before.held[node], after)
+    half = differences(run.before.held[node], after, lambda place: place[0] not in (0x1800 + offset, 0x1A00 + offset))
     right = [((0x1800 + offset, 2), wanted["code"]), ((0x1800 + offset, 5), wanted["timer"])]
     right += [((0x1A00 + offset, sub), word) for sub, word in enumerate([len(wanted["words"]), *wanted["words"]])] if wanted["words"] else []
     is_new = all(number is None or int.from_bytes(after.get(place) or b"", "little") == number for place, number in right)
