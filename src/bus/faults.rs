@@ -25,12 +25,16 @@ pub struct FaultPlan {
     pub truncate: BTreeMap<u64, usize>,
     /// When the interface goes down, and for how long; for ever without a time.
     pub down: Option<(Mono, Option<Duration>)>,
+    /// When nobody acknowledges and the transmit queue is full, and for how long.
+    pub full: Option<(Mono, Duration)>,
     /// When the controller switches itself off: what is sent from then on waits, until nothing more can wait.
     pub bus_off: Option<Mono>,
+    /// How long after that it is started again, and sends what waits; never without a time.
+    pub restart_after: Option<Duration>,
 }
 
 /// How many frames wait in a controller that is off.
-const OFF_QUEUE: u32 = 10;
+const OFF_QUEUE: usize = 10;
 
 /// A bus that follows a [`FaultPlan`].
 pub struct Faulty<B> {
@@ -42,15 +46,16 @@ pub struct Faulty<B> {
     held: VecDeque<Received>,
     /// What the program has been told of the interface.
     is_up: bool,
-    told_off: bool,
+    is_off: bool,
     /// Frames that wait in a controller that is off.
-    waiting: u32,
+    waiting: VecDeque<Frame>,
 }
 
 impl<B: Bus> Faulty<B> {
     /// Lets `plan` happen to `bus`.
     pub fn new(bus: B, plan: FaultPlan) -> Faulty<B> {
-        Faulty { bus, plan, sends: 0, received: 0, held: VecDeque::new(), is_up: true, told_off: false, waiting: 0 }
+        let (held, waiting) = (VecDeque::new(), VecDeque::new());
+        Faulty { bus, plan, sends: 0, received: 0, held, is_up: true, is_off: false, waiting }
     }
 
     /// The bus inside.
@@ -72,14 +77,19 @@ impl<B: Bus> Faulty<B> {
     }
 
     fn is_off_at(&self, now: Mono) -> bool {
-        self.plan.bus_off.is_some_and(|from| from <= now)
+        self.plan.bus_off.is_some_and(|from| from <= now) && self.restart().is_none_or(|at| now < at)
+    }
+
+    /// When a controller that switches itself off is started again.
+    fn restart(&self) -> Option<Mono> {
+        self.plan.bus_off.zip(self.plan.restart_after).map(|(from, length)| from + length)
     }
 
     /// The next moment after `now` at which something happens to the interface.
     fn next_change(&self, now: Mono) -> Option<Mono> {
         let down =
             self.plan.down.into_iter().flat_map(|(from, length)| [Some(from), length.map(|length| from + length)]);
-        down.flatten().chain(self.plan.bus_off).filter(|moment| *moment > now).min()
+        down.flatten().chain(self.plan.bus_off).chain(self.restart()).filter(|moment| *moment > now).min()
     }
 
     /// What has happened to the interface and was not told yet.
@@ -89,11 +99,26 @@ impl<B: Bus> Faulty<B> {
             self.is_up = !self.is_up;
             return Some(Event::Link(self.is_up));
         }
-        if self.is_off_at(now.mono) && !self.told_off {
-            self.told_off = true;
-            return Some(Event::Fault(Fault::BusOff, now));
+        if self.is_off_at(now.mono) != self.is_off {
+            self.is_off = !self.is_off;
+            let fault = if self.is_off { Fault::BusOff } else { Fault::Restarted };
+            return Some(Event::Fault(fault, now));
         }
         None
+    }
+
+    /// A controller that was started again sends what waits, as far as the queue takes it.
+    fn send_what_waits(&mut self) -> Result<(), BusError> {
+        while !self.is_off_at(self.bus.now().mono)
+            && let Some(frame) = self.waiting.front()
+        {
+            match self.bus.send(frame) {
+                Err(BusError::QueueFull) => return Ok(()),
+                result => result?,
+            }
+            self.waiting.pop_front();
+        }
+        Ok(())
     }
 
     fn hold(&mut self, received: Received) {
@@ -190,14 +215,16 @@ impl<B: Bus> Bus for Faulty<B> {
         if !self.is_up_at(now) {
             return Err(BusError::Down(self.bus.name().to_owned()));
         }
-        if self.is_off_at(now) {
-            if self.waiting >= OFF_QUEUE {
+        self.send_what_waits()?;
+        if self.is_off_at(now) || !self.waiting.is_empty() {
+            if self.waiting.len() >= OFF_QUEUE {
                 return Err(BusError::QueueFull);
             }
-            self.waiting += 1;
+            self.waiting.push_back(*frame);
             return Ok(());
         }
-        if self.plan.queue_full.contains(&number) {
+        let is_full = self.plan.full.is_some_and(|(from, length)| (from..from + length).contains(&now));
+        if is_full || self.plan.queue_full.contains(&number) {
             return Err(BusError::QueueFull);
         }
         if self.plan.lose_sent.contains(&number) {
@@ -208,6 +235,7 @@ impl<B: Bus> Bus for Faulty<B> {
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
         loop {
+            self.send_what_waits()?;
             if let Some(news) = self.news() {
                 return Ok(news);
             }
@@ -313,6 +341,33 @@ mod tests {
         assert!(heard(&mut bus, at(100))?.is_empty());
         let taken = (0..20u8).filter(|n| bus.send(&Frame::byte(CanId::NMT, *n)).is_ok()).count();
         assert_eq!((taken, bus.inner().sent.len()), (10, 0));
+        Ok(())
+    }
+
+    #[test]
+    fn a_controller_that_is_started_again_sends_what_waits() -> Result<(), BusError> {
+        let (bus_off, restart_after) = (Some(at(5)), Some(Duration::from_millis(10)));
+        let script = Script::new().frame(at(10), "181#").frame(at(20), "182#");
+        let mut bus = Faulty::new(script, FaultPlan { bus_off, restart_after, ..FaultPlan::default() });
+        assert!(matches!(bus.receive(at(100))?, Event::Fault(Fault::BusOff, _)));
+        bus.send(&Frame::byte(CanId::NMT, 1))?;
+        assert!(bus.inner().sent.is_empty());
+        assert!(matches!(bus.receive(at(100))?, Event::Fault(Fault::Restarted, _)));
+        assert_eq!(bus.inner().sent, ["000#01"]);
+        assert_eq!(heard(&mut bus, at(100))?, [(at(20), "182#".to_owned())]);
+        Ok(())
+    }
+
+    #[test]
+    fn a_queue_is_full_for_a_while() -> Result<(), BusError> {
+        let full = Some((at(5), Duration::from_millis(10)));
+        let mut bus = Faulty::new(Script::new(), FaultPlan { full, ..FaultPlan::default() });
+        let mut taken = Vec::new();
+        for moment in [0, 5, 14, 15] {
+            bus.receive(at(moment))?;
+            taken.push(bus.send(&Frame::empty(CanId::SYNC)).is_ok());
+        }
+        assert_eq!(taken, [true, false, false, true]);
         Ok(())
     }
 

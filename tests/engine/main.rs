@@ -11,13 +11,19 @@
 //!
 //! A scenario that breaks a rule is made smaller as long as it still breaks it, and printed with its frames.
 
+mod bench;
+mod carry_out;
+mod command;
 mod judge;
+mod kinds;
 mod make;
 mod random;
 mod run;
+mod shrink;
 mod spec;
 mod station;
 mod tap;
+mod time;
 
 use judge::{Broken, judge};
 use spec::Spec;
@@ -49,7 +55,7 @@ fn try_out(spec: &Spec) -> (Vec<Broken>, String) {
         let mut run = run::run(spec);
         let end = format!("{:?} at {:?}\n", run.result, run.ended.since_start());
         let devices = run.bus.bus.inner().stations::<station::Unruly>();
-        let devices: Vec<_> = devices.map(|unruly| run::holds(&unruly.device)).collect();
+        let devices: Vec<_> = devices.map(|unruly| bench::holds(&unruly.device)).collect();
         let end = end + &format!("before {:?}\nafter {devices:?}", run.before);
         let broken = judge(spec, &mut run);
         (broken, run::transcript(&run) + &end)

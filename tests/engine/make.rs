@@ -1,16 +1,15 @@
 //! From a seed to a [`Spec`].
 
-use crate::random::Random;
-use crate::spec::{Act, Command, DeviceSpec, Fault, Other, Spec, Target, Vagary};
-use cangauge::canopen::nmt::NmtCommand;
-use cangauge::canopen::object::ObjectId;
-use cangauge::canopen::value::DataType;
-use cangauge::device::catalog;
-use cangauge::device::description::Access;
-use cangauge::tasks::lss::Via;
+mod commands;
 
-const KINDS: [&str; 13] =
-    ["mh4", "mh4", "mh4", "d20", "d20", "mc1609", "mc1609", "dps", "dps", "hydac", "jumo", "baumer", "hydac-old"];
+use crate::command::Command;
+use crate::kinds::ATTIC;
+use crate::random::Random;
+use crate::spec::{Act, DeviceSpec, Fault, Kill, Other, Spec, Vagary};
+use commands::command;
+
+const KINDS: [&str; 14] =
+    ["mh4", "mh4", "mh4", "d20", "d20", "mc1609", "mc1609", "dps", "dps", "hydac", "jumo", "baumer", "hydac-old", ATTIC];
 const RATES: [u32; 4] = [125_000, 250_000, 500_000, 1_000_000];
 const ABORTS: [u32; 6] = [0x0800_0000, 0x0602_0000, 0x0609_0011, 0x0601_0002, 0x0800_0022, 0x0606_0000];
 
@@ -33,11 +32,18 @@ impl Spec {
             others: Vec::new(),
             faults: Vec::new(),
             interrupts: Vec::new(),
+            kill: None,
             command,
         };
+        if let Command::Detect { .. } = spec.command {
+            let rate = *random.pick(&[20_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000]);
+            spec.devices.iter_mut().for_each(|device| device.bit_rate = Some(rate));
+        }
         // Each kind of trouble now and then, and a quarter of all runs without any.
-        if random.percent(75) {
-            spec.trouble(random);
+        match random.within(0..=99) {
+            0..=69 => spec.trouble(random),
+            70..=75 => spec.kill = Some(kill(random)),
+            _ => {}
         }
         spec
     }
@@ -69,6 +75,9 @@ impl Spec {
             if random.percent(20) {
                 self.interrupts.push(when(random));
             }
+        }
+        if random.percent(15) {
+            self.kill = Some(kill(random));
         }
     }
 }
@@ -103,6 +112,10 @@ fn nth(random: &mut Random) -> u64 {
     random.within(0..=most)
 }
 
+fn kill(random: &mut Random) -> Kill {
+    Kill { before: nth(random), again_ms: *random.pick(&[0, 5, 100, 700, 3_000]) }
+}
+
 fn fault(random: &mut Random) -> Fault {
     let number = nth(random);
     match random.within(0..=10) {
@@ -112,16 +125,19 @@ fn fault(random: &mut Random) -> Fault {
         5 => Fault::Delay(number, *random.pick(&[1, 5, 30, 120, 700, 2_000])),
         6 => Fault::Garble(number, usize::from(random.byte(0..=7)), random.byte(1..=255)),
         7 => Fault::Truncate(number, usize::from(random.byte(0..=7))),
+        8 if random.percent(30) => Fault::Full { at_us: when(random), for_ms: *random.pick(&[20, 400, 3_000]) },
         8 => Fault::QueueFull(number),
         9 => Fault::Down { at_us: when(random), for_ms: random.percent(40).then(|| random.within(1..=500)) },
-        _ if random.percent(50) => Fault::BusOff { at_us: when(random) },
+        _ if random.percent(50) => {
+            Fault::BusOff { at_us: when(random), for_ms: random.percent(50).then(|| random.within(1..=700)) }
+        }
         _ => Fault::Lose(number + 1),
     }
 }
 
 fn vagary(random: &mut Random) -> Vagary {
     let nth = nth(random);
-    match random.within(0..=13) {
+    match random.within(0..=14) {
         0 => Vagary::ResetAt { ms: when(random) / 1000 },
         1 => Vagary::Hang { from_ms: when(random) / 1000, for_ms: *random.pick(&[20, 200, 2_000, 1_000_000]) },
         2 | 3 => {
@@ -139,6 +155,11 @@ fn vagary(random: &mut Random) -> Vagary {
             Vagary::LateLss(*random.pick(&[0x11, 0x13, 0x17, 0x43, 0x5e]), *random.pick(&[60, 300, 700, 2_500, 4_000]))
         }
         12 => Vagary::RefuseLss(*random.pick(&[0x11, 0x13, 0x17])),
+        13 => Vagary::Babbles {
+            from_ms: when(random) / 1000,
+            for_ms: *random.pick(&[20, 500, 10_000]),
+            every_us: *random.pick(&[550, 2_000, 20_000]),
+        },
         _ if random.percent(50) => Vagary::GoneAfterReset,
         _ => Vagary::ScansForEver,
     }
@@ -148,160 +169,12 @@ fn act(random: &mut Random, devices: &[DeviceSpec]) -> Act {
     let node = random.pick(devices).node.unwrap_or(5);
     let (index, sub) =
         *random.pick(&[(0x1000, 0), (0x1008, 0), (0x1017, 0), (0x1018, 4), (0x6130, 1), (0x1a00, 0), (0x100a, 0)]);
-    match random.within(0..=9) {
+    match random.within(0..=10) {
         0..=5 => Act::Read { node, index, sub },
+        6 if random.percent(25) => Act::LssWait,
         6 | 7 => Act::Write { node, index: 0x1017, sub: 0, value: *random.pick(&[0, 77, 500]), bytes: 2 },
         _ => {
             Act::Nmt { specifier: *random.pick(&[0x01, 0x02, 0x80, 0x81, 0x82]), node: *random.pick(&[node, node, 0]) }
-        }
-    }
-}
-
-/// A node that is there, or seldom one that is not.
-fn node(random: &mut Random, devices: &[DeviceSpec]) -> u8 {
-    let there = random.pick(devices).node;
-    there.filter(|_| !random.percent(6)).unwrap_or_else(|| random.byte(1..=127))
-}
-
-fn nodes(random: &mut Random, devices: &[DeviceSpec]) -> Vec<u8> {
-    let mut all: Vec<u8> = devices.iter().filter_map(|device| device.node).filter(|_| random.percent(70)).collect();
-    if all.is_empty() || random.percent(5) {
-        all.push(node(random, devices));
-    }
-    all.sort_unstable();
-    all.dedup();
-    all
-}
-
-fn target(random: &mut Random, devices: &[DeviceSpec]) -> Target {
-    match random.within(0..=9) {
-        0..=4 => Target::Node(node(random, devices)),
-        5..=7 => Target::Identity(usize::try_from(random.next() % devices.len() as u64).expect("an index")),
-        8 => Target::Only,
-        _ => Target::Unconfigured,
-    }
-}
-
-/// An object of the device at a node, what can be written to it among those that are plain memory.
-fn object(random: &mut Random, devices: &[DeviceSpec], node: u8, write: bool) -> Option<(ObjectId, DataType)> {
-    let kind = devices.iter().find(|device| device.node == Some(node))?.kind;
-    let model = catalog::by_name(kind)?;
-    let may = |object: ObjectId, access: Access, data_type: DataType| {
-        if !write {
-            return access != Access::Wo;
-        }
-        let acts = matches!(object.index, 0x1003 | 0x1010 | 0x1011 | 0x1800..=0x1bff | 0x2000..=0x5fff)
-            || matches!(object.index & 0x0fff, 0x125 | 0x131 | 0x132);
-        access == Access::Rw && !acts && matches!(data_type, DataType::Unsigned(1 | 2 | 4))
-    };
-    let all: Vec<(ObjectId, DataType)> = model
-        .dictionary
-        .iter()
-        .filter(|entry| may(entry.object, entry.access, entry.data_type))
-        .map(|entry| (entry.object, entry.data_type))
-        .collect();
-    (!all.is_empty()).then(|| *random.pick(&all))
-}
-
-fn command(random: &mut Random, devices: &[DeviceSpec]) -> Command {
-    let one = node(random, devices);
-    match random.within(0..=33) {
-        0 if random.percent(20) => Command::Scan { nodes: (1..=127).collect() },
-        0 | 1 => Command::Scan { nodes: nodes(random, devices) },
-        2 | 3 => Command::Read { nodes: nodes(random, devices) },
-        4 => Command::Info { node: one },
-        5 => Command::PdoShow { node: one },
-        6 | 7 => {
-            let object = object(random, devices, one, false).map_or(ObjectId::new(0x1000, 0), |(object, _)| object);
-            Command::SdoRead { node: one, object }
-        }
-        8 | 9 => {
-            let (object, data_type) =
-                object(random, devices, one, true).unwrap_or((ObjectId::new(0x1017, 0), DataType::Unsigned(2)));
-            let value = *random.pick(&[0u32, 1, 2, 50, 100, 1000]);
-            let bytes = value.to_le_bytes()[..data_type.width().unwrap_or(4)].to_vec();
-            Command::SdoWrite { node: one, object, bytes }
-        }
-        10 | 11 => {
-            let what = [
-                NmtCommand::Start,
-                NmtCommand::Stop,
-                NmtCommand::EnterPreOperational,
-                NmtCommand::ResetNode,
-                NmtCommand::ResetCommunication,
-            ];
-            Command::Nmt { what: *random.pick(&what), nodes: nodes(random, devices), all: random.percent(10) }
-        }
-        12 => Command::NmtState { nodes: nodes(random, devices) },
-        13 => Command::NmtProbe { node: one },
-        14 => Command::Startup { node: one, auto: random.percent(50) },
-        // What asks all 127 takes its time.
-        15 if random.percent(15) => Command::LssScan,
-        15 if random.percent(40) => Command::LssInquire { target: target(random, devices) },
-        15 => Command::LssStore { target: target(random, devices) },
-        16 => Command::SdoRead { node: one, object: ObjectId::new(0x1008, 0) },
-        17 | 18 => Command::Assign {
-            target: target(random, devices),
-            id: random.percent(85).then(|| *random.pick(&[1, 2, 5, 12, 16, 55, 127])),
-            rate: random.percent(25).then(|| *random.pick(&RATES)),
-            store: random.percent(80),
-            retime: random.percent(10),
-            via: *random.pick(&[Via::Auto, Via::Auto, Via::Lss, Via::Sdo]),
-        },
-        19..=22 => Command::Map {
-            node: one,
-            number: *random.pick(&[1, 1, 2, 3]),
-            items: random
-                .pick(&[
-                    &[][..],
-                    &["pressure"],
-                    &["pressure", "temperature"],
-                    &["ch1"],
-                    &["ch3", "ch1"],
-                    &["pressure.status"],
-                ])
-                .to_vec(),
-            code: random.percent(60).then(|| *random.pick(&[1, 2, 240, 254, 255])),
-            timer_ms: random.percent(50).then(|| *random.pick(&[0, 10, 100, 1000])),
-            cob_id: random.percent(20).then(|| *random.pick(&[0x191, 0x185, 0x281, 0x3ff])),
-            keep: random.percent(30),
-        },
-        23 | 24 => Command::Autozero {
-            node: one,
-            channel: *random.pick(&[None, Some(1)]),
-            force: random.percent(50),
-            store: random.percent(50),
-            dry_run: random.percent(15),
-        },
-        25 => Command::Store { node: one, group: random.byte(0..=2), verify: random.percent(50) },
-        26 => Command::Restore { node: one, group: random.byte(0..=2), reset: random.percent(60) },
-        27 => Command::Unit {
-            node: one,
-            signal: *random.pick(&[None, Some("pressure"), Some("temperature"), Some("ch1")]),
-            unit: *random.pick(&[0x00ab_0000, 0x004e_0000, 0x0622_0000, 0x002d_0000, 0x00ac_0000]),
-        },
-        28 => Command::Filter {
-            node: one,
-            kind: random.byte(0..=3),
-            constant: random.percent(60).then(|| *random.pick(&[1, 8, 50])),
-        },
-        29 => Command::Limits {
-            node: one,
-            lower: *random.pick(&[0.0, 1.5, -3.0]),
-            upper: *random.pick(&[2.0, 9.0, 40.0]),
-        },
-        30 => Command::Errors { node: one, clear: random.percent(60) },
-        31 => Command::Minmax { node: one },
-        _ => {
-            let how = random.within(0..=4);
-            Command::Log {
-                nodes: nodes(random, devices),
-                sync_ms: (how == 0).then(|| *random.pick(&[10, 50])),
-                poll_ms: (how == 1).then(|| *random.pick(&[20, 100])),
-                duration_ms: *random.pick(&[100, 400, 1000]),
-                count: random.percent(20).then(|| random.within(1..=30)),
-                nmt: random.percent(85),
-            }
         }
     }
 }

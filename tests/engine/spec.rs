@@ -1,9 +1,7 @@
 //! What a seed stands for: a bench, what goes wrong, what is asked for, and when it is interrupted. Everything is
 //! spelled out, so that it can be made smaller piece by piece.
 
-use cangauge::canopen::nmt::NmtCommand;
-use cangauge::canopen::object::ObjectId;
-use cangauge::tasks::lss::Via;
+use crate::command::Command;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Spec {
@@ -15,7 +13,16 @@ pub(crate) struct Spec {
     pub(crate) faults: Vec<Fault>,
     /// In µs.
     pub(crate) interrupts: Vec<u64>,
+    pub(crate) kill: Option<Kill>,
     pub(crate) command: Command,
+}
+
+/// The program vanishes, and the same command is typed once more.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Kill {
+    /// The first frame that it does not send, counted from 0.
+    pub(crate) before: u64,
+    pub(crate) again_ms: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -77,6 +84,12 @@ pub(crate) enum Vagary {
     RefuseLss(u8),
     ScansForEver,
     GoneAfterReset,
+    /// It sends emergencies that mean nothing, again and again.
+    Babbles {
+        from_ms: u64,
+        for_ms: u64,
+        every_us: u64,
+    },
 }
 
 /// Somebody else on the bus.
@@ -93,6 +106,8 @@ pub(crate) enum Act {
     Read { node: u8, index: u16, sub: u8 },
     Write { node: u8, index: u16, sub: u8, value: u32, bytes: u8 },
     Nmt { specifier: u8, node: u8 },
+    /// Everybody back to the waiting state of LSS.
+    LssWait,
 }
 
 /// What goes wrong between the program and the wire. Frames are counted, each direction for itself.
@@ -105,128 +120,9 @@ pub(crate) enum Fault {
     Garble(u64, usize, u8),
     Truncate(u64, usize),
     QueueFull(u64),
+    Full { at_us: u64, for_ms: u64 },
     Down { at_us: u64, for_ms: Option<u64> },
-    BusOff { at_us: u64 },
-}
-
-#[derive(Clone, Debug)]
-pub(crate) enum Target {
-    Node(u8),
-    /// That of the device at this place.
-    Identity(usize),
-    Only,
-    Unconfigured,
-}
-
-#[derive(Clone, Debug)]
-pub(crate) enum Command {
-    Scan {
-        nodes: Vec<u8>,
-    },
-    Read {
-        nodes: Vec<u8>,
-    },
-    Info {
-        node: u8,
-    },
-    PdoShow {
-        node: u8,
-    },
-    SdoRead {
-        node: u8,
-        object: ObjectId,
-    },
-    SdoWrite {
-        node: u8,
-        object: ObjectId,
-        bytes: Vec<u8>,
-    },
-    Nmt {
-        what: NmtCommand,
-        nodes: Vec<u8>,
-        all: bool,
-    },
-    NmtState {
-        nodes: Vec<u8>,
-    },
-    NmtProbe {
-        node: u8,
-    },
-    Startup {
-        node: u8,
-        auto: bool,
-    },
-    LssScan,
-    LssInquire {
-        target: Target,
-    },
-    LssStore {
-        target: Target,
-    },
-    Assign {
-        target: Target,
-        id: Option<u8>,
-        rate: Option<u32>,
-        store: bool,
-        retime: bool,
-        via: Via,
-    },
-    Map {
-        node: u8,
-        number: u16,
-        items: Vec<&'static str>,
-        code: Option<u8>,
-        timer_ms: Option<u16>,
-        cob_id: Option<u16>,
-        keep: bool,
-    },
-    Autozero {
-        node: u8,
-        channel: Option<u8>,
-        force: bool,
-        store: bool,
-        dry_run: bool,
-    },
-    Store {
-        node: u8,
-        group: u8,
-        verify: bool,
-    },
-    Restore {
-        node: u8,
-        group: u8,
-        reset: bool,
-    },
-    Unit {
-        node: u8,
-        signal: Option<&'static str>,
-        unit: u32,
-    },
-    Filter {
-        node: u8,
-        kind: u8,
-        constant: Option<u16>,
-    },
-    Limits {
-        node: u8,
-        lower: f64,
-        upper: f64,
-    },
-    Errors {
-        node: u8,
-        clear: bool,
-    },
-    Minmax {
-        node: u8,
-    },
-    Log {
-        nodes: Vec<u8>,
-        sync_ms: Option<u64>,
-        poll_ms: Option<u64>,
-        duration_ms: u64,
-        count: Option<u64>,
-        nmt: bool,
-    },
+    BusOff { at_us: u64, for_ms: Option<u64> },
 }
 
 impl Spec {
@@ -279,6 +175,7 @@ impl Spec {
         self.faults.is_empty()
             && self.others.is_empty()
             && self.interrupts.is_empty()
+            && self.kill.is_none()
             && self.vagaries().next().is_none()
             && !self.shares_node_ids()
             && self.devices.iter().all(|device| device.bit_rate.is_none() && device.latency_us < 20_000)
@@ -286,58 +183,6 @@ impl Spec {
 
     /// Nothing but faults between program and wire goes wrong.
     pub(crate) fn is_clean_but_for_faults(&self) -> bool {
-        Spec { faults: Vec::new(), interrupts: Vec::new(), ..self.clone() }.is_clean()
-    }
-
-    /// Everything that is left of it when one piece is taken away.
-    pub(crate) fn smaller(&self) -> Vec<Spec> {
-        let mut all = Vec::new();
-        let mut without = |change: &dyn Fn(&mut Spec)| {
-            let mut spec = self.clone();
-            change(&mut spec);
-            all.push(spec);
-        };
-        (0..self.others.len()).for_each(|at| without(&|spec| drop(spec.others.remove(at))));
-        (0..self.faults.len()).for_each(|at| without(&|spec| _ = spec.faults.remove(at)));
-        (0..self.interrupts.len()).for_each(|at| without(&|spec| _ = spec.interrupts.remove(at)));
-        for (at, device) in self.devices.iter().enumerate() {
-            for vagary in 0..device.vagaries.len() {
-                without(&|spec| _ = spec.devices[at].vagaries.remove(vagary));
-            }
-            if device.latency_us > 0 {
-                without(&|spec| spec.devices[at].latency_us = 0);
-            }
-            if device.unsaved_heartbeat.is_some() {
-                without(&|spec| spec.devices[at].unsaved_heartbeat = None);
-            }
-            if device.heartbeat_ms.is_some() {
-                without(&|spec| spec.devices[at].heartbeat_ms = None);
-            }
-            if device.event_timer_ms.is_some() {
-                without(&|spec| spec.devices[at].event_timer_ms = None);
-            }
-            if device.overload {
-                without(&|spec| spec.devices[at].overload = false);
-            }
-        }
-        for (at, other) in self.others.iter().enumerate() {
-            let Other::Master { plan } = other else { continue };
-            for act in 0..plan.len() {
-                without(&|spec| {
-                    if let Other::Master { plan } = &mut spec.others[at] {
-                        plan.remove(act);
-                    }
-                });
-            }
-        }
-        // The command names devices by their place, so only the last one can go.
-        if self.devices.len() > 1 && !matches!(self.command, Command::Assign { target: Target::Identity(_), .. }) {
-            without(&|spec| drop(spec.devices.pop()));
-            without(&|spec| drop(spec.devices.remove(0)));
-        }
-        if self.queue < 10 {
-            without(&|spec| spec.queue = 10);
-        }
-        all
+        Spec { faults: Vec::new(), interrupts: Vec::new(), kill: None, ..self.clone() }.is_clean()
     }
 }

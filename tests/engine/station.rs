@@ -29,6 +29,8 @@ pub(crate) struct Unruly {
     /// SDO answers so far.
     answers: u64,
     late: Vec<(Mono, Frame)>,
+    /// When it babbles next, until when, and how often.
+    babble: Option<(Mono, Mono, Duration)>,
     unsaved: Option<Frame>,
     /// Everything that it sent, when it was complete.
     pub(crate) sent: Vec<(Mono, Frame)>,
@@ -43,10 +45,14 @@ impl Unruly {
     pub(crate) fn new(device: Device, place: usize, vagaries: &[Vagary], unsaved: Option<Frame>) -> Unruly {
         let mut resets: Vec<Mono> = Vec::new();
         let mut hangs = Vec::new();
+        let mut babble = None;
         for vagary in vagaries {
             match vagary {
                 Vagary::ResetAt { ms: at } => resets.push(ms(*at)),
                 Vagary::Hang { from_ms, for_ms } => hangs.push((ms(*from_ms), ms(from_ms + for_ms))),
+                Vagary::Babbles { from_ms, for_ms, every_us } => {
+                    babble = Some((ms(*from_ms), ms(from_ms + for_ms), Duration::from_micros(*every_us)));
+                }
                 _ => {}
             }
         }
@@ -60,6 +66,7 @@ impl Unruly {
             hung_until: Mono::START,
             answers: 0,
             late: Vec::new(),
+            babble,
             unsaved,
             sent: Vec::new(),
             signed: Vec::new(),
@@ -74,7 +81,17 @@ impl Unruly {
         self.resets.clear();
         self.hangs.clear();
         self.late.clear();
+        self.babble = None;
         self.hung_until = Mono::START;
+    }
+
+    /// An emergency of no code that anybody knows, if one is due and the one before is out.
+    fn babble(&mut self, now: Mono, out: &mut Outbox) {
+        let Some((due, until, every)) = self.babble.filter(|(due, ..)| *due <= now) else { return };
+        self.babble = (due < until).then_some((now + every, until, every));
+        if let (Some(node), Some(_), None) = (self.device.node(), self.device.state(), out.front()) {
+            out.send(Frame::full(CanId::emergency(node), [0xff, 0xff, 0, 0, 0, 0, 0, 0]));
+        }
     }
 
     fn hung_until(&self, now: Mono) -> Option<Mono> {
@@ -201,6 +218,7 @@ impl Station for Unruly {
             self.hung_until = until;
             return;
         }
+        self.babble(now, out);
         for (_, frame) in self.late.extract_if(.., |(due, _)| *due <= now) {
             out.send(frame);
         }
@@ -212,7 +230,8 @@ impl Station for Unruly {
     fn next_wake(&self) -> Option<Mono> {
         let late = self.late.iter().map(|(due, _)| *due);
         // A device that hangs is not woken before it is over.
-        let own = late.chain(self.device.next_wake()).min().map(|due| due.max(self.hung_until));
+        let babble = self.babble.map(|(due, ..)| due);
+        let own = late.chain(self.device.next_wake()).chain(babble).min().map(|due| due.max(self.hung_until));
         own.into_iter().chain(self.resets.front().copied()).min()
     }
 
@@ -285,6 +304,7 @@ impl Station for Rival {
                 }
                 Act::Write { node, index, sub, value, bytes } => write(node, index, sub, value, bytes),
                 Act::Nmt { specifier, node } => Frame::pair(CanId::NMT, specifier, node),
+                Act::LssWait => Frame::full(CanId::LSS_MASTER, [0x04, 0, 0, 0, 0, 0, 0, 0]),
             });
         }
     }

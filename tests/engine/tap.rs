@@ -19,6 +19,11 @@ pub(crate) struct Tap<B> {
     pub(crate) deadline: Mono,
     pub(crate) overran: bool,
     calls: u64,
+    /// The program vanishes before it sends this frame, counted from 0.
+    kill: Option<u64>,
+    /// Frames that the bus took.
+    taken: u64,
+    pub(crate) is_dead: bool,
     /// Whether the program was told to stop, that the interface is down, that the controller is off.
     pub(crate) interrupted: bool,
     pub(crate) was_down: bool,
@@ -26,13 +31,16 @@ pub(crate) struct Tap<B> {
 }
 
 impl<B: Bus> Tap<B> {
-    pub(crate) fn new(bus: B, deadline: Mono) -> Tap<B> {
+    pub(crate) fn new(bus: B, deadline: Mono, kill: Option<u64>) -> Tap<B> {
         Tap {
             bus,
             frames: Vec::new(),
             deadline,
             overran: false,
             calls: 0,
+            kill,
+            taken: 0,
+            is_dead: false,
             interrupted: false,
             was_down: false,
             was_off: false,
@@ -44,6 +52,16 @@ impl<B: Bus> Tap<B> {
             Passed::Sent(frame) => Some((*at, *frame)),
             Passed::Received(_) => None,
         })
+    }
+
+    /// Somebody else's end of the same bus, who will not vanish.
+    pub(crate) fn anew(self, deadline: Mono) -> Tap<B> {
+        Tap::new(self.bus, deadline, None)
+    }
+
+    /// Nothing gets through any more.
+    fn live(&self) -> Result<(), BusError> {
+        if self.is_dead { Err(BusError::Unsupported("the program is gone".to_owned())) } else { Ok(()) }
     }
 
     pub(crate) fn all_sent(&self) -> Vec<(Mono, Frame)> {
@@ -69,10 +87,12 @@ impl<B: Bus> Bus for Tap<B> {
     }
 
     fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
+        self.live()?;
         self.bus.set_bit_rate(bit_rate, mode)
     }
 
     fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+        self.live()?;
         self.bus.put_back_bit_rate()
     }
 
@@ -85,9 +105,14 @@ impl<B: Bus> Bus for Tap<B> {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.is_dead |= self.kill == Some(self.taken);
+        self.live()?;
         let result = self.bus.send(frame);
         match &result {
-            Ok(()) => self.frames.push((self.bus.now().mono, Passed::Sent(*frame))),
+            Ok(()) => {
+                self.taken += 1;
+                self.frames.push((self.bus.now().mono, Passed::Sent(*frame)));
+            }
             Err(BusError::Down(_)) => self.was_down = true,
             Err(_) => {}
         }
@@ -103,6 +128,7 @@ impl<B: Bus> Bus for Tap<B> {
             self.calls = self.calls.max(MOST_CALLS);
             return Err(BusError::Unsupported("the scenario is over".to_owned()));
         }
+        self.live()?;
         // Nobody waits for ever: beyond the end there is nothing to be found.
         let result = self.bus.receive(deadline.min(self.deadline + std::time::Duration::from_nanos(1)));
         match &result {

@@ -39,7 +39,7 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     let bus_is_well = spec.faults.iter().all(|fault| !matches!(fault, Fault::Down { .. } | Fault::BusOff { .. }));
     if failure.kind == Kind::Bus && bus_is_well && spec.devices.iter().all(|device| device.bit_rate.is_none()) {
         let sharing = spec.shares_node_ids() || !spec.others.is_empty();
-        let answered = run.bus.frames.iter().any(|(_, passed)| matches!(passed, crate::tap::Passed::Received(_)));
+        let answered = run.bus.frames.iter().any(|(_, passed)| matches!(passed, Passed::Received(_)));
         let retimes = matches!(spec.command, Command::Assign { rate: Some(_), .. });
         if answered
             && !sharing
@@ -72,7 +72,7 @@ fn quiet(spec: &Spec) -> bool {
 
 fn all_there(spec: &Spec) -> bool {
     let there: BTreeSet<u8> = spec.devices.iter().filter_map(|device| device.node).collect();
-    !is_lss(&spec.command) && named(spec).is_subset(&there)
+    !spec.command.is_lss() && named(spec).is_subset(&there)
 }
 
 /// TPDOs that wait for something bring no rows; a device with a long latency is silent at a short time-out.
@@ -99,5 +99,5 @@ fn may_be_odd(spec: &Spec, message: &str) -> bool {
         ]
         .iter()
         .any(|part| message.contains(part))
-        || is_lss(&spec.command) && spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
+        || spec.command.is_lss() && spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
 }

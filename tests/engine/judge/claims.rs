@@ -36,7 +36,7 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], b
                 let mut holders = run.bus.bus.inner_mut().stations_mut::<Unruly>();
                 let held = holders.any(|unruly| {
                     let value = unruly.device.value(*object, settled);
-                    value.is_some_and(|value| value == *raw || value.starts_with(raw) && !raw.is_empty())
+                    value.is_some_and(|value| value == *raw)
                 });
                 if !expedited && !held {
                     broken.push(("reads what is there", format!("node {node} {object}: {raw:02X?}")));
@@ -97,7 +97,20 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], b
                 }
             }
         }
-        (Said::Nothing, Command::SdoWrite { node, object, bytes }) if !spec.lies() => {
+        (Said::Detected(Some(rate)), _) if !spec.lies() => {
+            if !spec.devices.iter().any(|device| device.bit_rate == Some(*rate)) {
+                broken.push(("finds who is there", format!("nobody is at {rate} bit/s")));
+            }
+        }
+        (Said::Identified(answered), Command::LssIdentify { .. }) if spec.is_clean() => {
+            let replied = run.bus.frames.iter().any(|(_, passed)| {
+                matches!(passed, Passed::Received(frame) if frame.id() == CanId::LSS_SLAVE && frame.data()[0] == 0x4f)
+            });
+            if *answered != replied {
+                broken.push(("finds who is there", format!("{answered}, and {replied}")));
+            }
+        }
+        (Said::Nothing, Command::SdoWrite { node, object, bytes, .. }) if !spec.lies() => {
             // Nothing tells the acknowledge of somebody else's write to the same object from that of ours.
             let acknowledged_by_others =
                 spec.acts().any(|act| matches!(act, Act::Write { index, .. } if *index == object.index));
@@ -118,23 +131,23 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], b
 /// Whether a device keeps the serial number that it was given.
 fn has_serial(spec: &Spec, node: u8) -> bool {
     let device = spec.devices.iter().find(|device| device.node == Some(node));
-    device.is_some_and(|device| crate::run::identity(device).serial == device.serial)
+    device.is_some_and(|device| crate::bench::identity(device).serial == device.serial)
 }
 
 /// Objects in which a value stands for another one.
 fn becomes_another(spec: &Spec, node: u8, object: ObjectId) -> bool {
     let device = spec.devices.iter().find(|device| device.node == Some(node));
-    let model = device.and_then(|device| cangauge::device::catalog::by_name(device.kind));
+    let model = device.map(|device| crate::kinds::model(device.kind));
     let described = model.as_ref().and_then(|model| model.description.object(object));
     // MH-4: 0 brings back the identifier as delivered.
     described.is_none() || object.index & 0x0fff == 0x1a0 || object.index == 0x1014
 }
 
-fn number(bytes: &[u8]) -> u32 {
+pub(super) fn number(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0u32, |number, byte| number << 8 | u32::from(*byte))
 }
 
-fn mapped_otherwise(unruly: &mut Unruly, settings: &Settings, now: Mono) -> Option<String> {
+pub(super) fn mapped_otherwise(unruly: &mut Unruly, settings: &Settings, now: Mono) -> Option<String> {
     let mut value = |object: ObjectId| unruly.device.value(object, now).map(|bytes| number(&bytes));
     let mut expected = vec![
         (settings.number.communication(1), settings.cob_id.0),
@@ -187,70 +200,6 @@ pub(super) fn last_writes(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) 
                 broken
                     .push(("holds what was written", format!("node {node} {object}: {found:02X?}, not {bytes:02X?}")));
             }
-        }
-    }
-}
-
-/// What was stored is still there after power off and on; what was not changed is as it was.
-pub(super) fn after_power(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
-    let settled = run.settled;
-    let bus = run.bus.bus.inner_mut();
-    bus.stations_mut::<Unruly>().for_each(Unruly::tame);
-    bus.power_cycle();
-    let after: Vec<Holds> = bus.stations::<Unruly>().map(|unruly| holds(&unruly.device)).collect();
-    match &run.result {
-        Ok(Said::Assigned { new, stored: true, .. }) if !spec.lies() => {
-            let meant = (0..after.len()).filter(|place| is_meant(spec, *place)).any(|place| after[place].node == *new);
-            if !meant && new.is_some() {
-                broken.push(("keeps what was stored", format!("node {new:?}, and it is {after:?}")));
-            }
-        }
-        Ok(Said::Mapped(settings)) if !spec.lies() && !spec.is_meddled_with() && !spec.shares_node_ids() => {
-            // What a device is and keeps is known of one that tells its identity.
-            let tells = !spec.vagaries().any(|vagary| matches!(vagary, Vagary::Refuse { .. }));
-            if let (Command::Map { node, keep: true, .. }, true) = (&spec.command, tells) {
-                for unruly in bus.stations_mut::<Unruly>() {
-                    if spec.devices[unruly.place].node == Some(*node)
-                        && let Some(difference) = mapped_otherwise(unruly, settings, settled)
-                    {
-                        broken.push(("keeps what was stored", difference));
-                    }
-                }
-            }
-        }
-        Ok(Said::Stored) if !spec.lies() && !spec.is_meddled_with() && !spec.shares_node_ids() => {
-            heartbeat_kept(spec, bus, settled, broken);
-        }
-        Err(failure) if failure.message.contains("nothing was changed") && !spec.lies() => {
-            let own = |holds: &Holds| (holds.stored, holds.node);
-            let before = run.before.iter().map(own);
-            if is_lss(&spec.command) && !before.eq(after.iter().map(own)) {
-                broken.push(("says what was changed", format!("{failure}: {:?} became {after:?}", run.before)));
-            }
-        }
-        _ => {}
-    }
-}
-
-fn heartbeat_kept(spec: &Spec, bus: &mut cangauge::bus::memory::MemoryBus, now: Mono, broken: &mut Vec<Broken>) {
-    let heartbeat = ObjectId::new(0x1017, 0);
-    for unruly in bus.stations_mut::<Unruly>() {
-        let device = &spec.devices[unruly.place];
-        let model = cangauge::device::catalog::by_name(device.kind).expect("built in");
-        let Some(entry) = model.dictionary.get(heartbeat).filter(|entry| entry.access.is_writable()) else { continue };
-        let Some(period) = unruly.device.value(heartbeat, now).map(|bytes| number(&bytes)) else { continue };
-        let (wanted, group) = match &spec.command {
-            Command::Store { node, group: of, .. } if device.node == Some(*node) => {
-                (device.unsaved_heartbeat.map(u32::from), group(*of))
-            }
-            Command::Restore { node, group: of, .. } if device.node == Some(*node) => {
-                let default = entry.default_bytes(NodeId::new(*node).expect("a node-ID"));
-                (default.map(|bytes| number(&bytes)), group(*of))
-            }
-            _ => continue,
-        };
-        if group != Group::Application && wanted.is_some_and(|wanted| wanted != period) {
-            broken.push(("keeps what was stored", format!("1017h is {period}, not {wanted:?}")));
         }
     }
 }

@@ -2,15 +2,26 @@
 
 use super::*;
 
+/// How a command comes to its rows, and whether it keeps all that comes.
+fn recording(command: &Command) -> Option<(bool, bool)> {
+    match command {
+        Command::Log { poll_ms, count, .. } => Some((poll_ms.is_some(), count.is_none())),
+        Command::PdoWatch { .. } => Some((false, true)),
+        Command::Check { how: Measuring::Poll { .. }, .. } => Some((true, false)),
+        Command::Check { how: Measuring::AsSent { .. } | Measuring::Sync { .. }, .. } => Some((false, false)),
+        _ => None,
+    }
+}
+
 /// Every row is a value that was sent; none twice, none invented.
 pub(super) fn rows(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
-    let Command::Log { poll_ms, count, .. } = &spec.command else { return };
+    let Some((polls, keeps_all)) = recording(&spec.command) else { return };
     if spec.lies() || spec.shares_node_ids() {
         return;
     }
-    if poll_ms.is_some() {
+    if polls {
         let answers = answers(run);
-        for row in &run.rows {
+        for row in &run.heard.rows {
             let mut cells = row.split(',').skip(1);
             let node: u8 = cells.next().and_then(|node| node.parse().ok()).unwrap_or(0);
             let raw = hex(row.rsplit(',').next().unwrap_or(""));
@@ -33,7 +44,7 @@ pub(super) fn rows(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     let mut left: BTreeMap<String, usize> = BTreeMap::new();
     run.truth.iter().for_each(|row| *left.entry(key(row)).or_default() += 1);
     let mut twice = spec.faults.iter().filter(|fault| matches!(fault, Fault::Duplicate(_))).count() * 8;
-    for row in &run.rows {
+    for row in &run.heard.rows {
         match left.get_mut(&key(row)) {
             Some(count) if *count > 0 => *count -= 1,
             Some(_) if twice > 0 => twice -= 1,
@@ -51,17 +62,17 @@ pub(super) fn rows(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
         }
     }
     // Where nothing is lost nothing is missing between the first row and the last one.
-    if !spec.is_clean() || count.is_some() {
+    if !spec.is_clean() || !keeps_all {
         return;
     }
     let time = |row: &str| row.split(',').next().and_then(|time| time.parse::<u64>().ok()).unwrap_or(0);
     let node = |row: &str| row.split(',').nth(1).and_then(|node| node.parse::<u8>().ok()).unwrap_or(0);
-    if let (Some(first), Some(last)) = (run.rows.first(), run.rows.last()) {
+    if let (Some(first), Some(last)) = (run.heard.rows.first(), run.heard.rows.last()) {
         let named = named(spec);
         let between = run.truth.iter().filter(|row| (time(first)..=time(last)).contains(&time(row)));
         let sent = between.filter(|row| named.contains(&node(row))).count();
-        if sent != run.rows.len() {
-            broken.push(("loses no row", format!("{} rows of {sent}", run.rows.len())));
+        if sent != run.heard.rows.len() {
+            broken.push(("loses no row", format!("{} rows of {sent}", run.heard.rows.len())));
         }
     }
 }

@@ -1,0 +1,387 @@
+//! What the program does: each command as the command line carries it out, and what it says.
+
+use crate::bench::identity;
+use crate::command::{Command, How, Measuring, Target};
+use crate::judge::group;
+use crate::kinds::model;
+use crate::spec::Spec;
+use cangauge::bus::{Bus, Stamp};
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::nmt::NmtState;
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::pdo::TpdoNumber;
+use cangauge::device::unit::Unit;
+use cangauge::master::transfer::Moved;
+use cangauge::master::{Master, Timing};
+use cangauge::measure::expression::Expression;
+use cangauge::measure::expression::verdict::Verdict;
+use cangauge::measure::sample::{Sample, Source};
+use cangauge::measure::survey::Overrides;
+use cangauge::tasks::log::{Mode, Note, Observer, Plan, log};
+use cangauge::tasks::lss::{self, Job, LssAddress, LssRange, Rate};
+use cangauge::tasks::nmt::Seen;
+use cangauge::tasks::pdo::{self, Item, Line, Send, Settings, Wish};
+use cangauge::tasks::sdo::{Knowledge, Options, SizeMode};
+use cangauge::tasks::settings::{self, errors, filter, info, limits, minmax, unit};
+use cangauge::tasks::{Failure, autozero, check, detect, nmt, read, restore, scan, sdo, store};
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+/// What a command claims when it ends well.
+#[derive(Clone, Debug)]
+pub(crate) enum Said {
+    Nothing,
+    /// Node and serial number.
+    Found(Vec<(u8, Option<u32>)>),
+    /// Node, object and bytes as they were sent.
+    Values(Vec<(u8, ObjectId, Vec<u8>)>),
+    States(Vec<(u8, Option<NmtState>)>),
+    /// Whether all went well.
+    Probed(bool),
+    Assigned {
+        new: Option<u8>,
+        stored: bool,
+        rate: Option<Option<u32>>,
+        retimed: bool,
+    },
+    Mapped(Settings),
+    Stored,
+    /// The bit rate of the bus.
+    Detected(Option<u32>),
+    /// Whether somebody answers.
+    Identified(bool),
+    /// All that was expected is so.
+    Held,
+}
+
+/// What a command tells while it goes on.
+#[derive(Default)]
+pub(crate) struct Heard {
+    /// Rows of a recording, as the simulator's own record would write them.
+    pub(crate) rows: Vec<String>,
+    /// What became of nodes.
+    pub(crate) seen: Vec<Seen>,
+    /// What came of expectations.
+    pub(crate) verdicts: Vec<Verdict>,
+}
+
+impl Heard {
+    fn take(&mut self, samples: &[Sample], sources: &[Source]) {
+        for sample in samples {
+            let source = &sources[sample.source];
+            let value = sample.value.map(|value| value.to_string()).unwrap_or_default();
+            let status = sample.status.map_or("", |status| status.as_str());
+            let at = sample.at.mono.since_start().as_micros();
+            let Source { node, signal, unit, .. } = source;
+            self.rows.push(format!("{at},{node},{signal},{value},{unit},{status},{}", sample.raw));
+        }
+    }
+}
+
+impl Observer for Heard {
+    fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
+        self.take(samples, sources);
+        ControlFlow::Continue(())
+    }
+
+    fn note(&mut self, _: &Note, _: Stamp) {}
+
+    fn tick(&mut self, _: Stamp, _: u64) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+pub(crate) fn node(id: u8) -> NodeId {
+    NodeId::new(id).expect("a node-ID")
+}
+
+fn nodes(ids: &[u8]) -> Vec<NodeId> {
+    ids.iter().copied().map(node).collect()
+}
+
+/// What the user says of a node.
+fn described(spec: &Spec, id: u8, how: How) -> Overrides {
+    let device = spec.devices.iter().find(|device| device.node == Some(id) && how.described);
+    device.map(|device| (node(id), model(device.kind))).into_iter().collect()
+}
+
+fn options(how: How, progress: &mut dyn FnMut(Moved)) -> Options<'_> {
+    Options { blocks: how.blocks, size: SizeMode::Auto, progress }
+}
+
+fn target(spec: &Spec, target: &Target) -> lss::Target {
+    match target {
+        Target::Node(id) => lss::Target::Node(node(*id)),
+        Target::Only => lss::Target::Only,
+        Target::Unconfigured => lss::Target::Unconfigured,
+        Target::Identity(place) => lss::Target::Address(identity(&spec.devices[*place])),
+    }
+}
+
+/// Carries out the command as the command line does, and settles what is left to be sent.
+pub(crate) fn carry_out(bus: &mut dyn Bus, spec: &Spec, heard: &mut Heard) -> Result<Said, Failure> {
+    if let Command::Detect { ask, each_ms } = spec.command {
+        let found = detect::detect(bus, ask, Duration::from_millis(each_ms), &mut |_| {})?;
+        return Ok(Said::Detected(found.found.map(|(rate, _)| rate)));
+    }
+    let timing = Timing { timeout: Duration::from_millis(spec.timeout_ms), retries: spec.retries };
+    let mut master = Master::new(bus, timing);
+    let result = carry_out_with(&mut master, spec, heard);
+    master.settle();
+    result
+}
+
+fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Result<Said, Failure> {
+    let none = Overrides::new();
+    let mut quiet = |_: lss::Note| {};
+    Ok(match &spec.command {
+        Command::Scan { nodes: ids } => {
+            let wait = Duration::from_millis(200.min(spec.timeout_ms));
+            let found = scan::scan(master, &nodes(ids), wait, spec.retries + 1, &none)?;
+            let found = found.into_iter().filter(|found| found.failure.is_none());
+            Said::Found(found.map(|found| (found.node.get(), found.instrument.identity.serial)).collect())
+        }
+        Command::Read { nodes: ids } => {
+            let mut values = Vec::new();
+            for result in read::read(master, &nodes(ids), &[], &none)? {
+                for (target, sample) in result? {
+                    values.push((target.source.node.get(), target.object, hex(&sample.raw.to_string())));
+                }
+            }
+            Said::Values(values)
+        }
+        Command::Info { node: id } => {
+            let device = settings::Device::open(master, node(*id), &none)?;
+            let read = info::read(master, &device)?;
+            Said::Found(vec![(*id, read.instrument.identity.serial)])
+        }
+        Command::PdoShow { node: id } => {
+            let number = TpdoNumber::new(1);
+            let shown = pdo::show(master, node(*id), number, &none)?;
+            shown.into_iter().next().map_or(Said::Nothing, |shown| Said::Mapped(shown.settings))
+        }
+        Command::SdoRead { node: id, object, how } => {
+            let mut knowledge = Knowledge::new(node(*id), &described(spec, *id, *how));
+            let mut progress = |_| {};
+            let value = sdo::read(master, &mut knowledge, *object, None, &mut options(*how, &mut progress))?;
+            Said::Values(vec![(*id, *object, value.raw)])
+        }
+        Command::SdoWrite { node: id, object, bytes, how } => {
+            let knowledge = Knowledge::new(node(*id), &described(spec, *id, *how));
+            sdo::write(master, &knowledge, *object, bytes, &mut options(*how, &mut |_| {}))?;
+            Said::Nothing
+        }
+        Command::Nmt { what, nodes: ids, all } => {
+            let reports = nmt::command(master, *what, &nodes(ids), *all)?;
+            Said::States(reports.iter().map(|report| (report.node.get(), report.state)).collect())
+        }
+        Command::NmtState { nodes: ids } => {
+            let reports = nmt::states(master, &nodes(ids))?;
+            Said::States(reports.iter().map(|report| (report.node.get(), report.state)).collect())
+        }
+        Command::NmtWatch { nodes: ids, ask, for_ms } => {
+            let until = master.now() + Duration::from_millis(*for_ms);
+            nmt::watch(master, &nodes(ids), *ask, Some(until), &mut |seen| {
+                heard.seen.push(*seen);
+                ControlFlow::Continue(())
+            })?;
+            Said::Nothing
+        }
+        Command::NmtProbe { node: id } => {
+            let probed = nmt::probe(master, node(*id))?;
+            Said::Probed(probed.trouble.is_none())
+        }
+        Command::Startup { node: id, auto } => {
+            let set = if *auto { nmt::Starts::Auto } else { nmt::Starts::Wait };
+            nmt::startup(master, node(*id), &none, Some(set))?;
+            Said::Nothing
+        }
+        Command::LssScan => {
+            let found = lss::scan(master, &mut quiet)?;
+            let serial = |slave: &lss::Slave| slave.address.map(|address| address.serial);
+            Said::Found(found.iter().filter_map(|slave| Some((slave.node?.get(), serial(slave)))).collect())
+        }
+        Command::LssInquire { target: wanted } => {
+            let told = lss::inquire(master, &target(spec, wanted), (&none, None), &mut quiet)?;
+            let node = told.node.flatten();
+            let serial = told.address.map(|address| address.serial);
+            Said::Found(node.map(|node| (node.get(), serial)).into_iter().collect())
+        }
+        Command::LssStore { target: wanted, force } => {
+            lss::store(master, &target(spec, wanted), (&none, None), *force, &mut quiet)?;
+            Said::Nothing
+        }
+        Command::LssActivate { target: wanted, delay_ms, force } => {
+            let wanted = wanted.as_ref().map(|wanted| target(spec, wanted));
+            lss::activate(master, wanted.as_ref(), *delay_ms, (&none, None), *force, &mut quiet)?;
+            Said::Nothing
+        }
+        Command::LssIdentify { place, around } => {
+            let LssAddress { vendor, product, revision, serial } = identity(&spec.devices[*place]);
+            let serial = (serial.saturating_sub(*around), serial.saturating_add(*around));
+            let range = LssRange { vendor, product, revision: (revision, revision), serial };
+            Said::Identified(lss::identify(master, &range)?)
+        }
+        Command::Assign { target: wanted, id, rate, store, retime, via, force } => {
+            let job = Job {
+                target: target(spec, wanted),
+                id: id.or((rate.is_none()).then_some(9)).map(node),
+                rate: rate.map(Rate::Bits),
+                store: *store,
+                retime: *retime,
+                via: *via,
+                force: *force,
+                overrides: &none,
+                given: None,
+            };
+            let report = lss::assign(master, &job, &mut quiet)?;
+            Said::Assigned {
+                new: report.new.map(NodeId::get),
+                stored: report.stored,
+                rate: report.rate.map(|rate| rate.bits),
+                retimed: report.retimed,
+            }
+        }
+        Command::Map { node: id, number, items, code, timer_ms, cob_id, keep } => {
+            let wish = Wish {
+                node: node(*id),
+                number: TpdoNumber::new(*number).expect("a TPDO"),
+                items: items.iter().map(|item| Item::Name((*item).to_owned(), None)).collect(),
+                send: code.map(Send::Code),
+                event_timer_ms: *timer_ms,
+                inhibit_100us: None,
+                cob_id: *cob_id,
+            };
+            Said::Mapped(pdo::map(master, &wish, *keep, &none)?.shown.settings)
+        }
+        Command::Autozero { node: id, channel, force, store, dry_run } => {
+            let options = autozero::Options {
+                channel: *channel,
+                limit: autozero::Limit::Default,
+                samples: 4,
+                force: *force,
+                store: *store,
+                dry_run: *dry_run,
+            };
+            autozero::autozero(master, node(*id), &none, &options)?;
+            Said::Nothing
+        }
+        Command::Store { node: id, group: number, verify } => {
+            let device = store::device(master, node(*id), &none)?;
+            store::store(master, &device, group(*number), *verify)?;
+            Said::Stored
+        }
+        Command::Restore { node: id, group: number, reset } => {
+            let device = store::device(master, node(*id), &none)?;
+            restore::restore(master, &device, group(*number), *reset)?;
+            Said::Stored
+        }
+        Command::Unit { node: id, signal, unit: code } => {
+            let mut device = settings::Device::open(master, node(*id), &none)?;
+            unit::set(master, &mut device, *signal, Unit(*code))?;
+            match device.signal(*signal) {
+                Ok(signal) => {
+                    let object = ObjectId::new(0x6131, signal.channel);
+                    Said::Values(vec![(*id, object, code.to_le_bytes().to_vec())])
+                }
+                Err(_) => Said::Nothing,
+            }
+        }
+        Command::Filter { node: id, kind, constant } => {
+            let device = settings::Device::open(master, node(*id), &none)?;
+            let kinds = [
+                None,
+                Some(filter::FilterType::None),
+                Some(filter::FilterType::Moving),
+                Some(filter::FilterType::Repeating),
+            ];
+            let kind = kinds[usize::from(*kind)];
+            filter::set(master, &device, None, filter::Wanted { kind, constant: *constant, damping: None })?;
+            Said::Nothing
+        }
+        Command::Limits { node: id, lower, upper } => {
+            let device = settings::Device::open(master, node(*id), &none)?;
+            let wanted = [(limits::Limit::Lower, *lower), (limits::Limit::Upper, *upper)];
+            limits::set(master, &device, "pressure", &wanted)?;
+            Said::Nothing
+        }
+        Command::Errors { node: id, clear } => {
+            let device = settings::Device::open(master, node(*id), &none)?;
+            match clear {
+                true => drop(errors::clear(master, &device)?),
+                false => drop(errors::read(master, &device)?),
+            }
+            Said::Nothing
+        }
+        Command::Minmax { node: id } => {
+            let device = settings::Device::open(master, node(*id), &none)?;
+            minmax::reset(master, &device)?;
+            Said::Nothing
+        }
+        Command::PdoWatch { nodes: ids, for_ms } => {
+            let duration = Some(Duration::from_millis(*for_ms));
+            pdo::watch(master, &nodes(ids), &none, duration, &mut |line| {
+                if let Line::Pdo { samples, sources, .. } = line {
+                    heard.take(samples, sources);
+                }
+                ControlFlow::Continue(())
+            })?;
+            Said::Nothing
+        }
+        Command::Check { nodes: ids, expected, how, excuse } => {
+            let for_ms = |length: u64| Some(Duration::from_millis(length));
+            let measuring = match *how {
+                Measuring::Once => None,
+                Measuring::AsSent { for_ms: length } => Some((Mode::AsSent, for_ms(length))),
+                Measuring::Sync { ms, for_ms: length } => {
+                    Some((Mode::Sync(Duration::from_millis(ms)), for_ms(length)))
+                }
+                Measuring::Poll { ms, for_ms: length } => {
+                    Some((Mode::Poll(Duration::from_millis(ms)), for_ms(length)))
+                }
+            };
+            let parsed = expected.iter().map(|one| Expression::parse(&one.to_string()).expect("an expression"));
+            let plan = check::Plan {
+                nodes: nodes(ids),
+                excuse: *excuse,
+                expressions: parsed.collect(),
+                measuring,
+                overrides: none.clone(),
+            };
+            let report = check::check(master, &plan, heard)?;
+            let met = check::all_met(&report.verdicts, &report.failures);
+            heard.verdicts = report.verdicts;
+            met?;
+            Said::Held
+        }
+        Command::Detect { .. } => Said::Nothing,
+        Command::Log { nodes: ids, sync_ms, poll_ms, duration_ms, count, nmt } => {
+            let mode = match (sync_ms, poll_ms) {
+                (Some(period), _) => Mode::Sync(Duration::from_millis(*period)),
+                (None, Some(period)) => Mode::Poll(Duration::from_millis(*period)),
+                (None, None) => Mode::AsSent,
+            };
+            let plan = Plan {
+                nodes: nodes(ids),
+                wanted: Vec::new(),
+                mode,
+                duration: Some(Duration::from_millis(*duration_ms)),
+                count: *count,
+                nmt: *nmt,
+                max_gap: None,
+                overrides: none.clone(),
+            };
+            let outcome = log(master, &plan, heard)?;
+            match outcome.nothing {
+                Some(nothing) => return Err(nothing),
+                None => Said::Nothing,
+            }
+        }
+    })
+}
+
+/// `0x0102` as bytes.
+pub(crate) fn hex(text: &str) -> Vec<u8> {
+    let digits = text.trim_start_matches("0x");
+    (0..digits.len() / 2).filter_map(|at| u8::from_str_radix(digits.get(2 * at..2 * at + 2)?, 16).ok()).collect()
+}

@@ -1,0 +1,93 @@
+//! A verdict is what the values say.
+
+use super::*;
+use cangauge::measure::expression::verdict::{Ruling, Verdict};
+
+/// Every ruling follows from the rows, or from what the devices answered; and the end from the rulings.
+pub(super) fn checks(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
+    let Command::Check { nodes, expected, how, excuse } = &spec.command else { return };
+    let verdicts = run.heard.verdicts.clone();
+    let count = |ruling: Ruling| verdicts.iter().filter(|verdict| verdict.ruling == ruling).count();
+    let complete = *excuse && !verdicts.is_empty() || verdicts.len() == nodes.len() * expected.len();
+    let right = match &run.result {
+        Ok(_) => complete && count(Ruling::Ok) == verdicts.len(),
+        Err(failure) if failure.kind == Kind::CheckFailed => count(Ruling::Fail) > 0,
+        Err(_) => count(Ruling::Fail) == 0,
+    };
+    if !right {
+        broken.push(("ends as the verdicts say", format!("{:?} after {verdicts:?}", run.result)));
+    }
+    for verdict in &verdicts {
+        let Some(limits) = expected.iter().find(|one| one.to_string() == verdict.text) else {
+            broken.push(("judges what was expected", verdict.text.clone()));
+            continue;
+        };
+        let Some(node) = verdict.node else { continue };
+        let holds = |value: f64| limits.low <= value && value <= limits.high;
+        if *how == Measuring::Once {
+            once(spec, run, (node, verdict), holds, broken);
+            continue;
+        }
+        let of_node = run.heard.rows.iter().map(|row| row.split(',').collect::<Vec<_>>());
+        let of_node = of_node.filter(|cells| cells[1] == node.to_string() && cells[2] == limits.signal);
+        let values: Vec<Option<f64>> = of_node.map(|cells| cells[3].parse().ok()).collect();
+        let ruling = match values.as_slice() {
+            [] => Ruling::NoData,
+            values if values.iter().all(|value| value.is_some_and(holds)) => Ruling::Ok,
+            _ => Ruling::Fail,
+        };
+        if verdict.ruling != ruling || verdict.count != values.len() as u64 {
+            broken.push(("judges by every value", format!("{verdict:?} of {values:?}")));
+        }
+    }
+}
+
+/// The value of one reading is one that was answered, and the ruling follows from it.
+fn once(
+    spec: &Spec,
+    run: &mut Run,
+    (node, verdict): (NodeId, &Verdict),
+    holds: impl Fn(f64) -> bool,
+    broken: &mut Vec<Broken>,
+) {
+    let shown = verdict.values.first().and_then(|shown| shown.value);
+    let right = match (verdict.ruling, shown) {
+        (Ruling::Ok, Some(value)) => holds(value),
+        (Ruling::Fail, Some(value)) => !holds(value),
+        // What has no value satisfies nothing.
+        (Ruling::Fail, None) => true,
+        (Ruling::Ok | Ruling::NoData, _) => verdict.ruling == Ruling::NoData && shown.is_none(),
+    };
+    if !right {
+        broken.push(("judges by every value", format!("{verdict:?}")));
+    }
+    let digits_are_known = !spec.vagaries().any(|vagary| matches!(vagary, Vagary::Refuse { .. }));
+    let (Some(value), true) = (shown, !spec.lies() && digits_are_known) else { return };
+    let all = answered_values(spec, run, node);
+    if !all.iter().any(|answered| (answered - value).abs() <= 1e-9 * value.abs()) {
+        broken.push(("judges what was answered", format!("{value} of node {node}, and it answered {all:?}")));
+    }
+}
+
+/// The process values that a node answered, in its own unit.
+fn answered_values(spec: &Spec, run: &mut Run, node: NodeId) -> Vec<f64> {
+    let answers = rows::answers(run);
+    let settled = run.settled;
+    let mut values = Vec::new();
+    for unruly in run.bus.bus.inner_mut().stations_mut::<Unruly>() {
+        if spec.devices[unruly.place].node != Some(node.get()) {
+            continue;
+        }
+        for ((_, object), raws) in answers.iter().filter(|((from, _), _)| *from == node.get()) {
+            let digits = unruly.device.value(ObjectId::new(0x6132, object.sub), settled);
+            let scale = 10f64.powi(digits.and_then(|bytes| bytes.first().copied()).unwrap_or(0).into());
+            values.extend(raws.iter().filter_map(|raw| match (object.index, raw.as_slice()) {
+                (0x6130, &[a, b, c, d]) => Some(f32::from_le_bytes([a, b, c, d]).to_string().parse().ok()?),
+                (0x7130, &[a, b]) => Some(f64::from(i16::from_le_bytes([a, b])) / scale),
+                (0x9130, &[a, b, c, d]) => Some(f64::from(i32::from_le_bytes([a, b, c, d])) / scale),
+                _ => None,
+            }));
+        }
+    }
+    values
+}

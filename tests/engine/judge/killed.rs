@@ -1,0 +1,33 @@
+//! What holds even where the program vanished in the middle and could put nothing back.
+
+use super::*;
+use crate::run::run;
+
+/// A device holds the old node-ID and bit rate or the new ones, and the same command brings everything to its end.
+pub(super) fn killed(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
+    let Some(killed) = &run.killed else { return };
+    if let Command::Assign { id, rate, .. } = &spec.command
+        && !spec.lies()
+    {
+        let wanted = id.or(rate.is_none().then_some(9));
+        for (place, (before, after)) in killed.before.iter().zip(&killed.after).enumerate() {
+            let (old, new) = (before.stored, after.stored);
+            let node = new.0 == old.0 || new.0 == wanted;
+            let bit_rate = new.1 == old.1 || rate.is_some() && new.1 == *rate;
+            if !node || !bit_rate {
+                broken.push(("old or new after a kill", format!("device {place}: {old:?} became {new:?}")));
+            }
+        }
+    }
+    // Who was given another node-ID or bit rate is no longer where the same command looks for him.
+    let moves = matches!(spec.command, Command::Assign { .. } | Command::LssActivate { .. } | Command::Detect { .. });
+    let whole = Spec { kill: None, ..spec.clone() };
+    if moves || !whole.is_clean() {
+        return;
+    }
+    if let Err(failure) = &run.result
+        && self::run(&whole).result.is_ok()
+    {
+        broken.push(("comes to its end after a kill", format!("{:?}: {failure}", failure.kind)));
+    }
+}

@@ -1,0 +1,97 @@
+//! What a failure names as its cause has been seen: silence, a refusal, that nothing was changed.
+
+use super::*;
+use cangauge::canopen::frame::Frame;
+use cangauge::tasks::Failure;
+use std::time::Duration;
+
+/// Judges the cause that a failure names by the frames of the command.
+pub(super) fn told_causes(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
+    let Err(failure) = &run.result else { return };
+    match failure.kind {
+        Kind::NoAnswer if !spec.lies() && !spec.shares_node_ids() => was_silent(spec, run, failure, broken),
+        Kind::Refused => was_refused(run, failure, broken),
+        _ => {}
+    }
+    let stopped = failure.kind == Kind::CheckFailed && !matches!(spec.command, Command::Check { .. });
+    if stopped || failure.kind == Kind::Usage || failure.message.contains("nothing was changed") {
+        let changes = run.bus.all_sent().into_iter().find(|(_, frame)| changes(frame));
+        if let Some((at, frame)) = changes {
+            broken.push(("says what was changed", format!("{failure}, and {frame} at {:?}", at.since_start())));
+        }
+    }
+}
+
+/// Whether a frame of the program changes a device for longer than a command.
+fn changes(frame: &Frame) -> bool {
+    match (frame.id().sdo_request_node(), frame.data().first()) {
+        (Some(_), Some(first)) => begins(frame).is_some() && matches!(first >> 5, 1 | 6),
+        (None, Some(first)) => frame.id() == CanId::LSS_MASTER && matches!(first, 0x11 | 0x13 | 0x15 | 0x17),
+        (_, None) => false,
+    }
+}
+
+/// The object of a request that begins a transfer.
+fn begins(frame: &Frame) -> Option<ObjectId> {
+    let data = frame.all_eight()?;
+    let begins = match data[0] >> 5 {
+        1 | 2 => true,
+        5 => data[0] & 0x03 == 0,
+        6 => data[0] & 0x01 == 0,
+        _ => false,
+    };
+    begins.then(|| ObjectId::from_multiplexer([data[1], data[2], data[3]]))
+}
+
+/// Nothing came to the last question, if that is what is said.
+fn was_silent(spec: &Spec, run: &Run, failure: &Failure, broken: &mut Vec<Broken>) {
+    let (Some(node), Some(object)) = (failure.node, failure.object) else { return };
+    if failure.message.contains("in the middle") {
+        return;
+    }
+    let asked = run.bus.all_sent().into_iter().rev().find(|(_, frame)| {
+        frame.id() == CanId::sdo_request(node) && begins(frame) == Some(object)
+    });
+    let Some((asked, _)) = asked else {
+        let waits = run.bus.was_down || run.bus.was_off || spec.faults.iter().any(is_full);
+        if !waits {
+            broken.push(("names the cause", format!("never asked: {failure}")));
+        }
+        return;
+    };
+    let until = asked + Duration::from_millis(spec.timeout_ms);
+    let answers = |at: Mono, frame: &Frame| {
+        let addressed = frame.all_eight().map(|data| ObjectId::from_multiplexer([data[1], data[2], data[3]]));
+        let is_answer = frame.data().first().is_some_and(|first| matches!(first >> 5, 2..=6));
+        frame.id() == CanId::sdo_response(node) && addressed == Some(object) && is_answer && at > asked && at < until
+    };
+    for (at, passed) in &run.bus.frames {
+        if let Passed::Received(frame) = passed
+            && answers(*at, frame)
+        {
+            broken.push(("names the cause", format!("{frame} came at {:?}: {failure}", at.since_start())));
+            return;
+        }
+    }
+}
+
+fn is_full(fault: &Fault) -> bool {
+    matches!(fault, Fault::QueueFull(_) | Fault::Full { .. })
+}
+
+/// Somebody said no, if that is what is said.
+fn was_refused(run: &Run, failure: &Failure, broken: &mut Vec<Broken>) {
+    let refuses = |frame: &Frame| match (failure.abort, failure.node, frame.all_eight()) {
+        (Some(code), Some(node), Some(data)) => {
+            frame.id().sdo_response_node().or(frame.id().sdo_request_node()) == Some(node)
+                && data[0] == 0x80
+                && data[4..] == code.0.to_le_bytes()
+        }
+        (None, _, Some(data)) => frame.id() == CanId::Standard(0x7e4) && data[1] != 0,
+        _ => false,
+    };
+    let came = run.bus.frames.iter().any(|(_, passed)| matches!(passed, Passed::Received(frame) if refuses(frame)));
+    if !came {
+        broken.push(("names the cause", format!("nobody refused: {failure} {:?}", failure.abort)));
+    }
+}
