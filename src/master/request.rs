@@ -13,7 +13,10 @@ use std::time::Duration;
 
 /// Names a transfer from its start to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Ticket(pub(super) u64);
+pub struct Ticket {
+    pub(super) number: u64,
+    pub(super) node: NodeId,
+}
 
 /// What is to be transferred.
 #[derive(Clone, Debug)]

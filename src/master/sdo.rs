@@ -63,6 +63,10 @@ pub(super) struct SdoClient {
     nodes: BTreeMap<NodeId, Node>,
     finished: VecDeque<(Ticket, Result<Answer, SdoError>)>,
     next_ticket: u64,
+    /// Not after the first deadline of those under way: a frame must not cost a look at every node.
+    due: Option<Mono>,
+    /// Whether a node has a transfer that waits and none under way.
+    can_start: bool,
 }
 
 impl Active {
@@ -183,9 +187,11 @@ impl Active {
 
 impl SdoClient {
     pub(super) fn submit(&mut self, request: Request) -> Ticket {
-        let ticket = Ticket(self.next_ticket);
+        let ticket = Ticket { number: self.next_ticket, node: request.node };
         self.next_ticket += 1;
-        self.nodes.entry(request.node).or_default().waiting.push_back((ticket, request));
+        let node = self.nodes.entry(request.node).or_default();
+        node.waiting.push_back((ticket, request));
+        self.can_start |= node.active.is_none();
         ticket
     }
 
@@ -199,7 +205,7 @@ impl SdoClient {
 
     /// Whether [`SdoClient::advance`] would start something.
     pub(super) fn can_start(&self) -> bool {
-        self.nodes.values().any(|node| node.active.is_none() && !node.waiting.is_empty())
+        self.can_start
     }
 
     pub(super) fn has_finished(&self) -> bool {
@@ -212,6 +218,9 @@ impl SdoClient {
 
     /// Starts what can start: the next transfer of every node that has none under way.
     pub(super) fn advance(&mut self, timing: &Timing, now: Mono, outgoing: &mut Outgoing) {
+        if !std::mem::take(&mut self.can_start) {
+            return;
+        }
         for node in self.nodes.values_mut() {
             if node.active.is_some() {
                 continue;
@@ -235,32 +244,50 @@ impl SdoClient {
 
     /// A frame of a transfer is on its way: once the last of those given out is, its answer is waited for.
     pub(super) fn on_sent(&mut self, ticket: Ticket, now: Mono, timing: &Timing) {
-        let active = self.nodes.values_mut().filter_map(|node| node.active.as_mut());
-        if let Some(active) = active.into_iter().find(|active| active.ticket == ticket) {
+        let active = self.nodes.get_mut(&ticket.node).and_then(|node| node.active.as_mut());
+        if let Some(active) = active.filter(|active| active.ticket == ticket) {
             active.machine.on_sent();
             active.asked_at.get_or_insert(now);
             active.unsent = active.unsent.saturating_sub(1);
             if active.unsent == 0 {
                 active.deadline = Some(now + active.waited(timing));
+                self.due = earlier(self.due, active.deadline);
             }
         }
     }
 
     /// Bytes transferred so far and bytes in all, where known; `None` of a transfer that is not under way.
     pub(super) fn moved(&self, ticket: Ticket) -> Option<(usize, Option<usize>)> {
-        let mut active = self.nodes.values().filter_map(|node| node.active.as_ref());
-        let active = active.find(|active| active.ticket == ticket && active.behind.is_none())?;
+        let active = self.nodes.get(&ticket.node)?.active.as_ref();
+        let active = active.filter(|active| active.ticket == ticket && active.behind.is_none())?;
         Some(active.machine.moved())
     }
 
+    /// When a transfer's time may be over, and not later than it is.
     pub(super) fn next_deadline(&self) -> Option<Mono> {
-        self.nodes.values().filter_map(|node| node.active.as_ref()?.deadline).min()
+        self.due
     }
 
     /// Takes a frame; `false` if it is no SDO frame of a node that we deal with.
     pub(super) fn on_frame(&mut self, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let id = received.frame.id();
         let Some(number) = id.sdo_response_node().or_else(|| id.sdo_request_node()) else { return false };
+        let is_ours = self.on_frame_of(number, received, timing, outgoing);
+        if let Some(node) = self.nodes.get(&number) {
+            self.due = earlier(self.due, node.active.as_ref().and_then(|active| active.deadline));
+            self.can_start |= node.active.is_none() && !node.waiting.is_empty();
+        }
+        is_ours
+    }
+
+    fn on_frame_of(
+        &mut self,
+        number: NodeId,
+        received: &Received,
+        timing: &Timing,
+        outgoing: &mut Outgoing,
+    ) -> bool {
+        let id = received.frame.id();
         let Some(node) = self.nodes.get_mut(&number) else { return false };
         let Some(active) = &mut node.active else {
             node.settle(&received.frame);
@@ -349,6 +376,15 @@ impl SdoClient {
 
     /// Looks for transfers whose time is over.
     pub(super) fn on_time(&mut self, now: Mono, timing: &Timing, outgoing: &mut Outgoing) {
+        if self.due.is_none_or(|due| now < due) {
+            return;
+        }
+        self.end_what_is_over(now, timing, outgoing);
+        self.due = self.nodes.values().filter_map(|node| node.active.as_ref()?.deadline).min();
+        self.can_start = self.nodes.values().any(|node| node.active.is_none() && !node.waiting.is_empty());
+    }
+
+    fn end_what_is_over(&mut self, now: Mono, timing: &Timing, outgoing: &mut Outgoing) {
         for node in self.nodes.values_mut() {
             let Some(active) = node.active.as_mut().filter(|active| active.deadline.is_some_and(|at| at <= now)) else {
                 continue;
@@ -399,12 +435,12 @@ impl SdoClient {
 
     /// Drops one transfer without telling its server.
     pub(super) fn forget(&mut self, ticket: Ticket) {
-        for node in self.nodes.values_mut() {
-            node.waiting.retain(|(waiting, _)| *waiting != ticket);
-            if node.active.as_ref().is_some_and(|active| active.ticket == ticket) {
-                node.active = None;
-            }
+        let Some(node) = self.nodes.get_mut(&ticket.node) else { return };
+        node.waiting.retain(|(waiting, _)| *waiting != ticket);
+        if node.active.as_ref().is_some_and(|active| active.ticket == ticket) {
+            node.active = None;
         }
+        self.can_start |= node.active.is_none() && !node.waiting.is_empty();
     }
 
     /// Ends everything; what is to be told to servers goes to `out`.
@@ -416,7 +452,12 @@ impl SdoClient {
             node.waiting.clear();
         }
         self.finished.clear();
+        (self.due, self.can_start) = (None, false);
     }
+}
+
+fn earlier(one: Option<Mono>, other: Option<Mono>) -> Option<Mono> {
+    one.into_iter().chain(other).min()
 }
 
 impl Node {

@@ -36,7 +36,9 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
             broken.push(("names the cause", format!("the interface was down: {}", told())));
         }
     }
-    let bus_is_well = spec.faults.iter().all(|fault| !matches!(fault, Fault::Down { .. } | Fault::BusOff { .. }));
+    let bus_is_well = spec.faults.iter().all(|fault| {
+        !matches!(fault, Fault::Down { .. } | Fault::BusOff { .. } | Fault::Full { .. })
+    });
     if failure.kind == Kind::Bus && bus_is_well && spec.devices.iter().all(|device| device.bit_rate.is_none()) {
         let sharing = spec.shares_node_ids() || !spec.others.is_empty();
         let answered = run.bus.frames.iter().any(|(_, passed)| matches!(passed, Passed::Received(_)));
@@ -77,7 +79,7 @@ fn all_there(spec: &Spec) -> bool {
 
 /// TPDOs that wait for something bring no rows; a device with a long latency is silent at a short time-out.
 fn may_be_silent(spec: &Spec) -> bool {
-    matches!(spec.command, Command::Log { .. })
+    matches!(spec.command, Command::Log { .. } | Command::Check { .. } | Command::PdoWatch { .. })
         // Its table of bit rates has not that of this bus, and what it stores is that it works at another one.
         || matches!(spec.command, Command::Store { .. }) && spec.devices.iter().any(|device| device.kind == "baumer")
         || spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
@@ -99,5 +101,7 @@ fn may_be_odd(spec: &Spec, message: &str) -> bool {
         ]
         .iter()
         .any(|part| message.contains(part))
+        // Several that take one node-ID.
+        || matches!(spec.command, Command::Assign { force: true, .. }) && spec.devices.len() > 1
         || spec.command.is_lss() && spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
 }

@@ -1,6 +1,7 @@
 //! A verdict is what the values say.
 
 use super::*;
+use cangauge::canopen::value::DataType;
 use cangauge::measure::expression::verdict::{Ruling, Verdict};
 
 /// Every ruling follows from the rows, or from what the devices answered; and the end from the rulings.
@@ -8,7 +9,9 @@ pub(super) fn checks(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
     let Command::Check { nodes, expected, how, excuse } = &spec.command else { return };
     let verdicts = run.heard.verdicts.clone();
     let count = |ruling: Ruling| verdicts.iter().filter(|verdict| verdict.ruling == ruling).count();
-    let complete = *excuse && !verdicts.is_empty() || verdicts.len() == nodes.len() * expected.len();
+    // Who says the same twice gets one verdict.
+    let asked: BTreeSet<String> = expected.iter().map(ToString::to_string).collect();
+    let complete = *excuse && !verdicts.is_empty() || verdicts.len() == nodes.len() * asked.len();
     let right = match &run.result {
         Ok(_) => complete && count(Ruling::Ok) == verdicts.len(),
         Err(failure) if failure.kind == Kind::CheckFailed => count(Ruling::Fail) > 0,
@@ -78,13 +81,15 @@ fn answered_values(spec: &Spec, run: &mut Run, node: NodeId) -> Vec<f64> {
         if spec.devices[unruly.place].node != Some(node.get()) {
             continue;
         }
+        let model = crate::kinds::model(spec.devices[unruly.place].kind);
         for ((_, object), raws) in answers.iter().filter(|((from, _), _)| *from == node.get()) {
             let digits = unruly.device.value(ObjectId::new(0x6132, object.sub), settled);
             let scale = 10f64.powi(digits.and_then(|bytes| bytes.first().copied()).unwrap_or(0).into());
-            values.extend(raws.iter().filter_map(|raw| match (object.index, raw.as_slice()) {
-                (0x6130, &[a, b, c, d]) => Some(f32::from_le_bytes([a, b, c, d]).to_string().parse().ok()?),
-                (0x7130, &[a, b]) => Some(f64::from(i16::from_le_bytes([a, b])) / scale),
-                (0x9130, &[a, b, c, d]) => Some(f64::from(i32::from_le_bytes([a, b, c, d])) / scale),
+            let is_real = model.dictionary.get(*object).is_some_and(|entry| entry.data_type == DataType::Real32);
+            values.extend(raws.iter().filter_map(|raw| match *raw.as_slice() {
+                [a, b, c, d] if is_real => f32::from_le_bytes([a, b, c, d]).to_string().parse().ok(),
+                [a, b] => Some(f64::from(i16::from_le_bytes([a, b])) / scale),
+                [a, b, c, d] => Some(f64::from(i32::from_le_bytes([a, b, c, d])) / scale),
                 _ => None,
             }));
         }

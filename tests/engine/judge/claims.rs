@@ -140,7 +140,9 @@ fn becomes_another(spec: &Spec, node: u8, object: ObjectId) -> bool {
     let model = device.map(|device| crate::kinds::model(device.kind));
     let described = model.as_ref().and_then(|model| model.description.object(object));
     // MH-4: 0 brings back the identifier as delivered.
-    described.is_none() || object.index & 0x0fff == 0x1a0 || object.index == 0x1014
+    // Short texts are filled up.
+    let is_text = model.as_ref().is_some_and(|model| model.dictionary.get(object).is_some_and(|entry| entry.data_type.width().is_none()));
+    is_text && device.is_some_and(|device| device.kind != crate::kinds::ATTIC) || described.is_none() || object.index & 0x0fff == 0x1a0 || object.index == 0x1014
 }
 
 pub(super) fn number(bytes: &[u8]) -> u32 {

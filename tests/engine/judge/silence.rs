@@ -10,23 +10,41 @@ pub(super) fn told_causes(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     let Err(failure) = &run.result else { return };
     match failure.kind {
         Kind::NoAnswer if !spec.lies() && !spec.shares_node_ids() => was_silent(spec, run, failure, broken),
-        Kind::Refused => was_refused(run, failure, broken),
+        // What cannot be done at all is not even asked for.
+        Kind::Refused if failure.message.contains("refused by the device") => was_refused(run, failure, broken),
         _ => {}
     }
     let stopped = failure.kind == Kind::CheckFailed && !matches!(spec.command, Command::Check { .. });
     if stopped || failure.kind == Kind::Usage || failure.message.contains("nothing was changed") {
-        let changes = run.bus.all_sent().into_iter().find(|(_, frame)| changes(frame));
+        let changes = (0..run.bus.frames.len()).find_map(|place| taken(&run.bus.frames[place..]));
         if let Some((at, frame)) = changes {
             broken.push(("says what was changed", format!("{failure}, and {frame} at {:?}", at.since_start())));
         }
     }
 }
 
+/// The first of these frames, if it changed a device, or may have.
+fn taken(frames: &[(Mono, Passed)]) -> Option<(Mono, Frame)> {
+    let (&(at, Passed::Sent(request)), rest) = frames.split_first()? else { return None };
+    let refuses = |answer: &Frame| match (request.id().sdo_request_node(), request.all_eight(), answer.all_eight()) {
+        (Some(node), Some(request), Some(answered)) => {
+            answer.id() == CanId::sdo_response(node) && answered[0] == 0x80 && answered[1..4] == request[1..4]
+        }
+        (None, Some(request), Some(answered)) => {
+            answer.id() == CanId::LSS_SLAVE && answered[0] == request[0] && answered[1] != 0
+        }
+        _ => false,
+    };
+    let refused = rest.iter().any(|(_, passed)| matches!(passed, Passed::Received(answer) if refuses(answer)));
+    (changes(&request) && !refused).then_some((at, request))
+}
+
 /// Whether a frame of the program changes a device for longer than a command.
 fn changes(frame: &Frame) -> bool {
     match (frame.id().sdo_request_node(), frame.data().first()) {
         (Some(_), Some(first)) => begins(frame).is_some() && matches!(first >> 5, 1 | 6),
-        (None, Some(first)) => frame.id() == CanId::LSS_MASTER && matches!(first, 0x11 | 0x13 | 0x15 | 0x17),
+        // What was configured and is configured as before is nothing; power shows the rest.
+        (None, Some(first)) => frame.id() == CanId::LSS_MASTER && matches!(first, 0x15 | 0x17),
         (_, None) => false,
     }
 }
