@@ -167,7 +167,9 @@ impl Spec {
     }
 
     pub(crate) fn loses_sent(&self) -> bool {
-        self.faults.iter().any(|fault| matches!(fault, Fault::LoseSent(_) | Fault::Down { .. } | Fault::BusOff { .. }))
+        self.faults.iter().any(|fault| {
+            matches!(fault, Fault::LoseSent(_) | Fault::Full { .. } | Fault::Down { .. } | Fault::BusOff { .. })
+        })
     }
 
     /// Nothing goes wrong at all.

@@ -3,6 +3,7 @@
 use super::cob_ids::{CobIds, cob_ids};
 use super::confirm::{Confirmed, confirm};
 use super::objects::by_objects;
+use super::only::agreed;
 use super::presence::taken;
 use super::progress::{Done, Stage};
 use super::retime::{Host, Retiming};
@@ -41,20 +42,6 @@ pub struct Job<'a> {
     pub overrides: &'a Overrides,
     /// The description that the user named for whichever device is meant.
     pub given: Option<Arc<Model>>,
-}
-
-impl Job<'_> {
-    /// Several slaves that all say yes are what `force` was asked for.
-    fn forced(&self, result: Result<(), LssError>) -> Result<(), LssError> {
-        match result {
-            Err(LssError::Several { frames, .. })
-                if self.force && frames.iter().all(|frame| frame.data().get(1) == Some(&0)) =>
-            {
-                Ok(())
-            }
-            result => result,
-        }
-    }
 }
 
 /// What became of it.
@@ -223,17 +210,17 @@ fn old_index(master: &Master<'_>, subject: &Subject) -> Option<u8> {
 
 fn configure(lss: &mut Lss<'_, '_>, job: &Job<'_>, rate: Option<PlannedRate>, done: &mut Done) -> Result<(), LssError> {
     if let Some((id, stage)) = &mut done.id {
-        let result = job.forced(lss.configure_node_id(Some(*id)));
+        let result = agreed(lss.configure_node_id(Some(*id)), job.force);
         *stage = stage_of(&result);
         result?;
     }
     if let (Some(rate), Some((_, stage))) = (rate, &mut done.rate) {
-        let result = job.forced(lss.configure_bit_timing(0, rate.index));
+        let result = agreed(lss.configure_bit_timing(0, rate.index), job.force);
         *stage = stage_of(&result);
         result?;
     }
     if job.store {
-        let result = job.forced(lss.store());
+        let result = agreed(lss.store(), job.force);
         done.stored = stage_of(&result);
         result?;
     }

@@ -128,6 +128,16 @@ fn inquire(lss: &mut Lss<'_, '_>, known: Option<LssAddress>) -> Result<Told, Lss
     Ok(told)
 }
 
+/// Several slaves that all say yes are what `force` was asked for.
+pub(super) fn agreed(result: Result<(), LssError>, force: bool) -> Result<(), LssError> {
+    match result {
+        Err(LssError::Several { frames, .. }) if force && frames.iter().all(|frame| frame.data().get(1) == Some(&0)) => {
+            Ok(())
+        }
+        result => result,
+    }
+}
+
 /// A question that not every slave knows.
 pub(super) fn known_service<T>(told: Result<Gathered<T>, LssError>) -> Result<Option<Gathered<T>>, LssError> {
     match told {

@@ -1,5 +1,6 @@
 //! The services one by one: inquire, activate, store.
 
+use super::only::agreed;
 use super::session::{prepared, put_back};
 use super::subject::{Knowledge, Subject, subject};
 use super::ways::way;
@@ -81,7 +82,7 @@ pub fn store(
     force: bool,
     tell: Tell<'_>,
 ) -> Result<(), Failure> {
-    service(master, target, named, force, tell, |lss| lss.store())
+    service(master, target, named, force, tell, |lss| agreed(lss.store(), force))
 }
 
 /// Brings the configured bit rate into force, after `delay` and as long again of silence. `None` is everybody: each

@@ -101,7 +101,7 @@ fn may_be_odd(spec: &Spec, message: &str) -> bool {
         ]
         .iter()
         .any(|part| message.contains(part))
-        // Several that take one node-ID.
-        || matches!(spec.command, Command::Assign { force: true, .. }) && spec.devices.len() > 1
+        // Several that take one node-ID, because they may or because they could not be seen.
+        || matches!(spec.command, Command::Assign { target: Target::Only, .. }) && spec.devices.len() > 1
         || spec.command.is_lss() && spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
 }

@@ -97,7 +97,7 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], b
                 }
             }
         }
-        (Said::Detected(Some(rate)), _) if !spec.lies() => {
+        (Said::Detected(Some(rate)), _) if !spec.lies() && spec.others.is_empty() => {
             if !spec.devices.iter().any(|device| device.bit_rate == Some(*rate)) {
                 broken.push(("finds who is there", format!("nobody is at {rate} bit/s")));
             }

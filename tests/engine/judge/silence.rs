@@ -99,13 +99,14 @@ fn is_full(fault: &Fault) -> bool {
 
 /// Somebody said no, if that is what is said.
 fn was_refused(run: &Run, failure: &Failure, broken: &mut Vec<Broken>) {
-    let refuses = |frame: &Frame| match (failure.abort, failure.node, frame.all_eight()) {
-        (Some(code), Some(node), Some(data)) => {
+    let refuses = |frame: &Frame| match (failure.abort, failure.node, frame.data()) {
+        (Some(code), Some(node), [0x80, rest @ ..]) => {
+            // What a frame that was cut short does not say counts as zero.
+            let said = rest.get(3..).unwrap_or_default();
             frame.id().sdo_response_node().or(frame.id().sdo_request_node()) == Some(node)
-                && data[0] == 0x80
-                && data[4..] == code.0.to_le_bytes()
+                && (said == code.0.to_le_bytes() || said.len() < 4 && code.0 == 0)
         }
-        (None, _, Some(data)) => frame.id() == CanId::Standard(0x7e4) && data[1] != 0,
+        (None, _, [_, code, ..]) => frame.id() == CanId::LSS_SLAVE && *code != 0,
         _ => false,
     };
     let came = run.bus.frames.iter().any(|(_, passed)| matches!(passed, Passed::Received(frame) if refuses(frame)));

@@ -2,9 +2,11 @@
 
 use super::{Wanted, all_held, bus, id, run};
 use cangauge::device::assign::spoken_rate;
+use cangauge::master::{Master, Timing};
+use cangauge::measure::survey::Overrides;
 use cangauge::sim::Device;
 use cangauge::tasks::Kind;
-use cangauge::tasks::lss::{Confirmed, Via};
+use cangauge::tasks::lss::{Confirmed, Target, Via, store};
 
 const ALL: &str = "device = [
     { kind = 'mh4', node = 1 }, { kind = 'd20', node = 2 }, { kind = 'mc1609', node = 3 }, { kind = 'dps', node = 127 },
@@ -168,6 +170,16 @@ fn forced_on_several_it_is_no_success() {
         all_held(&bus).iter().map(|held| (held.0, held.2)).collect::<Vec<_>>(),
         [(Some(5), Some(12)), (Some(6), Some(12))]
     );
+}
+
+#[test]
+fn a_store_that_is_forced_takes_the_yes_of_several() {
+    let mut bus = bus("device = [{ kind = 'mh4', node = 5 }, { kind = 'mh4', node = 6, latency = '1ms' }]");
+    let overrides = Overrides::new();
+    let mut master = Master::new(&mut bus, Timing::default());
+    let mut stored = |force| store(&mut master, &Target::Only, (&overrides, None), force, &mut |_| {});
+    assert_eq!(stored(false).expect_err("two are there").kind, Kind::CheckFailed);
+    assert_eq!(stored(true), Ok(()));
 }
 
 #[test]
