@@ -73,6 +73,12 @@ impl Request {
         self
     }
 
+    /// Asked as often as another one, and waited for as long.
+    pub(super) fn as_patient_as(mut self, other: &Request) -> Request {
+        (self.timeout, self.repeatable) = (other.timeout, other.repeatable);
+        self
+    }
+
     /// Whether a request for blocks is only the first try.
     pub(super) fn falls_back(&self) -> bool {
         matches!(self.blocks, Blocks::First { .. })

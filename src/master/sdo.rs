@@ -231,8 +231,8 @@ impl SdoClient {
             // of another object comes first: once that is answered, nothing older can come.
             let haunted = node.ghosts.iter().any(|ghost| ghost.object == request.object);
             let mut active = if haunted {
-                let other = if request.object == DEVICE_TYPE { ERROR_REGISTER } else { DEVICE_TYPE };
-                let barrier = Request::read(request.node, other).once();
+                let other = node.barrier(request.object);
+                let barrier = Request::read(request.node, other).as_patient_as(&request);
                 Active { behind: Some((ticket, request)), ..Active::new(ticket, barrier, node.accept_60, timing) }
             } else {
                 Active::new(ticket, request, node.accept_60, timing)
@@ -363,7 +363,8 @@ impl SdoClient {
         if let Some(active) = node.active.take() {
             outgoing.drop_ticket(active.ticket);
             match active.behind {
-                // Refused or answered: either way everything older has been answered before.
+                // Refused or answered: either way everything older has been answered before, and to its own
+                // repetitions an answer comes before that to what waits behind.
                 Some(behind) => {
                     node.ghosts.clear();
                     node.waiting.push_front(behind);
@@ -461,6 +462,13 @@ fn earlier(one: Option<Mono>, other: Option<Mono>) -> Option<Mono> {
 }
 
 impl Node {
+    /// An object other than `object` of which no answer is under way either: an old one would prove nothing.
+    fn barrier(&self, object: ObjectId) -> ObjectId {
+        let is_fresh = |other: &ObjectId| *other != object && !self.ghosts.iter().any(|ghost| ghost.object == *other);
+        let fallback = if object == DEVICE_TYPE { ERROR_REGISTER } else { DEVICE_TYPE };
+        [DEVICE_TYPE, ERROR_REGISTER, IDENTITY].into_iter().find(is_fresh).unwrap_or(fallback)
+    }
+
     /// An answer that nobody waits for: it is that of a request given up.
     fn settle(&mut self, frame: &Frame) {
         if let (Some(_), [_, a, b, c, ..]) = (frame.id().sdo_response_node(), frame.data()) {
@@ -474,3 +482,4 @@ impl Node {
 
 const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
 const ERROR_REGISTER: ObjectId = ObjectId::new(0x1001, 0);
+const IDENTITY: ObjectId = ObjectId::new(0x1018, 0);

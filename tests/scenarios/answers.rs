@@ -1,5 +1,6 @@
 //! Late answers, and the answers that another client's requests bring: none may become ours.
 
+use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
@@ -52,8 +53,14 @@ fn node() -> NodeId {
 
 /// What reads of the objects give, one after the other, with answers that come after `delays` ms each.
 fn reads(objects: &[u16], retries: u32, delays: &[u64]) -> Vec<Option<u64>> {
+    reads_without(objects, retries, delays, &[])
+}
+
+/// The same where some of the frames that are sent, counted from 0, get lost.
+fn reads_without(objects: &[u16], retries: u32, delays: &[u64], lost: &[u64]) -> Vec<Option<u64>> {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
     bus.attach(Slow { delays: delays.iter().copied().collect(), due: VecDeque::new(), answered: 0 });
+    let mut bus = Faulty::new(bus, FaultPlan { lose_sent: lost.iter().copied().collect(), ..FaultPlan::default() });
     let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries });
     objects
         .iter()
@@ -78,6 +85,19 @@ fn a_late_answer_is_not_the_next_reading_of_the_same_object() {
     assert_eq!(reads(&[0x2000, 0x2000], 1, &[150, 1, 1, 1]), [Some(1), Some(4)]);
     // An answer that came in the meantime, to nobody, needs no such care.
     assert_eq!(reads(&[0x2000, 0x2001, 0x2000], 0, &[120, 50, 1, 1]), [None, Some(2), Some(3)]);
+}
+
+#[test]
+fn what_makes_sure_of_that_is_itself_no_object_that_an_old_answer_may_come_of() {
+    // 1000h is answered late, and so is 2000h: to read 1000h once more would prove nothing.
+    assert_eq!(reads(&[0x1000, 0x2000, 0x2000], 0, &[250, 1, 1, 1]), [None, None, Some(4)]);
+}
+
+#[test]
+fn what_makes_sure_of_that_is_repeated_as_the_reading_itself() {
+    assert_eq!(reads_without(&[0x2000, 0x2000], 1, &[150], &[2]), [Some(1), Some(4)]);
+    // An answer to its repetition is none to a reading of the same object.
+    assert_eq!(reads(&[0x2000, 0x2000, 0x1000], 1, &[150, 1, 101, 1]), [Some(1), Some(5), Some(6)]);
 }
 
 #[test]

@@ -67,10 +67,13 @@ fn was_silent(spec: &Spec, run: &Run, failure: &Failure, broken: &mut Vec<Broken
     if failure.message.contains("in the middle") {
         return;
     }
-    let asked = run.bus.all_sent().into_iter().rev().find(|(_, frame)| {
-        frame.id() == CanId::sdo_request(node) && begins(frame) == Some(object)
+    // Before an object is asked for again, another one is read, so that no old answer is taken for a new one.
+    let meant = [object, ObjectId::new(0x1000, 0), ObjectId::new(0x1001, 0)];
+    let asked = run.bus.all_sent().into_iter().rev().find_map(|(at, frame)| {
+        let begun = begins(&frame).filter(|_| frame.id() == CanId::sdo_request(node));
+        begun.filter(|begun| meant.contains(begun)).map(|begun| (at, begun))
     });
-    let Some((asked, _)) = asked else {
+    let Some((asked, object)) = asked else {
         let waits = run.bus.was_down || run.bus.was_off || spec.faults.iter().any(is_full);
         if !waits {
             broken.push(("names the cause", format!("never asked: {failure}")));
