@@ -280,13 +280,7 @@ impl SdoClient {
         is_ours
     }
 
-    fn on_frame_of(
-        &mut self,
-        number: NodeId,
-        received: &Received,
-        timing: &Timing,
-        outgoing: &mut Outgoing,
-    ) -> bool {
+    fn on_frame_of(&mut self, number: NodeId, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let id = received.frame.id();
         let Some(node) = self.nodes.get_mut(&number) else { return false };
         let Some(active) = &mut node.active else {

@@ -333,12 +333,8 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
             let measuring = match *how {
                 Measuring::Once => None,
                 Measuring::AsSent { for_ms: length } => Some((Mode::AsSent, for_ms(length))),
-                Measuring::Sync { ms, for_ms: length } => {
-                    Some((Mode::Sync(Duration::from_millis(ms)), for_ms(length)))
-                }
-                Measuring::Poll { ms, for_ms: length } => {
-                    Some((Mode::Poll(Duration::from_millis(ms)), for_ms(length)))
-                }
+                Measuring::Sync { ms, for_ms: length } => Some((Mode::Sync(Duration::from_millis(ms)), for_ms(length))),
+                Measuring::Poll { ms, for_ms: length } => Some((Mode::Poll(Duration::from_millis(ms)), for_ms(length))),
             };
             let parsed = expected.iter().map(|one| Expression::parse(&one.to_string()).expect("an expression"));
             let plan = check::Plan {

@@ -42,9 +42,17 @@ impl fmt::Display for Expected {
 pub(crate) enum Measuring {
     /// One reading by SDO.
     Once,
-    AsSent { for_ms: u64 },
-    Sync { ms: u64, for_ms: u64 },
-    Poll { ms: u64, for_ms: u64 },
+    AsSent {
+        for_ms: u64,
+    },
+    Sync {
+        ms: u64,
+        for_ms: u64,
+    },
+    Poll {
+        ms: u64,
+        for_ms: u64,
+    },
 }
 
 #[derive(Clone, Debug)]
@@ -213,7 +221,9 @@ impl Command {
     pub(crate) fn counts_places(&self) -> bool {
         let target = match self {
             Command::LssIdentify { .. } => return true,
-            Command::LssInquire { target } | Command::LssStore { target, .. } | Command::Assign { target, .. } => target,
+            Command::LssInquire { target } | Command::LssStore { target, .. } | Command::Assign { target, .. } => {
+                target
+            }
             Command::LssActivate { target: Some(target), .. } => target,
             _ => return false,
         };

@@ -8,8 +8,22 @@ use crate::random::Random;
 use crate::spec::{Act, DeviceSpec, Fault, Kill, Other, Spec, Vagary};
 use commands::command;
 
-const KINDS: [&str; 14] =
-    ["mh4", "mh4", "mh4", "d20", "d20", "mc1609", "mc1609", "dps", "dps", "hydac", "jumo", "baumer", "hydac-old", ATTIC];
+const KINDS: [&str; 14] = [
+    "mh4",
+    "mh4",
+    "mh4",
+    "d20",
+    "d20",
+    "mc1609",
+    "mc1609",
+    "dps",
+    "dps",
+    "hydac",
+    "jumo",
+    "baumer",
+    "hydac-old",
+    ATTIC,
+];
 const RATES: [u32; 4] = [125_000, 250_000, 500_000, 1_000_000];
 const ABORTS: [u32; 6] = [0x0800_0000, 0x0602_0000, 0x0609_0011, 0x0601_0002, 0x0800_0022, 0x0606_0000];
 

@@ -103,9 +103,22 @@ pub(crate) enum Other {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Act {
-    Read { node: u8, index: u16, sub: u8 },
-    Write { node: u8, index: u16, sub: u8, value: u32, bytes: u8 },
-    Nmt { specifier: u8, node: u8 },
+    Read {
+        node: u8,
+        index: u16,
+        sub: u8,
+    },
+    Write {
+        node: u8,
+        index: u16,
+        sub: u8,
+        value: u32,
+        bytes: u8,
+    },
+    Nmt {
+        specifier: u8,
+        node: u8,
+    },
     /// Everybody back to the waiting state of LSS.
     LssWait,
 }

@@ -131,7 +131,9 @@ fn inquire(lss: &mut Lss<'_, '_>, known: Option<LssAddress>) -> Result<Told, Lss
 /// Several slaves that all say yes are what `force` was asked for.
 pub(super) fn agreed(result: Result<(), LssError>, force: bool) -> Result<(), LssError> {
     match result {
-        Err(LssError::Several { frames, .. }) if force && frames.iter().all(|frame| frame.data().get(1) == Some(&0)) => {
+        Err(LssError::Several { frames, .. })
+            if force && frames.iter().all(|frame| frame.data().get(1) == Some(&0)) =>
+        {
             Ok(())
         }
         result => result,

@@ -36,9 +36,10 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
             broken.push(("names the cause", format!("the interface was down: {}", told())));
         }
     }
-    let bus_is_well = spec.faults.iter().all(|fault| {
-        !matches!(fault, Fault::Down { .. } | Fault::BusOff { .. } | Fault::Full { .. })
-    });
+    let bus_is_well = spec
+        .faults
+        .iter()
+        .all(|fault| !matches!(fault, Fault::Down { .. } | Fault::BusOff { .. } | Fault::Full { .. }));
     if failure.kind == Kind::Bus && bus_is_well && spec.devices.iter().all(|device| device.bit_rate.is_none()) {
         let sharing = spec.shares_node_ids() || !spec.others.is_empty();
         let answered = run.bus.frames.iter().any(|(_, passed)| matches!(passed, Passed::Received(_)));

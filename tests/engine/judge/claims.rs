@@ -141,8 +141,13 @@ fn becomes_another(spec: &Spec, node: u8, object: ObjectId) -> bool {
     let described = model.as_ref().and_then(|model| model.description.object(object));
     // MH-4: 0 brings back the identifier as delivered.
     // Short texts are filled up.
-    let is_text = model.as_ref().is_some_and(|model| model.dictionary.get(object).is_some_and(|entry| entry.data_type.width().is_none()));
-    is_text && device.is_some_and(|device| device.kind != crate::kinds::ATTIC) || described.is_none() || object.index & 0x0fff == 0x1a0 || object.index == 0x1014
+    let is_text = model
+        .as_ref()
+        .is_some_and(|model| model.dictionary.get(object).is_some_and(|entry| entry.data_type.width().is_none()));
+    is_text && device.is_some_and(|device| device.kind != crate::kinds::ATTIC)
+        || described.is_none()
+        || object.index & 0x0fff == 0x1a0
+        || object.index == 0x1014
 }
 
 pub(super) fn number(bytes: &[u8]) -> u32 {
@@ -178,7 +183,9 @@ pub(super) fn last_writes(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) 
             | Command::Errors { .. }
             | Command::Minmax { .. }
     );
-    if resets || spec.is_meddled_with() || spec.lies() || spec.loses_sent() || spec.shares_node_ids() {
+    // It says itself that it could not be put back.
+    let admits = matches!(run.result, Ok(Said::Probed(false)));
+    if resets || admits || spec.is_meddled_with() || spec.lies() || spec.loses_sent() || spec.shares_node_ids() {
         return;
     }
     let mut last: BTreeMap<(u8, ObjectId), Vec<u8>> = BTreeMap::new();

@@ -91,7 +91,11 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, bro
                     let meant = named.contains(&node);
                     // A block of a long download begins with a number; only short ones are written here.
                     // Whether an identifier is free is seen by asking who there is.
-                    let asks = lss || matches!(spec.command, Command::Map { cob_id: Some(_), .. } | Command::Detect { ask: true, .. });
+                    let asks = lss
+                        || matches!(
+                            spec.command,
+                            Command::Map { cob_id: Some(_), .. } | Command::Detect { ask: true, .. }
+                        );
                     if reads { meant || asks } else { meant && writes(&spec.command) }
                 }
                 _ => false,

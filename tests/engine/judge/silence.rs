@@ -15,6 +15,11 @@ pub(super) fn told_causes(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
         _ => {}
     }
     let stopped = failure.kind == Kind::CheckFailed && !matches!(spec.command, Command::Check { .. });
+    // What was configured and is configured as before is nothing; power shows the rest.
+    let undoes = matches!(spec.command, Command::Assign { .. });
+    if undoes {
+        return;
+    }
     if stopped || failure.kind == Kind::Usage || failure.message.contains("nothing was changed") {
         let changes = (0..run.bus.frames.len()).find_map(|place| taken(&run.bus.frames[place..]));
         if let Some((at, frame)) = changes {
@@ -43,8 +48,7 @@ fn taken(frames: &[(Mono, Passed)]) -> Option<(Mono, Frame)> {
 fn changes(frame: &Frame) -> bool {
     match (frame.id().sdo_request_node(), frame.data().first()) {
         (Some(_), Some(first)) => begins(frame).is_some() && matches!(first >> 5, 1 | 6),
-        // What was configured and is configured as before is nothing; power shows the rest.
-        (None, Some(first)) => frame.id() == CanId::LSS_MASTER && matches!(first, 0x15 | 0x17),
+        (None, Some(first)) => frame.id() == CanId::LSS_MASTER && matches!(first, 0x11 | 0x13 | 0x15 | 0x17),
         (_, None) => false,
     }
 }

@@ -20,7 +20,8 @@ pub(super) fn watched(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
             Change::BootUp => Life::BootUp,
             Change::State(state) | Change::Back(state) => Life::State(state),
             Change::Lost(silent) => {
-                let is_silent = |(came, node, _): &(Mono, NodeId, Life)| *node == seen.node && *came > at - silent && *came <= at;
+                let is_silent =
+                    |(came, node, _): &(Mono, NodeId, Life)| *node == seen.node && *came > at - silent && *came <= at;
                 if silent < Duration::from_millis(50) || lives.iter().any(is_silent) {
                     broken.push(("tells what came", format!("{seen:?} of {lives:?}")));
                 }

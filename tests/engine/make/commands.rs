@@ -163,9 +163,7 @@ pub(super) fn command(random: &mut Random, devices: &[DeviceSpec]) -> Command {
             for_ms: *random.pick(&[100, 700, 2_500]),
         },
         39 | 40 => Command::PdoWatch { nodes: nodes(random, devices), for_ms: *random.pick(&[50, 300, 1_000]) },
-        41 if random.percent(30) => {
-            Command::Detect { ask: random.percent(50), each_ms: *random.pick(&[20, 150, 600]) }
-        }
+        41 if random.percent(30) => Command::Detect { ask: random.percent(50), each_ms: *random.pick(&[20, 150, 600]) },
         41..=43 => check(random, devices),
         _ => {
             let how = random.within(0..=4);
