@@ -74,7 +74,7 @@ impl Request {
     }
 
     /// Asked as often as another one, and waited for as long.
-    pub(super) fn as_patient_as(mut self, other: &Request) -> Request {
+    pub(super) fn patient_as(mut self, other: &Request) -> Request {
         (self.timeout, self.repeatable) = (other.timeout, other.repeatable);
         self
     }

@@ -232,7 +232,7 @@ impl SdoClient {
             let haunted = node.ghosts.iter().any(|ghost| ghost.object == request.object);
             let mut active = if haunted {
                 let other = node.barrier(request.object);
-                let barrier = Request::read(request.node, other).as_patient_as(&request);
+                let barrier = Request::read(request.node, other).patient_as(&request);
                 Active { behind: Some((ticket, request)), ..Active::new(ticket, barrier, node.accept_60, timing) }
             } else {
                 Active::new(ticket, request, node.accept_60, timing)

@@ -97,10 +97,12 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], b
                 }
             }
         }
-        (Said::Detected(Some(rate)), _) if !spec.lies() && spec.others.is_empty() => {
-            if !spec.devices.iter().any(|device| device.bit_rate == Some(*rate)) {
-                broken.push(("finds who is there", format!("nobody is at {rate} bit/s")));
-            }
+        (Said::Detected(Some(rate)), _)
+            if !spec.lies()
+                && spec.others.is_empty()
+                && !spec.devices.iter().any(|device| device.bit_rate == Some(*rate)) =>
+        {
+            broken.push(("finds who is there", format!("nobody is at {rate} bit/s")));
         }
         (Said::Identified(answered), Command::LssIdentify { .. }) if spec.is_clean() => {
             let replied = run.bus.frames.iter().any(|(_, passed)| {

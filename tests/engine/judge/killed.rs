@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::run::run;
+use cangauge::tasks::Failure;
 
 /// A device holds the old node-ID and bit rate or the new ones, and the same command brings everything to its end.
 pub(super) fn killed(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
@@ -25,7 +26,13 @@ pub(super) fn killed(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     if moves || !whole.is_clean() {
         return;
     }
+    // Of what was still under way the next one may make what it likes, as long as it is no success.
+    let at_once = spec.kill.is_some_and(|kill| kill.again_ms < 100) && spec.command.is_lss();
+    // Whether anything comes while it is listened for is not the program's doing.
+    let listens = matches!(spec.command, Command::PdoWatch { .. } | Command::Log { .. } | Command::Check { .. });
+    let may_fail = |failure: &Failure| at_once || listens && failure.kind == Kind::NoAnswer;
     if let Err(failure) = &run.result
+        && !may_fail(failure)
         && self::run(&whole).result.is_ok()
     {
         broken.push(("comes to its end after a kill", format!("{:?}: {failure}", failure.kind)));

@@ -71,33 +71,39 @@ fn was_silent(spec: &Spec, run: &Run, failure: &Failure, broken: &mut Vec<Broken
     if failure.message.contains("in the middle") {
         return;
     }
-    // Before an object is asked for again, another one is read, so that no old answer is taken for a new one.
-    let meant = [object, ObjectId::new(0x1000, 0), ObjectId::new(0x1001, 0)];
-    let asked = run.bus.all_sent().into_iter().rev().find_map(|(at, frame)| {
-        let begun = begins(&frame).filter(|_| frame.id() == CanId::sdo_request(node));
-        begun.filter(|begun| meant.contains(begun)).map(|begun| (at, begun))
-    });
-    let Some((asked, object)) = asked else {
-        let waits = run.bus.was_down || run.bus.was_off || spec.faults.iter().any(is_full);
-        if !waits {
+    let writes = failure.message.contains(&format!("write {object}"));
+    let asks = |frame: &Frame| {
+        let writing = frame.data().first().is_some_and(|first| matches!(first >> 5, 1 | 6));
+        let begun = begins(frame).filter(|_| frame.id() == CanId::sdo_request(node));
+        begun.map(|begun| (begun, begun == object && writing == writes))
+    };
+    let requests = run.bus.all_sent().into_iter().filter_map(|(at, frame)| Some((at, asks(&frame)?)));
+    let requests: Vec<(Mono, (ObjectId, bool))> = requests.collect();
+    let Some(last) = requests.iter().rposition(|(_, (_, is_it))| *is_it) else {
+        if !(run.bus.was_down || run.bus.was_off || spec.faults.iter().any(is_full)) {
             broken.push(("names the cause", format!("never asked: {failure}")));
         }
         return;
     };
-    let until = asked + Duration::from_millis(spec.timeout_ms);
-    let answers = |at: Mono, frame: &Frame| {
-        let addressed = frame.all_eight().map(|data| ObjectId::from_multiplexer([data[1], data[2], data[3]]));
-        let is_answer = frame.data().first().is_some_and(|first| matches!(first >> 5, 2..=6));
-        frame.id() == CanId::sdo_response(node) && addressed == Some(object) && is_answer && at > asked && at < until
-    };
-    for (at, passed) in &run.bus.frames {
-        if let Passed::Received(frame) = passed
-            && answers(*at, frame)
-        {
-            broken.push(("names the cause", format!("{frame} came at {:?}: {failure}", at.since_start())));
-            return;
-        }
+    // Before an object is asked for again, another one is read, so that no old answer is taken for a new one. That
+    // one may have been silent, too.
+    let answered = requests[last..].iter().all(|(at, (object, _))| {
+        let until = *at + Duration::from_millis(spec.timeout_ms);
+        let mut received = run.bus.frames.iter();
+        received.any(|(came, passed)| {
+            came > at && *came < until && matches!(passed, Passed::Received(frame) if answers(frame, node, *object))
+        })
+    });
+    if answered {
+        broken.push(("names the cause", format!("it was answered: {failure}")));
     }
+}
+
+/// Whether a frame answers a request that begins a transfer of an object.
+fn answers(frame: &Frame, node: NodeId, object: ObjectId) -> bool {
+    let addressed = frame.all_eight().map(|data| ObjectId::from_multiplexer([data[1], data[2], data[3]]));
+    let is_answer = frame.data().first().is_some_and(|first| matches!(first >> 5, 2..=6));
+    frame.id() == CanId::sdo_response(node) && addressed == Some(object) && is_answer
 }
 
 fn is_full(fault: &Fault) -> bool {
