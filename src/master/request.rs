@@ -73,9 +73,9 @@ impl Request {
         self
     }
 
-    /// Asked as often as another one, and waited for as long.
+    /// Asked as often as another one, and waited for as long. Asking for blocks in vain was asking once.
     pub(super) fn patient_as(mut self, other: &Request) -> Request {
-        (self.timeout, self.repeatable) = (other.timeout, other.repeatable);
+        (self.timeout, self.repeatable) = (other.timeout, other.repeatable && !other.refused_blocks);
         self
     }
 
