@@ -24,7 +24,13 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     if failure.kind == Kind::Interrupted && !tap.interrupted {
         broken.push(("names the cause", format!("nobody interrupted: {}", told())));
     }
-    if tap.was_down && !tap.interrupted && !matches!(spec.command, Command::Log { .. }) && failure.kind != Kind::Bus {
+    // A recording goes on when the interface is back.
+    let records = match &spec.command {
+        Command::Log { .. } => true,
+        Command::Check { how, .. } => *how != Measuring::Once,
+        _ => false,
+    };
+    if tap.was_down && !tap.interrupted && !records && failure.kind != Kind::Bus {
         // It may have failed before.
         let down_at = spec.faults.iter().filter_map(|fault| match fault {
             Fault::Down { at_us, .. } => Some(*at_us),

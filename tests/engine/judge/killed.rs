@@ -26,8 +26,11 @@ pub(super) fn killed(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     if moves || !whole.is_clean() {
         return;
     }
-    // Of what was still under way the next one may make what it likes, as long as it is no success.
-    let at_once = spec.kill.is_some_and(|kill| kill.again_ms < 100) && spec.command.is_lss();
+    // Of what was still under way the next one may make what it likes, as long as it is no success. A slave that was
+    // left in configuration state is silent once, and a server in the middle of blocks until it gives up.
+    let again_ms = spec.kill.map_or(0, |kill| kill.again_ms);
+    let moves_data = matches!(spec.command, Command::SdoRead { .. } | Command::SdoWrite { .. });
+    let at_once = spec.command.is_lss() && (again_ms < 100 || spec.retries == 0) || moves_data && again_ms < 2000;
     // Whether anything comes while it is listened for is not the program's doing.
     let listens = matches!(spec.command, Command::PdoWatch { .. } | Command::Log { .. } | Command::Check { .. });
     let may_fail = |failure: &Failure| at_once || listens && failure.kind == Kind::NoAnswer;
