@@ -26,6 +26,7 @@ struct Break {
 fn every_break_applies() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let runner = fs::read_to_string(root.join("tests/breaks/run")).expect("the runner");
+    let is_known = |by: &str| by.split(' ').next().is_some_and(|test| runner.contains(&format!("\"{test}\"")));
     let (mut names, mut wrong) = (BTreeSet::new(), Vec::new());
     for entry in fs::read_dir(root.join("tests/breaks")).expect("a folder") {
         let path = entry.expect("an entry").path();
@@ -39,7 +40,7 @@ fn every_break_applies() {
             if times != 1 {
                 wrong.push(format!("{name}: its text stands {times} times in {file}"));
             }
-            if old == new || what.is_empty() || !runner.contains(&format!("\"{by}\"")) || !file.starts_with("src/") {
+            if old == new || what.is_empty() || !is_known(&by) || !file.starts_with("src/") {
                 wrong.push(format!("{name}: it changes nothing, says nothing, or nobody notices"));
             }
             if !names.insert(name.clone()) {
