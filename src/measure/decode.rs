@@ -327,6 +327,19 @@ mod tests {
     }
 
     #[test]
+    fn what_two_nodes_send_with_one_identifier_is_nobodys() {
+        let one = instrument(REAL, &[0x6130_0120], |_| {});
+        let other = Instrument { node: NodeId::new(2).expect("a node-ID"), ..one.clone() };
+        let mut decoder = Decoder::default();
+        decoder.add(&one, &[]);
+        decoder.add(&other, &[]);
+        let received = Received { frame: "181#0000803F".parse().expect("a frame"), at: Stamp::default() };
+        let mut samples = Vec::new();
+        assert!(matches!(decoder.decode(&received, &mut samples), Decoded::Held(_)) && samples.is_empty());
+        assert_eq!(decoder.take_contested().into_values().collect::<Vec<_>>(), [(one.node, other.node)]);
+    }
+
+    #[test]
     fn dps_integer_with_digits_tells_no_status() {
         let dps = instrument((ObjectId::new(0x6130, 1), DataType::Integer(4)), &[0x6130_0120], |_| {});
         let mut dps = dps;
