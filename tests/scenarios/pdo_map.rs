@@ -30,6 +30,8 @@ enum Mishap {
     LoseAnswer,
     /// The device refuses it.
     Refuse(u32),
+    /// The device acknowledges it and does nothing.
+    Pretend,
     /// Ctrl-C, before the answer is there.
     Interrupt,
     /// Ctrl-C, and again at the next frame.
@@ -103,6 +105,13 @@ impl Bus for Meddler {
                 let [d, e, f, g] = code.to_le_bytes();
                 let data = format!("80{a:02X}{b:02X}{c:02X}{d:02X}{e:02X}{f:02X}{g:02X}");
                 let frame = format!("{:03X}#{data}", 0x580 + u16::from(NODE)).parse().unwrap();
+                self.events.push_back(Event::Frame(Received { frame, at: self.bus.now() }));
+                return Ok(());
+            }
+            Mishap::Pretend => {
+                let [_, a, b, c, ..] = *frame.data() else { return self.bus.send(frame) };
+                let text = format!("{:03X}#60{a:02X}{b:02X}{c:02X}00000000", 0x580 + u16::from(NODE));
+                let frame = text.parse().unwrap();
                 self.events.push_back(Event::Frame(Received { frame, at: self.bus.now() }));
                 return Ok(());
             }
@@ -359,6 +368,9 @@ fn everywhere(mishaps: &[Mishap]) {
             let begin = if number < 2 { 0 } else { first };
             for &mishap in mishaps {
                 for at in begin..well.sent.len() {
+                    if mishap == Mishap::Pretend && !is_write(&well.sent[at]) {
+                        continue;
+                    }
                     // The scan for a free identifier asks who is not there, twice each.
                     if case.cob_id.is_some() && is_scan(&well.sent[at]) {
                         continue;
@@ -392,6 +404,11 @@ fn a_frame_that_is_lost() {
 #[test]
 fn a_refusal_of_every_step() {
     everywhere(&[Mishap::Refuse(0x0800_0000), Mishap::Refuse(0x0609_0030), Mishap::Refuse(0x0800_0022)]);
+}
+
+#[test]
+fn an_acknowledge_without_the_deed_at_every_step() {
+    everywhere(&[Mishap::Pretend]);
 }
 
 #[test]
