@@ -8,9 +8,9 @@ use cangauge::canopen::frame::Frame;
 use cangauge::device::assign::spoken_rate;
 use cangauge::master::{Master, Timing};
 use cangauge::measure::survey::Overrides;
-use cangauge::sim::Device;
+use cangauge::sim::{Device, State};
 use cangauge::tasks::Kind;
-use cangauge::tasks::lss::{Confirmed, Job, Via, assign};
+use cangauge::tasks::lss::{Confirmed, Job, Rate, Via, assign};
 use std::collections::BTreeSet;
 
 const ALL: &str = "device = [
@@ -317,6 +317,19 @@ fn objects_that_cannot_be_set_for_a_while_are_not_touched() {
         assert!(message.contains(why) && message.contains("nothing was changed"), "{failure:?} {message}");
         assert_eq!(all_held(&bus), expected);
         assert!(!done.warns("1010h:1"), "{:?}", done.notes);
+    }
+}
+
+#[test]
+fn a_state_that_lss_wanted_otherwise_is_put_back() {
+    // The DPS takes part in PRE-OPERATIONAL, the D-20-9 in STOPPED; a bit rate alone ends in no reset.
+    for kind in ["dps", "d20"] {
+        let device = format!("{{ kind = '{kind}', node = 5, start = true, set = {{ '0x1017' = 100 }} }}");
+        let mut bus = bus(&format!("device = [{device}]"));
+        let wanted = Wanted { rate: Some(Rate::Bits(500_000)), ..Wanted::default() };
+        run(&mut bus, "5", &wanted).result.unwrap();
+        let device: &Device = bus.stations().next().unwrap();
+        assert_eq!(device.state(), Some(State::Operational), "{kind}");
     }
 }
 
