@@ -207,9 +207,16 @@ fn guard(
         .iter()
         .copied()
         .filter(|node| means[node].may_guard && means[node].heartbeat.is_none())
-        .filter(|node| !watch.guarded_by_others.contains(node))
         .collect();
     let mut told = BTreeMap::new();
+    if asked.is_empty() {
+        return Ok(told);
+    }
+    // Asked by two, a node answers each with the toggle bit that the other one waits for.
+    let until = master.now() + master.timing().timeout;
+    let is_told = |watch: &Watch, node| watch.guarded_by_others.contains(node) && watch.lives.contains_key(node);
+    watch.wait(master, until, &|watch| asked.iter().all(|node| is_told(watch, node)))?;
+    let asked: Vec<NodeId> = asked.into_iter().filter(|node| !watch.guarded_by_others.contains(node)).collect();
     if asked.is_empty() {
         return Ok(told);
     }
