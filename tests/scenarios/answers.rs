@@ -178,7 +178,7 @@ fn a_server_that_has_begun_is_told_of_the_end() {
     }
 }
 
-/// Somebody who sends one frame every 10 ms.
+/// Somebody who sends one frame every 10 ms for two seconds.
 struct Chatter(Frame, Mono);
 
 impl Station for Chatter {
@@ -194,7 +194,7 @@ impl Station for Chatter {
     }
 
     fn next_wake(&self) -> Option<Mono> {
-        Some(self.1)
+        Some(self.1).filter(|at| at.since_start() < Duration::from_secs(2))
     }
 
     fn sent(&mut self, _: Mono, _: &Frame) {}
