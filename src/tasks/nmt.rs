@@ -203,11 +203,8 @@ fn guard(
     means: &BTreeMap<NodeId, Means>,
     watch: &mut Watch,
 ) -> Result<BTreeMap<NodeId, NmtState>, Error> {
-    let asked: Vec<NodeId> = nodes
-        .iter()
-        .copied()
-        .filter(|node| means[node].may_guard && means[node].heartbeat.is_none())
-        .collect();
+    let asked: Vec<NodeId> =
+        nodes.iter().copied().filter(|node| means[node].may_guard && means[node].heartbeat.is_none()).collect();
     let mut told = BTreeMap::new();
     if asked.is_empty() {
         return Ok(told);
