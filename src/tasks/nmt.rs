@@ -27,6 +27,9 @@ const HEARTBEAT: ObjectId = ObjectId::new(0x1017, 0);
 const GUARD_TIME: ObjectId = ObjectId::new(0x100c, 0);
 const LIFE_TIME_FACTOR: ObjectId = ObjectId::new(0x100d, 0);
 
+/// How long is listened for somebody else who guards.
+const OTHERS: Duration = Duration::from_millis(200);
+
 /// The longest wait for a boot-up message: no manual gives a time; storing may go before it.
 const BOOT_TIME: Duration = Duration::from_secs(3);
 
@@ -210,7 +213,7 @@ fn guard(
         return Ok(told);
     }
     // Asked by two, a node answers each with the toggle bit that the other one waits for.
-    let until = master.now() + master.timing().timeout;
+    let until = master.now() + OTHERS.min(master.timing().timeout);
     let is_told = |watch: &Watch, node| watch.guarded_by_others.contains(node) && watch.lives.contains_key(node);
     watch.wait(master, until, &|watch| asked.iter().all(|node| is_told(watch, node)))?;
     let asked: Vec<NodeId> = asked.into_iter().filter(|node| !watch.guarded_by_others.contains(node)).collect();

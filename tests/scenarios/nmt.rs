@@ -93,7 +93,7 @@ fn who_was_never_there_is_not_stopped() {
 #[test]
 fn a_node_that_somebody_else_guards_is_not_guarded() {
     let bench = "clock = 'virtual'\n[[device]]\nkind = 'd20'\nnode = 5\n";
-    for period in [None, Some(10), Some(300)] {
+    for period in [None, Some(10), Some(150)] {
         let mut bus = Bench::from_toml(bench, Path::new("")).unwrap().open().unwrap();
         let asks: Vec<(u64, &str)> = (0..1000).filter_map(|n| Some((period? * n + 1, "705#R1"))).collect();
         bus.attach(Other::new(&asks));
