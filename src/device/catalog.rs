@@ -231,6 +231,31 @@ mod tests {
         }
     }
 
+    #[test]
+    fn one_answer_that_differs_makes_another_device() {
+        for model in built_in() {
+            let wanted = &model.description.identify;
+            let own = Traits {
+                device_type: wanted.device_type,
+                vendor_id: wanted.vendor_id,
+                product_code: wanted.product_code,
+                device_name: wanted.device_name.clone(),
+                answers: BTreeMap::new(),
+            };
+            // Who says nothing of himself is taken when he is named, and never else.
+            assert_eq!(model.looks_like(&own), !wanted.is_empty(), "{}", model.description.name);
+            let other = |number: Option<u32>| number.map(|number| number ^ 1);
+            let others = [
+                Traits { device_type: other(own.device_type), ..own.clone() },
+                Traits { vendor_id: other(own.vendor_id), ..own.clone() },
+                Traits { product_code: other(own.product_code), ..own.clone() },
+                Traits { device_name: own.device_name.clone().map(|name| name + "!"), ..own.clone() },
+            ];
+            let wrong: Vec<_> = others.iter().filter(|other| **other != own && model.looks_like(other)).collect();
+            assert!(wrong.is_empty(), "{}: {wrong:?}", model.description.name);
+        }
+    }
+
     fn run_length(object: &ObjectEntry) -> usize {
         let mut dictionary = Dictionary::new();
         dictionary.insert_described(object).expect("an address");

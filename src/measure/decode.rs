@@ -317,6 +317,29 @@ mod tests {
     }
 
     #[test]
+    fn each_channel_has_its_own_status() {
+        let words = [0x6150_0108, 0x6130_0220, 0x6150_0208];
+        let second = instrument((ObjectId::new(0x6130, 2), DataType::Real32), &words, |signal| {
+            signal.status = Some(ObjectId::new(0x6150, 2));
+        });
+        assert_eq!(rows(&second, &[], "181#030000803F00"), [row("0x6150:1", "3", ""), row("pressure", "1", "ok")]);
+        assert_eq!(rows(&second, &[], "181#000000803F01"), [row("0x6150:1", "0", ""), row("pressure", "", "invalid")]);
+    }
+
+    #[test]
+    fn what_two_nodes_send_with_one_identifier_is_nobodys() {
+        let one = instrument(REAL, &[0x6130_0120], |_| {});
+        let other = Instrument { node: NodeId::new(2).expect("a node-ID"), ..one.clone() };
+        let mut decoder = Decoder::default();
+        decoder.add(&one, &[]);
+        decoder.add(&other, &[]);
+        let received = Received { frame: "181#0000803F".parse().expect("a frame"), at: Stamp::default() };
+        let mut samples = Vec::new();
+        assert!(matches!(decoder.decode(&received, &mut samples), Decoded::Held(_)) && samples.is_empty());
+        assert_eq!(decoder.take_contested().into_values().collect::<Vec<_>>(), [(one.node, other.node)]);
+    }
+
+    #[test]
     fn dps_integer_with_digits_tells_no_status() {
         let dps = instrument((ObjectId::new(0x6130, 1), DataType::Integer(4)), &[0x6130_0120], |_| {});
         let mut dps = dps;

@@ -27,6 +27,9 @@ const HEARTBEAT: ObjectId = ObjectId::new(0x1017, 0);
 const GUARD_TIME: ObjectId = ObjectId::new(0x100c, 0);
 const LIFE_TIME_FACTOR: ObjectId = ObjectId::new(0x100d, 0);
 
+/// How long is listened for somebody else who guards.
+const OTHERS: Duration = Duration::from_millis(200);
+
 /// The longest wait for a boot-up message: no manual gives a time; storing may go before it.
 const BOOT_TIME: Duration = Duration::from_secs(3);
 
@@ -203,13 +206,17 @@ fn guard(
     means: &BTreeMap<NodeId, Means>,
     watch: &mut Watch,
 ) -> Result<BTreeMap<NodeId, NmtState>, Error> {
-    let asked: Vec<NodeId> = nodes
-        .iter()
-        .copied()
-        .filter(|node| means[node].may_guard && means[node].heartbeat.is_none())
-        .filter(|node| !watch.guarded_by_others.contains(node))
-        .collect();
+    let asked: Vec<NodeId> =
+        nodes.iter().copied().filter(|node| means[node].may_guard && means[node].heartbeat.is_none()).collect();
     let mut told = BTreeMap::new();
+    if asked.is_empty() {
+        return Ok(told);
+    }
+    // Asked by two, a node answers each with the toggle bit that the other one waits for.
+    let until = master.now() + OTHERS.min(master.timing().timeout);
+    let is_told = |watch: &Watch, node| watch.guarded_by_others.contains(node) && watch.lives.contains_key(node);
+    watch.wait(master, until, &|watch| asked.iter().all(|node| is_told(watch, node)))?;
+    let asked: Vec<NodeId> = asked.into_iter().filter(|node| !watch.guarded_by_others.contains(node)).collect();
     if asked.is_empty() {
         return Ok(told);
     }

@@ -75,6 +75,9 @@ fn what_is_no_zero_is_refused() {
     still(0.15, 0.0, 0.0).run("autozero 1 --limit 2%").exit(0);
     still(0.15, 0.0, 0.0).run("autozero 1 --limit 2psi").exit(1);
     still(0.15, 0.0, 0.0).run("autozero 1 --limit 1e-1bar").exit(1);
+    // Below zero as well as above.
+    let done = still(0.0, -3.25, 0.0).run("autozero 2").exit(1);
+    assert!(done.stderr.starts_with("cangauge: node 2: pressure reads -3.250 bar; more than "), "{}", done.stderr);
     // What was taken away before counts along.
     let device = "[[device]]\nkind = \"mh4\"\nnode = 1\nset = { \"0x6127:1\" = -0.45 }\n[[device.channel]]\n\
                   channel = 1\nbase = 0.5125\namplitude = 0.0\nnoise = 0.0\n";

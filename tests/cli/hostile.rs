@@ -53,6 +53,16 @@ fn no_output_steers_a_terminal() {
 }
 
 #[test]
+fn neither_does_it_in_colour() {
+    let bench = bench();
+    for line in ["log 5 -o no\u{1b}[2J/such", "read 5 --device \u{1b}[2Jx"] {
+        let done = bench.run(&format!("{line} --color always"));
+        assert!(done.stderr.contains("\u{1b}["), "it is coloured: {:?}", done.stderr);
+        assert!(done.stderr.contains("\\x1B[2J") && !done.stderr.contains("\u{1b}[2J"), "{:?}", done.stderr);
+    }
+}
+
+#[test]
 fn neither_does_what_files_say() {
     let bench = bench();
     fs::write(bench.path("own.toml"), "name = \"a\u{9b}31m\\u001b[2J\"\nvendor = 5\n").expect("a file");

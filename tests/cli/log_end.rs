@@ -148,6 +148,9 @@ fn gaps_jitter_and_syncs_in_the_summary() {
     assert!((seconds("interval_s", "p50") - 0.1).abs() < 0.000_03 && seconds("jitter_s", "max") < 0.000_5, "{signal}");
     let done = bench.run("log 127 --count 20 --max-gap 101ms").exit(0);
     assert!(done.stderr.contains(", 0 gaps\n"), "{}", done.stderr);
+    // Four PDOs, ten times each: a gap is one of a PDO, whatever it carries.
+    let done = Bench::of("mc1609@3").run("log 3 --count 160 --max-gap 99ms").exit(0);
+    assert!(done.stderr.contains(", 36 gaps\n"), "{}", done.stderr);
     let done = bench.run("log 5 --sync 10ms --count 50 --summary - -o run.csv").exit(0);
     let summary = &done.json()[0];
     assert_eq!((&summary["syncs"], &summary["syncs_left_out"]), (&json!(50), &json!(0)));

@@ -86,6 +86,7 @@ fn a_full_disk() {
 fn what_was_received_is_handed_over_within_a_second() {
     // A reader that goes after the first line ends a recording of an hour at the next rows, on the real clock.
     use std::io::{BufRead, BufReader};
+    let begun = std::time::Instant::now();
     let bench = Bench::real("dps@127");
     let mut command = bench.traced(&["log", "127", "--duration", "1h"]);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
@@ -96,4 +97,6 @@ fn what_was_received_is_handed_over_within_a_second() {
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{stderr}");
     assert!(!stderr.contains("cangauge:") && !stderr.contains("warning"), "{stderr}");
+    // However busy the machine is: a block of rows takes a minute.
+    assert!(begun.elapsed() < std::time::Duration::from_secs(30), "{:?}", begun.elapsed());
 }

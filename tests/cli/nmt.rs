@@ -41,9 +41,12 @@ fn guarding_confirms_where_it_is_harmless() {
     );
     assert_eq!(done.frames_of("000"), ["0101", "0102", "0103", "017F"]);
     // The first RTR arms life guarding where 100Ch and 100Dh say so: then nobody asks.
-    let guarded = "[[device]]\nkind = \"d20\"\nnode = 2\nset = { \"0x100C\" = 100, \"0x100D\" = 3 }\n";
-    let done = Bench::described(guarded).run("nmt start 2").prints("2  -  none\n");
-    assert_eq!(done.frames_of("702"), ["00"], "the boot-up, and no RTR");
+    for (time, factor) in [(100, 3), (100, 0), (0, 3)] {
+        let set = format!("{{ \"0x100C\" = {time}, \"0x100D\" = {factor} }}");
+        let guarded = format!("[[device]]\nkind = \"d20\"\nnode = 2\nset = {set}\n");
+        let done = Bench::described(&guarded).run("nmt start 2").prints("2  -  none\n");
+        assert_eq!(done.frames_of("702"), ["00"], "the boot-up, and no RTR");
+    }
 }
 
 #[test]

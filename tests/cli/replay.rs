@@ -43,6 +43,48 @@ fn a_recording_without_its_beginning_needs_a_description() {
     assert_eq!(done.stdout.lines().count(), 21, "{}", done.stdout);
 }
 
+/// A recording of node 5, which another program asks for these objects; `None` is one that it does not have. Then it
+/// sends two INTEGER32 in TPDO1, 1234 and -5678.
+fn asked(objects: &[(u16, u8, Option<u32>)]) -> String {
+    let mut lines = String::new();
+    for (at, (index, sub, value)) in objects.iter().enumerate() {
+        let [low, high] = index.to_le_bytes();
+        let (command, word) = value.map_or((0x80, 0x0602_0000), |value| (0x43, value));
+        let word: String = word.to_le_bytes().iter().map(|byte| format!("{byte:02X}")).collect();
+        lines += &format!("(1700000000.{at:03}000) can0 605#40{low:02X}{high:02X}{sub:02X}00000000\n");
+        lines += &format!("(1700000000.{at:03}500) can0 585#{command:02X}{low:02X}{high:02X}{sub:02X}{word}\n");
+    }
+    lines + "(1700000001.000000) can0 185#D2040000D2E9FFFF\n"
+}
+
+#[test]
+fn each_channel_is_learned_with_its_own_digits_and_none_is_guessed() {
+    let bench = Bench::of("mh4@1");
+    let mut objects = vec![
+        (0x1800, 1, Some(0x185)),
+        (0x1a00, 0, Some(2)),
+        (0x1a00, 1, Some(0x9130_0120)),
+        (0x1a00, 2, Some(0x9130_0220)),
+        (0x6131, 1, Some(0x004e_0000)),
+        (0x6131, 2, Some(0x002d_0000)),
+        (0x6132, 1, Some(3)),
+    ];
+    let log = |objects: &[_]| {
+        fs::write(bench.path("t.log"), asked(objects)).expect("written");
+        replay(&bench, "t.log", "log 5")
+    };
+    let said = log(&objects).exit(2).stderr;
+    assert!(said.contains("its TPDOs come, and nothing told their mapping"), "{said}");
+    objects.push((0x6132, 2, Some(1)));
+    let done = log(&objects).exit(0);
+    let rows: Vec<&str> = done.stdout.lines().skip(1).map(|row| row.splitn(4, ',').last().unwrap_or(row)).collect();
+    assert_eq!(rows, ["ch1,1.234,bar,,0xD2040000", "ch2,-567.8,degC,,0xD2E9FFFF"]);
+    // Who has no such object has no digits.
+    objects[7].2 = None;
+    let done = log(&objects).exit(0);
+    assert!(done.stdout.ends_with("ch2,-5678,degC,,0xD2E9FFFF\n"), "{}", done.stdout);
+}
+
 #[test]
 fn nothing_can_be_sent_into_it() {
     let bench = Bench::of("mh4@1");

@@ -72,6 +72,14 @@ fn a_value_goes_out_as_its_type() {
 }
 
 #[test]
+fn what_was_acknowledged_and_is_not_kept_is_no_success() {
+    // HYDAC: a COB-ID of 0 stands for the default.
+    let bench = Bench::of("hydac@5");
+    let message = "0x1800:1 was acknowledged and reads 0x85010040 instead of 0x00000000";
+    bench.run("sdo write 5 0x1800:1 0 --verify").fails(6, &format!("cangauge: node 5: {message}\n"));
+}
+
+#[test]
 fn nothing_is_sent_of_a_value_that_does_not_fit() {
     let bench = Bench::of("mh4@5");
     for (value, why) in [

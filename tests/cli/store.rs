@@ -43,6 +43,19 @@ fn a_restore_without_reset_says_what_is_left_to_do() {
 }
 
 #[test]
+fn a_device_that_says_it_cannot_is_believed() {
+    // Bit 0: on command; bit 1: by itself.
+    let bench =
+        Bench::described("[[device]]\nkind = \"mh4\"\nnode = 5\nset = { \"0x1010:1\" = 2, \"0x1011:1\" = 0 }\n");
+    let why = "it stores by itself, and it does not store on command (0x1010:1 reads 0x00000002)";
+    let done = bench.run("store 5").fails(4, &format!("cangauge: node 5: {why}: nothing was stored\n"));
+    assert!(!done.frames_of("605").contains(&"2310100173617665"), "{:?}", done.frames);
+    let why = "it does not restore on command (0x1011:1 reads 0x00000000)";
+    let done = bench.run("restore 5").fails(4, &format!("cangauge: node 5: {why}: nothing was restored\n"));
+    assert!(!done.frames_of("605").contains(&"231110016C6F6164"), "{:?}", done.frames);
+}
+
+#[test]
 fn a_group_that_is_not_there_is_named() {
     Bench::of(ALL).run("store 127 --group comm").fails(
         4,

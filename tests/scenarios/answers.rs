@@ -1,5 +1,6 @@
 //! Late answers, and the answers that another client's requests bring: none may become ours.
 
+use cangauge::bus::Bus;
 use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
@@ -15,10 +16,16 @@ use std::time::Duration;
 const TIMEOUT: Duration = Duration::from_millis(100);
 
 /// A server that answers every read with a number that counts up, the n-th after its own delay.
-struct Slow {
+pub(super) struct Slow {
     delays: VecDeque<u64>,
     due: VecDeque<(Mono, Frame)>,
     answered: u8,
+}
+
+impl Slow {
+    pub(super) fn new(delays: &[u64]) -> Slow {
+        Slow { delays: delays.iter().copied().collect(), due: VecDeque::new(), answered: 0 }
+    }
 }
 
 impl Station for Slow {
@@ -59,7 +66,7 @@ fn reads(objects: &[u16], retries: u32, delays: &[u64]) -> Vec<Option<u64>> {
 /// The same where some of the frames that are sent, counted from 0, get lost.
 fn reads_without(objects: &[u16], retries: u32, delays: &[u64], lost: &[u64]) -> Vec<Option<u64>> {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
-    bus.attach(Slow { delays: delays.iter().copied().collect(), due: VecDeque::new(), answered: 0 });
+    bus.attach(Slow::new(delays));
     let mut bus = Faulty::new(bus, FaultPlan { lose_sent: lost.iter().copied().collect(), ..FaultPlan::default() });
     let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries });
     objects
@@ -140,4 +147,89 @@ fn the_acknowledge_of_another_clients_write_is_no_success_of_ours() {
     let request = Request::write(node(), ObjectId::new(0x2000, 0), vec![5], DownloadSize::Indicated);
     let error = master.transfer_one(request).expect("the bus works").expect_err("no success");
     assert_eq!(error.failure, SdoFailure::Ambiguous);
+}
+
+/// A server that begins a transfer in segments and falls silent, and what it hears.
+#[derive(Default)]
+struct Begun {
+    heard: Vec<String>,
+}
+
+impl Station for Begun {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+        self.heard.push(frame.to_string());
+        if frame.data().first() == Some(&0x40) {
+            out.send("585#4100200064000000".parse().expect("a frame"));
+        }
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+/// What a server that has begun hears last, of a read that ends at this time at the latest.
+fn last_heard(interrupt: Option<Duration>) -> String {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(Begun::default());
+    if let Some(moment) = interrupt {
+        bus.interrupt_at(Mono::START + moment);
+    }
+    let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 0 });
+    let ended = master.transfer_one(Request::read(node(), ObjectId::new(0x2000, 0)));
+    assert_eq!(ended.is_err(), interrupt.is_some());
+    master.settle();
+    // What has just been sent takes its time on the wire.
+    let _ = bus.receive(bus.now().mono + Duration::from_millis(10)).expect("the bus works");
+    let server = bus.stations::<Begun>().next().expect("it is there");
+    server.heard.last().expect("a request").clone()
+}
+
+#[test]
+fn a_server_that_has_begun_is_told_of_the_end() {
+    for interrupt in [None, Some(TIMEOUT / 2)] {
+        assert_eq!(last_heard(interrupt), "605#8000200000000405", "{interrupt:?}");
+    }
+}
+
+/// Somebody who sends one frame every 10 ms for two seconds.
+struct Chatter(Frame, Mono);
+
+impl Station for Chatter {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        if self.1 <= now {
+            out.send(self.0);
+            self.1 = now + Duration::from_millis(10);
+        }
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        Some(self.1).filter(|at| at.since_start() < Duration::from_secs(2))
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn no_other_frame_extends_the_wait() {
+    // TPDOs, heartbeats, requests of another client, and the answers to them.
+    for text in ["185#0000803F00", "705#05", "605#4001200000000000", "585#4301200001000000", "585#60012000"] {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(Chatter(text.parse().expect("a frame"), Mono::START + Duration::from_millis(1)));
+        let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 0 });
+        let error = master.transfer_one(Request::read(node(), ObjectId::new(0x2000, 0))).expect("the bus works");
+        let failure = error.expect_err("nobody answers").failure;
+        assert_eq!(failure, SdoFailure::NoAnswer { waited: TIMEOUT, begun: false }, "{text}");
+        assert!(master.now().since_start() < TIMEOUT + Duration::from_millis(20), "{text}: {:?}", master.now());
+    }
 }

@@ -28,13 +28,13 @@ fn node(id: u8) -> NodeId {
 }
 
 /// Somebody else on the bus, who sends what he was told and listens to nobody.
-struct Other {
+pub(super) struct Other {
     frames: VecDeque<(Mono, Frame)>,
 }
 
 impl Other {
     /// Frames with their times in milliseconds, in order.
-    fn new(frames: &[(u64, &str)]) -> Other {
+    pub(super) fn new(frames: &[(u64, &str)]) -> Other {
         let frames = frames.iter().map(|(time, text)| (at(*time), text.parse().expect("a frame")));
         Other { frames: frames.collect() }
     }
@@ -395,6 +395,14 @@ fn an_interface_that_goes_down_and_comes_back() {
     let links: Vec<_> = kept.notes.iter().filter(|note| matches!(note, Note::Link(_))).collect();
     assert_eq!(links, [&Note::Link(false), &Note::Link(true)]);
     assert_eq!(outcome.dropped, 7, "what was lost last is asked for at the end");
+}
+
+#[test]
+fn what_the_kernel_drops_is_counted() {
+    let (kept, outcome) = shaken(&[(1500, Event::Dropped(5)), (2500, Event::Dropped(30))]);
+    assert_eq!(outcome.dropped, 5 + 30 + 7);
+    let told: Vec<_> = kept.notes.iter().filter(|note| matches!(note, Note::Dropped(_))).collect();
+    assert_eq!(told, [&Note::Dropped(5), &Note::Dropped(30), &Note::Dropped(7)]);
 }
 
 #[test]

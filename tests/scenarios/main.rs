@@ -8,6 +8,7 @@ mod full_queue;
 mod garbage;
 mod log_goes_on;
 mod lss;
+mod nmt;
 mod pdo_map;
 mod pdo_map_devices;
 mod probe;

@@ -5,16 +5,23 @@ use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::device::catalog;
+use cangauge::device::description::Scalar;
 use cangauge::master::{Error, Master, Timing};
 use cangauge::sim::{Device, Setup};
 use cangauge::tasks::nmt::probe;
 use std::time::Duration;
 
-/// The heartbeat time that is left when the user asks to stop at these moments in ms; and whether the probe ended so.
+/// The heartbeat time that is left of none when the user asks to stop at these moments in ms; and whether the probe
+/// ended so.
 fn left(interrupts: &[u64]) -> (Vec<u8>, bool) {
+    left_of(0, interrupts)
+}
+
+fn left_of(before: i64, interrupts: &[u64]) -> (Vec<u8>, bool) {
     let node = NodeId::new(5).expect("a node-ID");
     let mut setup = Setup::new(catalog::by_name("mh4").expect("built in"), node);
     setup.oddities.latency = Duration::from_millis(40);
+    setup.set.push((ObjectId::new(0x1017, 0), Scalar::Integer(before)));
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(Device::new(setup).expect("a device"));
     interrupts.iter().for_each(|at| bus.interrupt_at(Mono::at(Duration::from_millis(*at))));
@@ -39,4 +46,6 @@ fn the_heartbeat_is_put_back_whenever_it_is_interrupted() {
         assert_eq!(left(&[at, at + 9, at + 30]).0, [0, 0], "three times from {at} ms");
     }
     assert_eq!(left(&[]), (vec![0, 0], false));
+    // One that is too slow to be waited for.
+    assert_eq!(left_of(10_000, &[]), (10_000u16.to_le_bytes().to_vec(), false));
 }

@@ -28,6 +28,8 @@ enum Mishap {
     Restarted,
     /// The device refuses it with this code instead of its answer.
     Refuse(u32),
+    /// The device acknowledges it and does nothing.
+    Pretend,
 }
 
 const MISHAPS: [Mishap; 5] =
@@ -40,6 +42,8 @@ struct Unlucky {
     sent: Vec<String>,
     /// What its answer becomes.
     refusal: Option<u32>,
+    /// What is acknowledged and never got there.
+    pretended: Option<Frame>,
     /// Answers still to be lost.
     deaf: bool,
     interrupted: bool,
@@ -50,7 +54,8 @@ impl Unlucky {
     fn of(kind: &str, settings: &str, at: Option<(usize, Mishap)>) -> Unlucky {
         let bench = format!("clock = \"virtual\"\n[[device]]\nkind = \"{kind}\"\nnode = 5\n{settings}");
         let inner = Bench::from_toml(&bench, Path::new("")).expect("a bench").open().expect("a bus");
-        Unlucky { inner, at, sent: Vec::new(), refusal: None, deaf: false, interrupted: false, restarts: false }
+        let (sent, refusal, pretended) = (Vec::new(), None, None);
+        Unlucky { inner, at, sent, refusal, pretended, deaf: false, interrupted: false, restarts: false }
     }
 
     /// How often this went out.
@@ -116,6 +121,11 @@ impl Bus for Unlucky {
                 Mishap::Restart => self.restarts = true,
                 Mishap::Restarted => self.reset(),
                 Mishap::Refuse(code) => self.refusal = Some(code),
+                Mishap::Pretend => {
+                    // A read has an answer, too.
+                    self.pretended = Some(*frame);
+                    return self.inner.send(&"605#4000100000000000".parse().expect("a frame"));
+                }
             },
             _ => {}
         }
@@ -135,6 +145,10 @@ impl Bus for Unlucky {
                     let [_, a, b, c, ..] = *received.frame.data() else { panic!("an answer has eight bytes") };
                     let bytes = [&[0x80, a, b, c], code.to_le_bytes().as_slice()].concat();
                     let frame = Frame::new(received.frame.id(), &bytes).expect("a frame");
+                    return Ok(Event::Frame(Received { frame, at: received.at }));
+                }
+                if let Some([_, a, b, c, ..]) = self.pretended.take().as_ref().map(Frame::data) {
+                    let frame = Frame::new(received.frame.id(), &[0x60, *a, *b, *c, 0, 0, 0, 0]).expect("a frame");
                     return Ok(Event::Frame(Received { frame, at: received.at }));
                 }
                 if std::mem::take(&mut self.deaf) {
@@ -294,18 +308,35 @@ fn what_is_told_as_stored_outlasts_a_reset() {
     }
 }
 
+fn load(bus: &mut Unlucky) -> Result<Done, Failure> {
+    with(bus, |master| {
+        let device = store::device(master, node(), &Default::default())?;
+        restore::restore(master, &device, Group::All, true)
+    })
+}
+
+#[test]
+fn a_signature_that_is_acknowledged_and_does_nothing() {
+    let mut bus = Unlucky::of("mh4", RUNS, None);
+    load(&mut bus).expect("restored");
+    let at = bus.sent.iter().position(|frame| frame.ends_with("6C6F6164")).expect("\"load\"");
+    let failure = load(&mut Unlucky::of("mh4", RUNS, Some((at, Mishap::Pretend)))).expect_err("nothing was restored");
+    assert_eq!(failure.kind, Kind::Unexpected);
+    assert!(failure.message.contains("restored and reset, but not as delivered"), "{failure}");
+    let mut bus = Unlucky::of("mh4", STILL, None);
+    zero(&mut bus, false).expect("zero");
+    let at = bus.sent.iter().position(|frame| frame.ends_with("7A65726F")).expect("\"zero\"");
+    let failure = zero(&mut Unlucky::of("mh4", STILL, Some((at, Mishap::Pretend))), false).expect_err("no zero");
+    assert_eq!(failure.kind, Kind::Unexpected);
+    assert!(failure.message.contains("it took the signature, and nothing has changed"), "{failure}");
+}
+
 #[test]
 fn what_is_told_as_restored_is_as_delivered() {
-    let run = |bus: &mut Unlucky| {
-        with(bus, |master| {
-            let device = store::device(master, node(), &Default::default())?;
-            restore::restore(master, &device, Group::All, true)
-        })
-    };
-    let count = frames(|bus| drop(run(bus)), "mh4", RUNS);
+    let count = frames(|bus| drop(load(bus)), "mh4", RUNS);
     for (at, mishap) in (0..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
         let mut bus = Unlucky::of("mh4", RUNS, Some((at, mishap)));
-        let result = run(&mut bus);
+        let result = load(&mut bus);
         let place = format!("{mishap:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
         assert!(bus.count("6C6F6164") <= 1, "{place}");
         match result {

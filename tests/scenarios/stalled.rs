@@ -2,12 +2,16 @@
 //! had been there, and makes up for nothing that cannot be made up for.
 
 use super::Kept;
-use cangauge::bus::memory::MemoryBus;
+use super::answers::Slow;
+use super::log_goes_on::Other;
+use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::bus::time::{Mono, Stamp};
 use cangauge::bus::{Bus, BusError, Event, Filters, TimestampSource};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
-use cangauge::master::{Master, Timing};
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::value::{DataType, Value};
+use cangauge::master::{Happening, Master, SdoError, SdoFailure, Timing};
 use cangauge::sim::Bench;
 use cangauge::tasks::log::{Mode, Plan, log};
 use std::collections::{BTreeMap, VecDeque};
@@ -87,6 +91,10 @@ impl Bus for Stalled {
 
 fn stalled(text: &str, milliseconds: Range<u64>, stopped: bool) -> Stalled {
     let inner = Bench::from_toml(text, Path::new("")).expect("a bench").open().expect("a bus");
+    away(inner, milliseconds, stopped)
+}
+
+fn away(inner: MemoryBus, milliseconds: Range<u64>, stopped: bool) -> Stalled {
     let at = |milliseconds| Mono::at(Duration::from_millis(milliseconds));
     let (from, until) = (at(milliseconds.start), at(milliseconds.end));
     Stalled { inner, from, until, waiting: VecDeque::new(), stopped, syncs: Vec::new() }
@@ -140,4 +148,33 @@ fn what_came_before_the_end_is_recorded_whatever_its_time_says() {
     let late = kept.rows.iter().filter(|row| row.starts_with("1603000,"));
     assert!((5..=6).contains(&late.count()), "{:?}", kept.rows);
     assert!(bus.inner.now().mono < Mono::at(Duration::from_millis(1700)), "and nothing is waited for");
+}
+
+/// What the object 2000h of node 5 reads.
+fn read(master: &mut Master<'_>) -> Result<Option<u64>, SdoError> {
+    let node = NodeId::new(5).expect("a node-ID");
+    let value = master.read(node, ObjectId::new(0x2000, 0), DataType::Unsigned(4)).expect("the bus works");
+    value.as_ref().map(Value::as_u64).map_err(Clone::clone)
+}
+
+#[test]
+fn what_was_received_before_the_question_is_no_answer() {
+    let mut inner = MemoryBus::new(Clock::Virtual);
+    inner.attach(Slow::new(&[1]));
+    inner.attach(Other::new(&[(20, "705#05"), (30, "585#4300200063000000")]));
+    let mut bus = away(inner, 0..500, false);
+    let mut master = Master::new(&mut bus, Timing::default());
+    let first = master.next(Mono::at(Duration::from_secs(1))).expect("the bus works");
+    assert!(matches!(first, Happening::Frame(_)), "{first:?}: one waits still");
+    assert_eq!(read(&mut master).expect("an answer"), Some(1), "and not 99");
+}
+
+#[test]
+fn an_answer_that_came_too_late_is_late_whenever_it_is_read() {
+    let mut inner = MemoryBus::new(Clock::Virtual);
+    inner.attach(Slow::new(&[150]));
+    let mut bus = away(inner, 0..500, false);
+    let timeout = Duration::from_millis(100);
+    let error = read(&mut Master::new(&mut bus, Timing { timeout, retries: 0 })).expect_err("no answer in time");
+    assert_eq!(error.failure, SdoFailure::NoAnswer { waited: timeout, begun: false });
 }

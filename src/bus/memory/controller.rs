@@ -97,3 +97,24 @@ impl Controller {
         *self = Controller { waits_until: Some(now + bit_time(RECOVERY_BITS, bit_rate)), ..Controller::default() };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_is_alone_gets_passive_and_who_is_disturbed_switches_off() {
+        let mut alone = Controller::default();
+        (0..1000).for_each(|_| alone.transmitted(Outcome::Unacknowledged));
+        assert_eq!(alone.level(), Level::Passive);
+        let mut disturbed = Controller::default();
+        let levels = [(12, Level::Warning), (16, Level::Passive), (32, Level::Off)];
+        let mut sent = 0;
+        for (count, level) in levels {
+            assert!(disturbed.level() < level);
+            (sent..count).for_each(|_| disturbed.transmitted(Outcome::Disturbed));
+            assert_eq!(disturbed.level(), level, "after {count}");
+            sent = count;
+        }
+    }
+}

@@ -397,14 +397,25 @@ mod tests {
             let target = Target::Stream(Box::new(Small(9)));
             let mut sink =
                 if queued { Sink::queued(target, None, 1000).expect("a thread") } else { Sink::direct(target, None) };
-            // 4 + 4 + 1 bytes of 12 fit: two rows of three; the head is none.
-            let mut kinds = vec![sink.head(false, b"hea\n".to_vec()), put(&mut sink, "aaa\nbbb\n")];
-            kinds.push(put(&mut sink, "ccc\n"));
+            // 4 + 4 + 1 bytes of 20 fit: the head, which is no row, and one row of four.
+            let mut kinds = vec![sink.head(false, b"hea\n".to_vec()), put(&mut sink, "aaa\nbbb\nccc\n")];
+            kinds.push(put(&mut sink, "ddd\n"));
             kinds.push(sink.finish(&mut || false));
             let failed: Vec<io::ErrorKind> = kinds.into_iter().filter_map(|kind| Some(kind.err()?.kind())).collect();
             assert_eq!(failed, [io::ErrorKind::StorageFull], "said once");
-            assert_eq!(sink.lost(), 2, "one did not fit, one came later");
+            assert_eq!(sink.lost(), 3, "two did not fit, one came later");
         }
+    }
+
+    #[test]
+    fn a_row_that_was_written_in_part_is_taken_back() {
+        let mut file = tempfile::tempfile().expect("a file");
+        file.write_all(b"head\naaa\nbb").expect("written");
+        let mut target = Target::File { file: file.try_clone().expect("a file"), keep: 0 };
+        assert_eq!(cut(&mut target, b"aaa\nbbb\n", 6), 4);
+        assert_eq!(file.metadata().expect("a file").len(), 9, "head and the first row");
+        assert_eq!(cut(&mut target, b"ccc\n", 0), 0);
+        assert_eq!(file.metadata().expect("a file").len(), 9);
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! Devices that lose answers, refuse, and do not come back.
 
 use super::{Held, Wanted, all_held, bus, id, run};
+use cangauge::bus::memory::{Outbox, Station};
+use cangauge::bus::time::Mono;
+use cangauge::canopen::frame::Frame;
 use cangauge::tasks::Kind;
 use cangauge::tasks::lss::{Rate, Via};
 
@@ -106,6 +109,42 @@ fn one_that_does_not_come_back() {
     assert!(done.failure().1.contains("node-ID 12 configured, stored"), "{}", done.failure().1);
     let hint = done.result.unwrap_err().hint.unwrap();
     assert!(hint.contains("power it off and on"), "{hint}");
+}
+
+/// A device that has been at node 12 all along and says so when it hears a reset of node 5.
+struct Newcomer {
+    awake: bool,
+}
+
+impl Station for Newcomer {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+        if frame.to_string() == "000#8105" {
+            self.awake = true;
+            out.send("70C#00".parse().unwrap());
+        }
+        if let ("60C", [0x40, a, b, sub, ..], true) = (&*frame.id().to_string(), frame.data(), self.awake) {
+            out.send(format!("58C#43{a:02X}{b:02X}{sub:02X}0{sub}000000").parse().unwrap());
+        }
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn another_one_that_shows_itself_in_its_place() {
+    let mut bus = bus(&bench("mh4", ", gone_after = ['reset']"));
+    bus.attach(Newcomer { awake: false });
+    let done = run(&mut bus, "5", &id(12));
+    assert_eq!(done.failure().0, Kind::Unexpected);
+    assert!(done.failure().1.contains("0x1:0x2:0x3:4 answers there, another device"), "{}", done.failure().1);
 }
 
 #[test]

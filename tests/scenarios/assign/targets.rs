@@ -1,12 +1,17 @@
 //! Who is meant, and that it is nobody else.
 
-use super::{Wanted, all_held, bus, id, run};
+use super::{Wanted, all_held, bus, id, node, run};
+use cangauge::bus::faults::{FaultPlan, Faulty};
+use cangauge::bus::memory::{Outbox, Station};
+use cangauge::bus::time::Mono;
+use cangauge::canopen::frame::Frame;
 use cangauge::device::assign::spoken_rate;
 use cangauge::master::{Master, Timing};
 use cangauge::measure::survey::Overrides;
-use cangauge::sim::Device;
+use cangauge::sim::{Device, State};
 use cangauge::tasks::Kind;
-use cangauge::tasks::lss::{Confirmed, Target, Via, store};
+use cangauge::tasks::lss::{Confirmed, Job, Rate, Target, Via, assign, store};
+use std::collections::BTreeSet;
 
 const ALL: &str = "device = [
     { kind = 'mh4', node = 1 }, { kind = 'd20', node = 2 }, { kind = 'mc1609', node = 3 }, { kind = 'dps', node = 127 },
@@ -54,6 +59,66 @@ fn a_node_id_that_is_taken_is_refused() {
         assert!(done.failure().1.contains("node-ID 3 is taken"), "{}", done.failure().1);
     }
     assert_eq!(all_held(&bus), before);
+}
+
+#[test]
+fn a_lost_frame_makes_no_node_id_free() {
+    let bench = "device = [{ kind = 'mh4', node = 5 }, { kind = 'dps', node = 12 }]";
+    let overrides = Overrides::new();
+    let job = Job {
+        target: "5".parse().unwrap(),
+        id: Some(node(12)),
+        rate: None,
+        store: true,
+        retime: false,
+        via: Via::Auto,
+        force: false,
+        overrides: &overrides,
+        given: None,
+    };
+    // More frames than it takes.
+    for lost in 0..150 {
+        let mut bus = Faulty::new(bus(bench), FaultPlan { lose: BTreeSet::from([lost]), ..FaultPlan::default() });
+        let before = all_held(bus.inner());
+        let result = assign(&mut Master::new(&mut bus, Timing::default()), &job, &mut |_| {});
+        assert!(result.is_err(), "{lost}");
+        assert_eq!(all_held(bus.inner()), before, "{lost}");
+    }
+}
+
+/// Two devices under one node-ID of which now the one and now the other is the first: another serial number each time.
+#[derive(Default)]
+struct Changeling {
+    reads: u8,
+}
+
+impl Station for Changeling {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+        if let ("605", [0x40, a, b, sub, ..]) = (&*frame.id().to_string(), frame.data()) {
+            self.reads += u8::from(*sub == 4);
+            let number = if *sub == 4 { self.reads } else { *sub };
+            out.send(format!("585#43{a:02X}{b:02X}{sub:02X}{number:02X}000000").parse().unwrap());
+        }
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn answers_that_differ_from_one_time_to_the_next() {
+    let mut bus = bus("device = [{ kind = 'mh4', node = 6 }]");
+    bus.attach(Changeling::default());
+    let done = run(&mut bus, "5", &id(12));
+    assert_eq!(done.failure().0, Kind::CheckFailed);
+    assert!(done.failure().1.contains("its answers differ from one time to the next"), "{}", done.failure().1);
 }
 
 #[test]
@@ -210,6 +275,14 @@ fn two_devices_with_one_identity() {
         assert!(done.failure().1.ends_with("nothing was changed"), "{}", done.failure().1);
     }
     assert_eq!(all_held(&bus), before);
+    // Those whose LSS tells no node-ID (5Eh).
+    for kind in ["dps", "d20"] {
+        let twin = |node: u8| format!("{{ kind = '{kind}', node = {node}, serial = 7 }}");
+        let mut bus = super::bus(&format!("device = [{}, {}]", twin(5), twin(6)));
+        let before = all_held(&bus);
+        assert_eq!(run(&mut bus, "5", &id(12)).failure().0, Kind::CheckFailed, "{kind}");
+        assert_eq!(all_held(&bus), before, "{kind}");
+    }
     // One of them has no node-ID, so that SDO does not show it: both answer to their address.
     let mut bus = super::bus("device = [{ kind = 'mh4', node = 5, serial = 7 }, { kind = 'mh4', serial = 7 }]");
     let before = all_held(&bus);
@@ -254,6 +327,19 @@ fn objects_that_cannot_be_set_for_a_while_are_not_touched() {
         assert!(message.contains(why) && message.contains("nothing was changed"), "{failure:?} {message}");
         assert_eq!(all_held(&bus), expected);
         assert!(!done.warns("1010h:1"), "{:?}", done.notes);
+    }
+}
+
+#[test]
+fn a_state_that_lss_wanted_otherwise_is_put_back() {
+    // The DPS takes part in PRE-OPERATIONAL, the D-20-9 in STOPPED; a bit rate alone ends in no reset.
+    for kind in ["dps", "d20"] {
+        let device = format!("{{ kind = '{kind}', node = 5, start = true, set = {{ '0x1017' = 100 }} }}");
+        let mut bus = bus(&format!("device = [{device}]"));
+        let wanted = Wanted { rate: Some(Rate::Bits(500_000)), ..Wanted::default() };
+        run(&mut bus, "5", &wanted).result.unwrap();
+        let device: &Device = bus.stations().next().unwrap();
+        assert_eq!(device.state(), Some(State::Operational), "{kind}");
     }
 }
 

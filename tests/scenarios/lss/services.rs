@@ -334,3 +334,12 @@ fn half_a_number_is_no_number() {
     });
     assert!(matches!(result, Err(LssError::Violation { violation: Violation::Short, .. })));
 }
+
+#[test]
+fn one_answer_beside_a_collision_is_not_one() {
+    let gathered = |faults: &[Fault]| Gathered { answers: vec![1], crowded: false, faults: faults.to_vec() };
+    assert!(gathered(&[]).is_one() && gathered(&[Fault::NoAcknowledge]).is_one());
+    for fault in [Fault::Protocol, Fault::ErrorWarning, Fault::ErrorPassive, Fault::BusOff, Fault::Other] {
+        assert!(!gathered(&[fault]).is_one(), "{fault:?}");
+    }
+}

@@ -1,0 +1,143 @@
+//! NMT commands to nodes that do not do as they are told, or later.
+
+use super::log_goes_on::Other;
+use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
+use cangauge::bus::{Bus, BusError, Event, Filters, Mono, Stamp, TimestampSource};
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::nmt::{NmtCommand, NmtState};
+use cangauge::master::{Master, Timing};
+use cangauge::sim::Bench;
+use cangauge::tasks::nmt::{By, Report, command, states};
+use std::path::Path;
+use std::time::Duration;
+
+/// A node in OPERATIONAL with a heartbeat every 100 ms, which obeys nothing but what it is told `obeys`, and that only
+/// after 250 ms.
+struct Slow {
+    obeys: Option<Frame>,
+    beat: Mono,
+    stops: Option<Mono>,
+}
+
+const PERIOD: Duration = Duration::from_millis(100);
+
+impl Station for Slow {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
+        match frame.data() {
+            [0x40, 0x17, 0x10, ..] => out.send("585#4B17100064000000".parse().unwrap()),
+            [0x40, a, b, c, ..] => out.send(format!("585#80{a:02X}{b:02X}{c:02X}00000206").parse().unwrap()),
+            _ if self.obeys == Some(*frame) => self.stops = Some(now + Duration::from_millis(250)),
+            _ => {}
+        }
+    }
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        if self.beat <= now {
+            let has_stopped = self.stops.is_some_and(|at| at <= now);
+            out.send(if has_stopped { "705#04" } else { "705#05" }.parse().unwrap());
+            self.beat = now + PERIOD;
+        }
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        Some(self.beat)
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+fn node() -> NodeId {
+    NodeId::new(5).unwrap()
+}
+
+/// What comes of a command to a node that obeys this frame and no other.
+fn told(what: NmtCommand, obeys: Option<&str>) -> Report {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    let obeys = obeys.map(|text| text.parse().unwrap());
+    bus.attach(Slow { obeys, beat: Mono::START + PERIOD, stops: None });
+    let mut master = Master::new(&mut bus, Timing::default());
+    command(&mut master, what, &[node()], false).unwrap()[0]
+}
+
+#[test]
+fn a_heartbeat_of_the_node_as_it_was_confirms_nothing() {
+    for reset in [NmtCommand::ResetNode, NmtCommand::ResetCommunication] {
+        assert_eq!(told(reset, None), Report { node: node(), state: None, by: By::None, present: true });
+    }
+    let operational = Some(NmtState::Operational);
+    let still = Report { node: node(), state: operational, by: By::Heartbeat, present: true };
+    assert_eq!(told(NmtCommand::Stop, None), still);
+}
+
+#[test]
+fn heartbeats_from_before_it_obeys_are_waited_over() {
+    let report = told(NmtCommand::Stop, Some("000#0205"));
+    let stopped = Some(NmtState::Stopped);
+    assert_eq!(report, Report { node: node(), state: stopped, by: By::Heartbeat, present: true });
+}
+
+#[test]
+fn who_was_never_there_is_not_stopped() {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    // Somebody acknowledges.
+    bus.attach(Slow { obeys: None, beat: Mono::START + PERIOD, stops: None });
+    let other = NodeId::new(9).unwrap();
+    let mut master = Master::new(&mut bus, Timing::default());
+    let reports = command(&mut master, NmtCommand::Stop, &[other], false).unwrap();
+    assert_eq!(reports, [Report { node: other, state: None, by: By::None, present: false }]);
+}
+
+#[test]
+fn a_node_that_somebody_else_guards_is_not_guarded() {
+    let bench = "clock = 'virtual'\n[[device]]\nkind = 'd20'\nnode = 5\n";
+    for period in [None, Some(10), Some(150)] {
+        let mut bus = Bench::from_toml(bench, Path::new("")).unwrap().open().unwrap();
+        let asks: Vec<(u64, &str)> = (0..1000).filter_map(|n| Some((period? * n + 1, "705#R1"))).collect();
+        bus.attach(Other::new(&asks));
+        let mut bus = Counting { bus, asked: 0 };
+        let mut master = Master::new(&mut bus, Timing::default());
+        let state = states(&mut master, &[node()]).unwrap()[0].state;
+        assert_eq!(state, Some(NmtState::PreOperational), "{period:?}");
+        assert_eq!(bus.asked, u32::from(period.is_none()), "{period:?}");
+    }
+}
+
+/// Counts the remote frames that are sent.
+struct Counting {
+    bus: MemoryBus,
+    asked: u32,
+}
+
+impl Bus for Counting {
+    fn name(&self) -> &str {
+        self.bus.name()
+    }
+
+    fn bit_rate(&self) -> Option<u32> {
+        self.bus.bit_rate()
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        self.bus.timestamps()
+    }
+
+    fn now(&self) -> Stamp {
+        self.bus.now()
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        self.bus.listen(filters)
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.asked += u32::from(frame.is_remote());
+        self.bus.send(frame)
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        self.bus.receive(deadline)
+    }
+}
