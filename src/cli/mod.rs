@@ -273,8 +273,11 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
     }
 }
 
-/// The commands by name, each with what gives it its arguments: one is made up without the others.
-const ARGUMENTS: [(&str, fn(clap::Command) -> clap::Command); 20] = [
+/// Gives a command its arguments.
+type Augment = fn(clap::Command) -> clap::Command;
+
+/// The commands by name: one is made up without the others.
+const ARGUMENTS: [(&str, Augment); 20] = [
     ("scan", scan::Scan::augment_args),
     ("read", read::Read::augment_args),
     ("nmt", nmt::Nmt::augment_args),
