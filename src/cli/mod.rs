@@ -273,6 +273,33 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
     }
 }
 
+/// Gives a command its arguments.
+type Augment = fn(clap::Command) -> clap::Command;
+
+/// The commands by name: one is made up without the others.
+const ARGUMENTS: [(&str, Augment); 20] = [
+    ("scan", scan::Scan::augment_args),
+    ("read", read::Read::augment_args),
+    ("nmt", nmt::Nmt::augment_args),
+    ("sdo", sdo::Sdo::augment_args),
+    ("log", log::Log::augment_args),
+    ("check", check::Check::augment_args),
+    ("lss", lss::LssCommand::augment_args),
+    ("info", info::Info::augment_args),
+    ("unit", unit::Unit::augment_args),
+    ("filter", filter::Filter::augment_args),
+    ("limits", limits::Limits::augment_args),
+    ("minmax", minmax::Minmax::augment_args),
+    ("errors", errors::Errors::augment_args),
+    ("bus", bus::BusCommand::augment_args),
+    ("pdo", pdo::Pdo::augment_args),
+    ("autozero", autozero::Autozero::augment_args),
+    ("store", store::Store::augment_args),
+    ("restore", store::Restore::augment_args),
+    ("sim", sim::Sim::augment_args),
+    ("completions", completions::Completions::augment_args),
+];
+
 impl Command {
     /// What it does not share with another cangauge while it runs.
     fn claim(&self) -> Claim {

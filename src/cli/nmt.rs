@@ -29,6 +29,7 @@ pub(crate) struct Nmt {
 }
 
 #[derive(Debug, Subcommand)]
+#[command(defer = true)]
 enum Action {
     /// To OPERATIONAL: the nodes send their TPDOs
     Start(Targets),

@@ -2,10 +2,10 @@
 //!
 //! A script starts the program for every single value, so its start counts. Most of it was the tree of all
 //! commands with all their arguments and the global options copied to each. Hence the arguments of a command
-//! are made up when it is chosen (`defer`), and only the one that is named takes part at all.
+//! are made up when it is chosen (`defer`), and only the one that is named is made up at all.
 
-use super::Cli;
-use clap::{Command, CommandFactory, FromArgMatches};
+use super::{ARGUMENTS, Cli, Global};
+use clap::{Args, Command, CommandFactory, FromArgMatches};
 use std::ffi::OsString;
 
 /// Parses the words of a command line; the first is the program's name.
@@ -13,25 +13,32 @@ use std::ffi::OsString;
 /// # Errors
 /// What is wrong with them, or help or version that were asked for.
 pub fn parse(words: Vec<OsString>) -> Result<Cli, clap::Error> {
-    match narrowed(Cli::command(), &words).try_get_matches_from(&words) {
-        Ok(matches) => Cli::from_arg_matches(&matches),
-        // What is not well is told by the whole tree: it knows the nearest command, and the usage of all.
-        Err(_) => Cli::command().try_get_matches_from(words).and_then(|matches| Cli::from_arg_matches(&matches)),
+    if let Some(mut narrowed) = narrowed(&words) {
+        let matches = narrowed.try_get_matches_from_mut(&words);
+        // The program ends soon: taking the tree to pieces would cost as much as some of its building.
+        std::mem::forget(narrowed);
+        if let Ok(mut matches) = matches {
+            let cli = Cli::from_arg_matches_mut(&mut matches);
+            std::mem::forget(matches);
+            return cli;
+        }
     }
+    // What is not well is told by the whole tree: it knows the nearest command, and the usage of all.
+    Cli::command().try_get_matches_from(words).and_then(|mut matches| Cli::from_arg_matches_mut(&mut matches))
 }
 
 /// The same program with only the command that the first word names that names any. What it accepts, the whole
 /// program accepts alike: where that word is the value of an option, the true command is not known here, and
 /// the whole tree is asked.
-fn narrowed(whole: Command, words: &[OsString]) -> Command {
-    let named = |word: &OsString| whole.get_subcommands().find(|command| word.as_os_str() == command.get_name());
-    Command::new("cangauge")
+fn narrowed(words: &[OsString]) -> Option<Command> {
+    let named = |word: &OsString| ARGUMENTS.iter().find(|(name, _)| word == name);
+    let (name, arguments) = words.iter().skip(1).find_map(named)?;
+    let program = Command::new("cangauge")
         .subcommand_required(true)
         .disable_help_subcommand(true)
         .disable_version_flag(true)
-        .disable_help_flag(true)
-        .args(whole.get_arguments())
-        .subcommands(words.iter().skip(1).find_map(named))
+        .disable_help_flag(true);
+    Some(Global::augment_args(program).subcommand(arguments(Command::new(name))))
 }
 
 #[cfg(test)]
@@ -55,6 +62,20 @@ mod tests {
             let whole = Cli::from_arg_matches(&whole).unwrap();
             let narrowed = parse(words(line)).unwrap();
             assert_eq!(format!("{narrowed:?}"), format!("{whole:?}"), "{line}");
+        }
+    }
+
+    #[test]
+    fn every_command_can_be_made_up_without_the_others() {
+        let mut root = Cli::command();
+        root.build();
+        let named: Vec<&str> = root.get_subcommands().map(Command::get_name).filter(|&name| name != "help").collect();
+        assert_eq!(ARGUMENTS.map(|(name, _)| name).to_vec(), named);
+        for (name, arguments) in ARGUMENTS {
+            let alone = arguments(Command::new(name));
+            let whole = root.find_subcommand(name).unwrap();
+            let about = |command: &Command| command.get_about().map(ToString::to_string);
+            assert_eq!(about(&alone), about(whole), "{name}");
         }
     }
 

@@ -29,6 +29,7 @@ pub(crate) struct Pdo {
 }
 
 #[derive(Debug, Subcommand)]
+#[command(defer = true)]
 enum Action {
     /// Show how the TPDOs are set up
     Show(ShowArgs),

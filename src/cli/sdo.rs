@@ -33,6 +33,7 @@ pub(crate) struct Sdo {
 }
 
 #[derive(Debug, Subcommand)]
+#[command(defer = true)]
 enum Action {
     /// Read objects: the value as it is, never scaled; several print "OBJECT VALUE" lines
     Read(ReadArgs),

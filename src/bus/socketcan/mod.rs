@@ -27,7 +27,7 @@ pub use setup::{Change, bring_down, bring_up, link};
 use socket::Bound;
 use socketcan::{CanFrame, CanSocket, Socket};
 use std::cell::Cell;
-use std::collections::{HashSet, VecDeque};
+use std::collections::{BTreeSet, VecDeque};
 use std::io;
 use std::os::fd::AsFd;
 use std::time::{Duration, Instant};
@@ -66,7 +66,7 @@ pub struct SocketCan {
     /// What is wanted, for another socket.
     filters: Filters,
     /// The identifiers wanted, where they are too many for the kernel.
-    wanted: Option<HashSet<CanId>>,
+    wanted: Option<BTreeSet<CanId>>,
     timestamps: TimestampSource,
     /// Asked for once while the interface stays up: it costs some system calls.
     bit_rate: Cell<Option<Option<u32>>>,

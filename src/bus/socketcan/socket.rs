@@ -3,7 +3,7 @@
 use crate::bus::{BusError, Filters, ReceiveBuffer, TimestampSource};
 use crate::canopen::id::CanId;
 use socketcan::{CanAddr, CanSocket, Socket, SocketOptions};
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
 use std::time::Duration;
@@ -18,7 +18,7 @@ const RECEIVE_BUFFER: i32 = 16 << 20;
 pub(super) struct Bound {
     pub(super) socket: CanSocket,
     /// The identifiers wanted, where they are too many for the kernel.
-    pub(super) wanted: Option<HashSet<CanId>>,
+    pub(super) wanted: Option<BTreeSet<CanId>>,
     /// Where the times of its frames come from, until the interface tells its own.
     pub(super) timestamps: TimestampSource,
 }
@@ -68,8 +68,8 @@ fn new(limit: Duration) -> Result<CanSocket, BusError> {
 }
 
 /// Tells the kernel which frames are wanted. The identifiers are returned where they are too many for it.
-pub(super) fn set_filters(socket: &CanSocket, filters: &Filters) -> io::Result<Option<HashSet<CanId>>> {
-    let ids: HashSet<CanId> = match filters {
+pub(super) fn set_filters(socket: &CanSocket, filters: &Filters) -> io::Result<Option<BTreeSet<CanId>>> {
+    let ids: BTreeSet<CanId> = match filters {
         Filters::All => return socket.set_filter_accept_all().map(|()| None),
         Filters::Only(ids) => ids.iter().copied().collect(),
     };
