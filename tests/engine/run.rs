@@ -8,7 +8,7 @@ use crate::tap::{Passed, Tap};
 use crate::time::bound;
 use cangauge::bus::faults::Faulty;
 use cangauge::bus::memory::MemoryBus;
-use cangauge::bus::{Bus, Event, Mono};
+use cangauge::bus::{Bus, Event, Filters, Mono};
 use cangauge::canopen::frame::Frame;
 use cangauge::sim::Recorder;
 use cangauge::tasks::Failure;
@@ -105,6 +105,8 @@ pub(crate) fn run(spec: &Spec) -> Run {
         killed = Some(Killed { frames, before, after: after.clone() });
         before = after;
         bus = bus.anew(begun + bound);
+        // A program that starts wants every frame.
+        bus.listen(&Filters::All).expect("it can always listen");
         heard = Heard::default();
         result = carry_out(&mut bus, spec, &mut heard);
     }
