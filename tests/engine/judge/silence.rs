@@ -65,7 +65,7 @@ fn begins(frame: &Frame) -> Option<ObjectId> {
     begins.then(|| ObjectId::from_multiplexer([data[1], data[2], data[3]]))
 }
 
-/// Nothing came to the last question, if that is what is said.
+/// Something was asked to which nothing came, if that is what is said.
 fn was_silent(spec: &Spec, run: &Run, failure: &Failure, broken: &mut Vec<Broken>) {
     let (Some(node), Some(object)) = (failure.node, failure.object) else { return };
     if failure.message.contains("in the middle") {
@@ -79,15 +79,15 @@ fn was_silent(spec: &Spec, run: &Run, failure: &Failure, broken: &mut Vec<Broken
     };
     let requests = run.bus.all_sent().into_iter().filter_map(|(at, frame)| Some((at, asks(&frame)?)));
     let requests: Vec<(Mono, (ObjectId, bool))> = requests.collect();
-    let Some(last) = requests.iter().rposition(|(_, (_, is_it))| *is_it) else {
+    let Some(first) = requests.iter().position(|(_, (_, is_it))| *is_it) else {
         if !(run.bus.was_down || run.bus.was_off || spec.faults.iter().any(is_full)) {
             broken.push(("names the cause", format!("never asked: {failure}")));
         }
         return;
     };
-    // Before an object is asked for again, another one is read, so that no old answer is taken for a new one. That
-    // one may have been silent, too.
-    let answered = requests[last..].iter().all(|(at, (object, _))| {
+    // Before an object is asked for again, another one is read, so that no old answer is taken for a new one: that
+    // may be what was silent.
+    let answered = requests[first..].iter().all(|(at, (object, _))| {
         let until = *at + Duration::from_millis(spec.timeout_ms);
         let mut received = run.bus.frames.iter();
         received.any(|(came, passed)| {
