@@ -12,7 +12,8 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     let tap = &run.bus;
     if tap.interrupted && !tap.was_down && !tap.was_off {
         // What went wrong before the interruption may be the reason.
-        if failure.kind == Kind::Bus {
+        let was_full = spec.faults.iter().any(|fault| matches!(fault, Fault::Full { .. }));
+        if failure.kind == Kind::Bus && !was_full {
             broken.push(("names the cause", format!("interrupted: {}", told())));
         }
         let quiet = spec.faults.is_empty() && spec.others.is_empty() && spec.vagaries().next().is_none();

@@ -55,6 +55,11 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], b
                 if stops && fails {
                     continue;
                 }
+                // On a wire that somebody disturbs the command itself comes late, and a heartbeat from before it after it.
+                let late = spec.devices.iter().any(|device| device.bit_rate.is_some());
+                if late && matches!(command, Command::Nmt { what, .. } if what.target() != *state) {
+                    continue;
+                }
                 let really = after.iter().find(|holds| holds.node == Some(*node)).and_then(|holds| holds.state);
                 let right = matches!(
                     (state, really),
