@@ -4,7 +4,7 @@
 use super::Kept;
 use cangauge::bus::memory::{MemoryBus, Outbox, Station};
 use cangauge::bus::time::{Mono, Stamp};
-use cangauge::bus::{Bus, BusError, Event, Fault, Filters, Received, TimestampSource};
+use cangauge::bus::{Bus, BusError, Event, Fault, Received};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::nmt::NmtState;
@@ -319,25 +319,7 @@ impl Shaky {
 }
 
 impl Bus for Shaky {
-    fn name(&self) -> &str {
-        self.inner.name()
-    }
-
-    fn bit_rate(&self) -> Option<u32> {
-        self.inner.bit_rate()
-    }
-
-    fn timestamps(&self) -> TimestampSource {
-        self.inner.timestamps()
-    }
-
-    fn now(&self) -> Stamp {
-        self.inner.now()
-    }
-
-    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.inner.listen(filters)
-    }
+    crate::as_the_bus_inside!(inner);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         if self.up { self.inner.send(frame) } else { Err(BusError::Down(self.name().to_owned())) }

@@ -2,7 +2,7 @@
 
 use super::log_goes_on::Other;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
-use cangauge::bus::{Bus, BusError, Event, Filters, Mono, Stamp, TimestampSource};
+use cangauge::bus::{Bus, BusError, Event, Mono};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::nmt::{NmtCommand, NmtState};
@@ -112,25 +112,7 @@ struct Counting {
 }
 
 impl Bus for Counting {
-    fn name(&self) -> &str {
-        self.bus.name()
-    }
-
-    fn bit_rate(&self) -> Option<u32> {
-        self.bus.bit_rate()
-    }
-
-    fn timestamps(&self) -> TimestampSource {
-        self.bus.timestamps()
-    }
-
-    fn now(&self) -> Stamp {
-        self.bus.now()
-    }
-
-    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.bus.listen(filters)
-    }
+    crate::as_the_bus_inside!(bus);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         self.asked += u32::from(frame.is_remote());

@@ -2,7 +2,7 @@
 //! mapping or the new one, and what is said is what it holds.
 
 use cangauge::bus::memory::{Clock, MemoryBus};
-use cangauge::bus::{Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource};
+use cangauge::bus::{Bus, BusError, Event, Mono, Received};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
@@ -79,25 +79,7 @@ impl Meddler {
 }
 
 impl Bus for Meddler {
-    fn name(&self) -> &str {
-        "meddler"
-    }
-
-    fn bit_rate(&self) -> Option<u32> {
-        self.bus.bit_rate()
-    }
-
-    fn timestamps(&self) -> TimestampSource {
-        self.bus.timestamps()
-    }
-
-    fn now(&self) -> Stamp {
-        self.bus.now()
-    }
-
-    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.bus.listen(filters)
-    }
+    crate::as_the_bus_inside!(bus);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let number = self.sent.len();

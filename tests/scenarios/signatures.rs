@@ -3,8 +3,8 @@
 //! holds.
 
 use cangauge::bus::memory::MemoryBus;
-use cangauge::bus::time::{Mono, Stamp};
-use cangauge::bus::{Bus, BusError, Event, Filters, Received, TimestampSource};
+use cangauge::bus::time::Mono;
+use cangauge::bus::{Bus, BusError, Event, Received};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
@@ -90,25 +90,7 @@ impl Unlucky {
 }
 
 impl Bus for Unlucky {
-    fn name(&self) -> &str {
-        self.inner.name()
-    }
-
-    fn bit_rate(&self) -> Option<u32> {
-        self.inner.bit_rate()
-    }
-
-    fn timestamps(&self) -> TimestampSource {
-        self.inner.timestamps()
-    }
-
-    fn now(&self) -> Stamp {
-        self.inner.now()
-    }
-
-    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.inner.listen(filters)
-    }
+    crate::as_the_bus_inside!(inner);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let number = self.sent.len();

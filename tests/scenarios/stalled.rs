@@ -5,8 +5,8 @@ use super::Kept;
 use super::answers::Slow;
 use super::log_goes_on::Other;
 use cangauge::bus::memory::{Clock, MemoryBus};
-use cangauge::bus::time::{Mono, Stamp};
-use cangauge::bus::{Bus, BusError, Event, Filters, TimestampSource};
+use cangauge::bus::time::Mono;
+use cangauge::bus::{Bus, BusError, Event};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
@@ -51,25 +51,7 @@ impl Stalled {
 }
 
 impl Bus for Stalled {
-    fn name(&self) -> &str {
-        self.inner.name()
-    }
-
-    fn bit_rate(&self) -> Option<u32> {
-        self.inner.bit_rate()
-    }
-
-    fn timestamps(&self) -> TimestampSource {
-        self.inner.timestamps()
-    }
-
-    fn now(&self) -> Stamp {
-        self.inner.now()
-    }
-
-    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.inner.listen(filters)
-    }
+    crate::as_the_bus_inside!(inner);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         if frame.to_string() == "080#" {

@@ -4,7 +4,7 @@ use super::slave::Slave;
 use super::{address, bus_of, configuring, ms};
 use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{MemoryBus, Outbox, Station};
-use cangauge::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp, TimestampSource};
+use cangauge::bus::{Bus, BusError, Event, Fault, Mono, Received};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::lss::{ErrorCode, LssRange, Mode, Part, Service, Violation};
@@ -237,25 +237,7 @@ struct Odd {
 }
 
 impl Bus for Odd {
-    fn name(&self) -> &str {
-        self.bus.name()
-    }
-
-    fn bit_rate(&self) -> Option<u32> {
-        self.bus.bit_rate()
-    }
-
-    fn timestamps(&self) -> TimestampSource {
-        self.bus.timestamps()
-    }
-
-    fn now(&self) -> Stamp {
-        self.bus.now()
-    }
-
-    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.bus.listen(filters)
-    }
+    crate::as_the_bus_inside!(bus);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         self.bus.send(frame)
