@@ -73,9 +73,10 @@ impl Request {
         self
     }
 
-    /// Asked as often as another one, and waited for as long. Asking for blocks in vain was asking once.
+    /// A read that is waited for as long as another request, and repeated even where that may not be. Asking for
+    /// blocks in vain was asking once.
     pub(super) fn patient_as(mut self, other: &Request) -> Request {
-        (self.timeout, self.repeatable) = (other.timeout, other.repeatable && !other.refused_blocks);
+        (self.timeout, self.repeatable) = (other.timeout, !other.refused_blocks);
         self
     }
 

@@ -420,9 +420,11 @@ impl SdoClient {
             }
             let waited = active.waited(timing);
             let mut error = active.error(SdoFailure::NoAnswer { waited, begun });
-            if let Some((_, request)) = &active.behind {
+            // A write that waited behind it was never sent, and must not be said to have been.
+            if let Some((_, request)) =
+                active.behind.as_ref().filter(|(_, request)| request.operation() == Operation::Read)
+            {
                 error.object = request.object;
-                error.operation = request.operation();
             }
             self.finished.push_back((active.ticket, Err(error)));
         }

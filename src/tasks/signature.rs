@@ -3,7 +3,7 @@
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, DownloadSize};
 use crate::device::description::SizeIndication;
-use crate::master::{Error, Master, Request, SdoError, SdoFailure};
+use crate::master::{Error, Master, Operation, Request, SdoError, SdoFailure};
 use crate::measure::instrument::Instrument;
 use std::time::Duration;
 
@@ -54,7 +54,8 @@ pub(super) fn sign(
     }
 }
 
-/// Whether a signature may have acted although no acknowledge proves it. A refusal is proof that it has not.
+/// Whether a signature may have acted although no acknowledge proves it. A refusal is proof that it has not, and so
+/// is the silence of what is read before a write.
 pub(super) fn may_have_acted(error: &SdoError) -> bool {
-    !matches!(error.failure, SdoFailure::Refused(_))
+    error.operation == Operation::Write && !matches!(error.failure, SdoFailure::Refused(_))
 }

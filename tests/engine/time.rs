@@ -7,7 +7,7 @@ use std::time::Duration;
 /// What the devices' own heartbeats may make of it: 1017h has 16 bits of milliseconds.
 const LONGEST_HEARTBEAT: Duration = Duration::from_millis(0xffff);
 
-/// The time that a command may take by what was asked for: some forty exchanges one after the other that get their
+/// The time that a command may take by what was asked for: some sixty exchanges one after the other that get their
 /// answer at the last moment, storing and starting again, and what the command itself is to last.
 pub(crate) fn bound(spec: &Spec) -> Duration {
     let ms = Duration::from_millis;
@@ -31,5 +31,5 @@ pub(crate) fn bound(spec: &Spec) -> Duration {
         Command::Nmt { .. } | Command::NmtState { .. } if spec.lies() => LONGEST_HEARTBEAT,
         _ => Duration::ZERO,
     };
-    ms(12_000) + unit * 40 + asked
+    ms(30_000) + unit * 60 + asked
 }

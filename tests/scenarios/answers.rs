@@ -9,7 +9,7 @@ use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::DownloadSize;
 use cangauge::canopen::value::{DataType, Value};
-use cangauge::master::{Master, Request, SdoFailure, Timing};
+use cangauge::master::{Master, Operation, Request, SdoFailure, Timing};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -98,6 +98,19 @@ fn a_late_answer_is_not_the_next_reading_of_the_same_object() {
 fn what_makes_sure_of_that_is_itself_no_object_that_an_old_answer_may_come_of() {
     // 1000h is answered late, and so is 2000h: to read 1000h once more would prove nothing.
     assert_eq!(reads(&[0x1000, 0x2000, 0x2000], 0, &[250, 1, 1, 1]), [None, None, Some(4)]);
+}
+
+#[test]
+fn a_write_that_waits_behind_it_is_not_said_to_have_been_sent() {
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
+    bus.attach(Slow::new(&[250]));
+    let mut bus = Faulty::new(bus, FaultPlan { lose_sent: [1].into(), ..FaultPlan::default() });
+    let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 0 });
+    let object = ObjectId::new(0x2000, 0);
+    master.read(node(), object, DataType::Unsigned(4)).expect("the bus works").expect_err("late");
+    let write = Request::write(node(), object, vec![1], DownloadSize::Indicated);
+    let error = master.transfer_one(write).expect("the bus works").expect_err("lost");
+    assert_eq!((error.operation, error.object), (Operation::Read, ObjectId::new(0x1000, 0)));
 }
 
 #[test]

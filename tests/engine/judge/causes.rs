@@ -50,7 +50,8 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     if failure.kind == Kind::Bus && bus_is_well && spec.devices.iter().all(|device| device.bit_rate.is_none()) {
         let sharing = spec.shares_node_ids() || !spec.others.is_empty();
         let answered = run.bus.frames.iter().any(|(_, passed)| matches!(passed, Passed::Received(_)));
-        let retimes = matches!(spec.command, Command::Assign { rate: Some(_), .. });
+        // A device that has gone to another bit rate acknowledges nothing any more.
+        let retimes = matches!(spec.command, Command::Assign { rate: Some(_), .. } | Command::LssActivate { .. });
         if answered
             && !sharing
             && !retimes

@@ -56,8 +56,14 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, bro
         | Command::LssStore { .. } => true,
         _ => false,
     };
+    let syncs = matches!(
+        spec.command,
+        Command::Log { sync_ms: Some(_), .. } | Command::Check { how: Measuring::Sync { .. }, .. }
+    );
     for (at, frame) in sent {
         let allowed = match frame.id() {
+            // A SYNC by the identifier that the device seemed to tell.
+            CanId::Standard(id) if id != 0 && syncs && spec.lies() && frame.data().is_empty() => !frame.is_remote(),
             CanId::Standard(0) => match (&spec.command, frame.data()) {
                 (Command::Nmt { what, nodes, all }, &[specifier, node]) => {
                     specifier == what.specifier() && if *all { node == 0 } else { nodes.contains(&node) }
@@ -65,13 +71,7 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, bro
                 (command, &[_, node]) => resets(command) && named.contains(&node),
                 _ => false,
             },
-            CanId::Standard(0x080) => {
-                let syncs = matches!(
-                    spec.command,
-                    Command::Log { sync_ms: Some(_), .. } | Command::Check { how: Measuring::Sync { .. }, .. }
-                );
-                syncs && !frame.is_remote()
-            }
+            CanId::Standard(0x080) => syncs && !frame.is_remote(),
             CanId::Standard(0x7e5) => lss && !frame.is_remote() && may_configure(&spec.command, frame.data()),
             id if frame.is_remote() => {
                 let guards = matches!(
