@@ -420,11 +420,11 @@ impl SdoClient {
             }
             let waited = active.waited(timing);
             let mut error = active.error(SdoFailure::NoAnswer { waited, begun });
-            // A write that waited behind it was never sent, and must not be said to have been.
-            if let Some((_, request)) =
-                active.behind.as_ref().filter(|(_, request)| request.operation() == Operation::Read)
-            {
-                error.object = request.object;
+            // A write that waited behind it and was never sent, not even as a question for blocks, must not be said to
+            // have been.
+            let asked = |request: &Request| request.operation() == Operation::Read || request.refused_blocks;
+            if let Some((_, request)) = active.behind.as_ref().filter(|(_, request)| asked(request)) {
+                (error.object, error.operation) = (request.object, request.operation());
             }
             self.finished.push_back((active.ticket, Err(error)));
         }

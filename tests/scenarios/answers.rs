@@ -9,7 +9,7 @@ use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::DownloadSize;
 use cangauge::canopen::value::{DataType, Value};
-use cangauge::master::{Master, Operation, Request, SdoFailure, Timing};
+use cangauge::master::{Blocks, Master, Operation, Request, SdoFailure, Timing};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -111,6 +111,17 @@ fn a_write_that_waits_behind_it_is_not_said_to_have_been_sent() {
     let write = Request::write(node(), object, vec![1], DownloadSize::Indicated);
     let error = master.transfer_one(write).expect("the bus works").expect_err("lost");
     assert_eq!((error.operation, error.object), (Operation::Read, ObjectId::new(0x1000, 0)));
+}
+
+#[test]
+fn a_write_that_asked_for_blocks_in_vain_is_what_got_no_answer() {
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
+    let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 0 });
+    let object = ObjectId::new(0x2000, 0);
+    let write = Request::write(node(), object, vec![0; 50], DownloadSize::Indicated);
+    let write = write.blocks(Blocks::First { threshold: 0 });
+    let error = master.transfer_one(write).expect("the bus works").expect_err("nobody is there");
+    assert_eq!((error.operation, error.object), (Operation::Write, object));
 }
 
 #[test]
