@@ -24,8 +24,9 @@ pub(crate) struct Tap<B> {
     /// Frames that the bus took.
     taken: u64,
     pub(crate) is_dead: bool,
-    /// Whether the program was told to stop, that the interface is down, that the controller is off.
-    pub(crate) interrupted: bool,
+    /// When the program was first told to stop.
+    pub(crate) interrupted: Option<Mono>,
+    /// Whether it was told that the interface is down, that the controller is off.
     pub(crate) was_down: bool,
     pub(crate) was_off: bool,
 }
@@ -41,7 +42,7 @@ impl<B: Bus> Tap<B> {
             kill,
             taken: 0,
             is_dead: false,
-            interrupted: false,
+            interrupted: None,
             was_down: false,
             was_off: false,
         }
@@ -133,7 +134,7 @@ impl<B: Bus> Bus for Tap<B> {
         let result = self.bus.receive(deadline.min(self.deadline + std::time::Duration::from_nanos(1)));
         match &result {
             Ok(Event::Frame(received)) => self.frames.push((received.at.mono, Passed::Received(received.frame))),
-            Ok(Event::Interrupted) => self.interrupted = true,
+            Ok(Event::Interrupted) => self.interrupted = self.interrupted.or(Some(self.bus.now().mono)),
             Ok(Event::Link(false)) => self.was_down = true,
             Ok(Event::Fault(Fault::BusOff, _)) => self.was_off = true,
             Ok(_) | Err(_) => {}

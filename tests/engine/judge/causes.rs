@@ -10,28 +10,24 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     }
     let told = || format!("{:?}: {failure} (hint: {:?})", failure.kind, failure.hint);
     let tap = &run.bus;
-    if tap.interrupted && !tap.was_down && !tap.was_off {
+    if tap.interrupted.is_some() && !tap.was_down && !tap.was_off {
         // What went wrong before the interruption may be the reason.
         let was_full = spec.faults.iter().any(|fault| matches!(fault, Fault::Full { .. }));
         if failure.kind == Kind::Bus && !was_full {
             broken.push(("names the cause", format!("interrupted: {}", told())));
         }
         let quiet = spec.faults.is_empty() && spec.others.is_empty() && spec.vagaries().next().is_none();
-        if quiet && failure.kind == Kind::NoAnswer && all_there(spec) {
+        // A recording may have ended for want of rows before that, and was putting back what it had started.
+        let in_time = tap.interrupted < tap.frames.last().map(|(at, _)| *at) || !records(spec);
+        if quiet && failure.kind == Kind::NoAnswer && all_there(spec) && in_time {
             broken.push(("names the cause", format!("interrupted: {}", told())));
         }
         return;
     }
-    if failure.kind == Kind::Interrupted && !tap.interrupted {
+    if failure.kind == Kind::Interrupted && tap.interrupted.is_none() {
         broken.push(("names the cause", format!("nobody interrupted: {}", told())));
     }
-    // A recording goes on when the interface is back.
-    let records = match &spec.command {
-        Command::Log { .. } => true,
-        Command::Check { how, .. } => *how != Measuring::Once,
-        _ => false,
-    };
-    if tap.was_down && !tap.interrupted && !records && failure.kind != Kind::Bus {
+    if tap.was_down && tap.interrupted.is_none() && !records(spec) && failure.kind != Kind::Bus {
         // It may have failed before.
         let down_at = spec.faults.iter().filter_map(|fault| match fault {
             Fault::Down { at_us, .. } => Some(*at_us),
@@ -77,6 +73,15 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     }
 }
 
+/// A recording goes on when the interface is back.
+fn records(spec: &Spec) -> bool {
+    match &spec.command {
+        Command::Log { .. } => true,
+        Command::Check { how, .. } => *how != Measuring::Once,
+        _ => false,
+    }
+}
+
 fn quiet(spec: &Spec) -> bool {
     spec.others.is_empty() && spec.vagaries().next().is_none() && all_there(spec) && spec.is_clean_but_for_faults()
 }
@@ -95,6 +100,10 @@ fn may_be_silent(spec: &Spec) -> bool {
 }
 
 fn may_be_odd(spec: &Spec, message: &str) -> bool {
+    let only = matches!(
+        spec.command,
+        Command::Assign { target: Target::Only, .. } | Command::LssStore { target: Target::Only, .. }
+    );
     // Devices that have no measured value, no such object; what a description does not know.
     matches!(spec.devices.len(), 0)
         || [
@@ -111,6 +120,6 @@ fn may_be_odd(spec: &Spec, message: &str) -> bool {
         .iter()
         .any(|part| message.contains(part))
         // Several that take one node-ID, because they may or because they could not be seen.
-        || matches!(spec.command, Command::Assign { target: Target::Only, .. }) && spec.devices.len() > 1
+        || only && spec.devices.len() > 1
         || spec.command.is_lss() && spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
 }

@@ -141,20 +141,18 @@ fn has_serial(spec: &Spec, node: u8) -> bool {
     device.is_some_and(|device| crate::bench::identity(device).serial == device.serial)
 }
 
-/// Objects in which a value stands for another one.
+/// Objects in which a value stands for another one, in any of the devices that are this node.
 fn becomes_another(spec: &Spec, node: u8, object: ObjectId) -> bool {
-    let device = spec.devices.iter().find(|device| device.node == Some(node));
-    let model = device.map(|device| crate::kinds::model(device.kind));
-    let described = model.as_ref().and_then(|model| model.description.object(object));
+    let becomes = |device: &crate::spec::DeviceSpec| {
+        let model = crate::kinds::model(device.kind);
+        // Short texts are filled up.
+        let is_text = model.dictionary.get(object).is_some_and(|entry| entry.data_type.width().is_none());
+        is_text && device.kind != crate::kinds::ATTIC || model.description.object(object).is_none()
+    };
     // MH-4: 0 brings back the identifier as delivered.
-    // Short texts are filled up.
-    let is_text = model
-        .as_ref()
-        .is_some_and(|model| model.dictionary.get(object).is_some_and(|entry| entry.data_type.width().is_none()));
-    is_text && device.is_some_and(|device| device.kind != crate::kinds::ATTIC)
-        || described.is_none()
-        || object.index & 0x0fff == 0x1a0
+    object.index & 0x0fff == 0x1a0
         || object.index == 0x1014
+        || spec.devices.iter().filter(|device| device.node == Some(node)).any(becomes)
 }
 
 pub(super) fn number(bytes: &[u8]) -> u32 {

@@ -63,7 +63,7 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, bro
     for (at, frame) in sent {
         let allowed = match frame.id() {
             // A SYNC by the identifier that the device seemed to tell.
-            CanId::Standard(id) if id != 0 && syncs && spec.lies() && frame.data().is_empty() => !frame.is_remote(),
+            id if id != CanId::Standard(0) && syncs && spec.lies() && frame.data().is_empty() => !frame.is_remote(),
             CanId::Standard(0) => match (&spec.command, frame.data()) {
                 (Command::Nmt { what, nodes, all }, &[specifier, node]) => {
                     specifier == what.specifier() && if *all { node == 0 } else { nodes.contains(&node) }
