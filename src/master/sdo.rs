@@ -103,6 +103,13 @@ impl Active {
         }
     }
 
+    /// Whether a frame seems to answer a segment that still waits to be sent: it is that of another device with this
+    /// node-ID. A request that waits may be the repetition of one that is answered, and a server may give up any time.
+    fn owes_what_is_answered(&self, frame: &Frame) -> bool {
+        let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
+        self.unsent > 0 && in_segments && frame.data().first() != Some(&0x80)
+    }
+
     /// Another master has got in the way: begins anew when it is done, if that may be. The server is told
     /// nothing, since the transfer that it has now is not ours.
     fn stand_back(&mut self, accept_60: bool, now: Mono, timing: &Timing, outgoing: &mut Outgoing) -> bool {
@@ -290,7 +297,9 @@ impl SdoClient {
         let mut out = Vec::new();
         let at = received.at.mono;
         let progress = match active.asked_at {
-            Some(asked_at) if at + SLACK >= asked_at => active.machine.on_frame(&received.frame, &mut out),
+            Some(asked_at) if at + SLACK >= asked_at && !active.owes_what_is_answered(&received.frame) => {
+                active.machine.on_frame(&received.frame, &mut out)
+            }
             _ => Progress::NotOurs,
         };
         let result = match progress {

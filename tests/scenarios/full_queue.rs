@@ -1,10 +1,14 @@
 //! A transmit queue that has no room: nothing is lost by it, and nobody is missed.
 
 use cangauge::bus::faults::{FaultPlan, Faulty};
-use cangauge::bus::memory::{BIT_RATE, Clock, MemoryBus};
+use cangauge::bus::memory::{BIT_RATE, Clock, MemoryBus, Outbox, Station};
+use cangauge::bus::time::Mono;
 use cangauge::bus::{Bus, Event};
+use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
-use cangauge::master::{Error, Master, Timing};
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::sdo::DownloadSize;
+use cangauge::master::{Error, Master, Request, Timing};
 use cangauge::sim::{Device, Setup};
 use cangauge::tasks::Kind;
 use cangauge::tasks::scan::{Found, scan};
@@ -81,4 +85,61 @@ fn a_queue_that_never_empties_is_a_fault_of_the_bus_after_a_while() {
     assert!(failure.hint.unwrap().contains("terminators"));
     let took = faulty.now().mono.since(begun);
     assert!((Duration::from_secs(1)..Duration::from_secs(2)).contains(&took), "{took:?}");
+}
+
+/// A server that takes a write in segments, and once acknowledges a segment that has not come yet: so it looks where
+/// two devices share a node-ID and one of them lags behind.
+#[derive(Default)]
+struct Hasty {
+    data: Vec<u8>,
+    toggle: u8,
+    segments: u32,
+    due: Option<(Mono, Frame)>,
+}
+
+impl Station for Hasty {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
+        match *frame.data() {
+            [0x21, a, b, c, ..] => {
+                (self.data, self.toggle) = (Vec::new(), 0);
+                out.send(format!("585#60{a:02X}{b:02X}{c:02X}00000000").parse().unwrap());
+            }
+            [command, ref bytes @ ..] if command & 0xe0 == 0 && command & 0x10 == self.toggle => {
+                self.data.extend(&bytes[..7 - usize::from(command >> 1 & 7)]);
+                let acknowledge = |toggle: u8| format!("585#{:02X}00000000000000", 0x20 | toggle).parse().unwrap();
+                out.send(acknowledge(self.toggle));
+                self.toggle ^= 0x10;
+                self.segments += 1;
+                if self.segments == 2 {
+                    self.due = Some((now + Duration::from_micros(500), acknowledge(self.toggle)));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn wake(&mut self, _: Mono, out: &mut Outbox) {
+        self.due.take().into_iter().for_each(|(_, frame)| out.send(frame));
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.due.map(|(at, _)| at)
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn an_acknowledge_of_what_still_waits_to_be_sent_takes_no_segment_off() {
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(BIT_RATE);
+    bus.attach(Hasty::default());
+    // The third segment has to wait.
+    let mut bus = Faulty::new(bus, FaultPlan { queue_full: (3..8).collect(), ..FaultPlan::default() });
+    let data: Vec<u8> = (0..50).collect();
+    let node = NodeId::new(5).unwrap();
+    let write = Request::write(node, ObjectId::new(0x2000, 0), data.clone(), DownloadSize::Indicated);
+    Master::new(&mut bus, Timing::default()).transfer_one(write).unwrap().unwrap();
+    assert_eq!(bus.inner().stations::<Hasty>().next().unwrap().data, data);
 }
