@@ -143,7 +143,8 @@ impl From<BusError> for Failure {
         };
         let hint = match &error {
             BusError::QueueFull => Some(
-                "nobody acknowledges: check the sensor's power, the bit rate, the wiring and the 120 ohm terminators"
+                "nobody acknowledges: check the sensor's power, the bit rate, the wiring and the 120 ohm terminators; \
+                 or somebody fills the bus: candump shows who"
                     .to_owned(),
             ),
             BusError::Down(name) => {

@@ -72,8 +72,11 @@ impl Spec {
         if random.percent(45) {
             for _ in 0..random.within(1..=2) {
                 let at = usize::try_from(random.next() % self.devices.len() as u64).expect("an index");
-                let vagary = vagary(random);
-                self.devices[at].vagaries.push(vagary);
+                let (vagary, device) = (vagary(random), &mut self.devices[at]);
+                if matches!(vagary, Vagary::Hang { .. } | Vagary::Late { .. }) {
+                    device.unsaved_heartbeat = None;
+                }
+                device.vagaries.push(vagary);
             }
         }
         if random.percent(18) {
@@ -108,7 +111,8 @@ fn device(random: &mut Random, at: u32) -> DeviceSpec {
         heartbeat_ms: random.percent(45).then(|| *random.pick(&[50, 100, 200, 1000])),
         bit_rate: random.percent(2).then(|| *random.pick(&RATES)),
         latency_us,
-        // Whoever wrote that has had the answer before the program comes, which could not tell it from its own.
+        // Whoever wrote that has had the answer before the program comes, which could not tell it from its own;
+        // therefore neither from one that hangs or is late.
         unsaved_heartbeat: (latency_us < 20_000 && random.percent(15)).then_some(150),
         event_timer_ms: random.percent(30).then(|| *random.pick(&[10, 50, 100])),
         overload: random.percent(10),

@@ -51,7 +51,10 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
         if answered
             && !sharing
             && !retimes
-            && !spec.vagaries().any(|vagary| matches!(vagary, Vagary::Hang { .. } | Vagary::GoneAfterReset))
+            && !spec.vagaries().any(|vagary| {
+                // Who babbles may fill the bus.
+                matches!(vagary, Vagary::Hang { .. } | Vagary::GoneAfterReset | Vagary::Babbles { .. })
+            })
         {
             broken.push(("names the cause", format!("the bus works: {}", told())));
         }

@@ -121,12 +121,8 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], b
         }
         (Said::Nothing, Command::SdoWrite { node, object, bytes, .. }) if !spec.lies() => {
             // Nothing tells the acknowledge of somebody else's write to the same object from that of ours.
-            let written_before = |device: &crate::spec::DeviceSpec| {
-                let hangs = device.vagaries.iter().any(|vagary| matches!(vagary, Vagary::Hang { .. }));
-                hangs && device.unsaved_heartbeat.is_some() && *object == ObjectId::new(0x1017, 0)
-            };
-            let acknowledged_by_others = spec.devices.iter().any(written_before)
-                || spec.acts().any(|act| matches!(act, Act::Write { index, .. } if *index == object.index));
+            let acknowledged_by_others =
+                spec.acts().any(|act| matches!(act, Act::Write { index, .. } if *index == object.index));
             let mut stations = run.bus.bus.inner_mut().stations_mut::<Unruly>();
             let held = stations.any(|unruly| {
                 let there = spec.devices[unruly.place].node == Some(*node);
