@@ -88,7 +88,8 @@ impl Company {
     /// Whether a transfer in segments that has come to its end may be somebody else's in part.
     pub(super) fn casts_doubt(self, announced: Option<u32>, delivered: usize) -> bool {
         let as_announced = announced.is_none_or(|size| usize::try_from(size) == Ok(delivered));
-        self.in_segments || self.seen && !as_announced
+        // Who was in the way once shares the channel, heard or not.
+        self.in_segments || (self.seen || self.since.is_some()) && !as_announced
     }
 
     /// Whether somebody else may be the reason of a failure. What a device says of the object itself it says
@@ -187,6 +188,7 @@ mod tests {
         assert_eq!(company.back_until(), Some(ms(160)));
         company.begin();
         assert!(company.back_until().is_none() && !company.is_in_the_way());
+        assert!(company.casts_doubt(Some(10), 8) && !company.casts_doubt(Some(8), 8));
         // Again and again, but not for ever.
         assert!(company.stand_back(ms(1099), PATIENCE) && !company.stand_back(ms(1100), PATIENCE));
 

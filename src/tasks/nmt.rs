@@ -18,7 +18,7 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::{Life, NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
-use crate::master::{Error, Happening, Master, SdoFailure};
+use crate::master::{Error, Happening, Master, Request, SdoFailure};
 use crate::measure::survey::read_all;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -287,8 +287,9 @@ pub fn command(
     let guarded = guard(master, nodes, &before, &mut watch)?;
     let silent: Vec<NodeId> =
         nodes.iter().copied().filter(|node| !watch.lives.contains_key(node) && !guarded.contains_key(node)).collect();
-    let items: Vec<_> = silent.iter().map(|&node| (node, HEARTBEAT, DataType::Unsigned(2))).collect();
-    let answers = read_all(master, &items)?;
+    let asked = silent.iter().map(|&node| Request::read(node, HEARTBEAT)).collect();
+    // Meanwhile others may tell that they have changed.
+    let answers = master.transfer(asked, &mut |received| watch.take(received))?;
     let no_longer: BTreeSet<NodeId> = silent
         .iter()
         .zip(&answers)

@@ -73,6 +73,18 @@ fn a_heartbeat_of_the_node_as_it_was_confirms_nothing() {
 }
 
 #[test]
+fn what_a_heartbeat_tells_while_others_are_asked_counts() {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    let obeys = Some("000#0205".parse().unwrap());
+    bus.attach(Slow { obeys, beat: Mono::START + PERIOD, stops: None });
+    let mut master = Master::new(&mut bus, Timing { timeout: PERIOD, retries: 1 });
+    // It obeys after the time in which it is waited for; whether the other one has become silent is asked after that.
+    let silent = NodeId::new(44).unwrap();
+    let reports = command(&mut master, NmtCommand::Stop, &[silent, node()], false).unwrap();
+    assert_eq!((reports[1].state, reports[1].by), (Some(NmtState::Stopped), By::Heartbeat));
+}
+
+#[test]
 fn heartbeats_from_before_it_obeys_are_waited_over() {
     let report = told(NmtCommand::Stop, Some("000#0205"));
     let stopped = Some(NmtState::Stopped);

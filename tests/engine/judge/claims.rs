@@ -56,7 +56,7 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], b
                     continue;
                 }
                 // On a wire that somebody disturbs the command itself comes late, and a heartbeat from before it after it.
-                let late = spec.devices.iter().any(|device| device.bit_rate.is_some());
+                let late = spec.loses_sent() || spec.devices.iter().any(|device| device.bit_rate.is_some());
                 if late && matches!(command, Command::Nmt { what, .. } if what.target() != *state) {
                     continue;
                 }

@@ -8,7 +8,8 @@ use cangauge::bus::memory::BIT_RATE;
 pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[Holds], broken: &mut Vec<Broken>) {
     let detects = matches!(spec.command, Command::Detect { .. });
     let cannot = spec.loses_sent()
-        || spec.vagaries().any(|vagary| matches!(vagary, Vagary::Hang { .. }))
+        // Who babbles may fill the bus, and the last frames wait.
+        || spec.vagaries().any(|vagary| matches!(vagary, Vagary::Hang { .. } | Vagary::Babbles { .. }))
         // Some hear LSS in one NMT state only, and another master takes them out of it.
         || spec.acts().any(|act| matches!(act, Act::Nmt { .. }))
         || spec.devices.iter().any(|device| device.bit_rate.is_some()) && !detects;
