@@ -12,7 +12,7 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     let tap = &run.bus;
     if tap.interrupted.is_some() && !tap.was_down && !tap.was_off {
         // What went wrong before the interruption may be the reason.
-        let was_full = spec.faults.iter().any(|fault| matches!(fault, Fault::Full { .. }));
+        let was_full = spec.faults.iter().any(|fault| matches!(fault, Fault::Full { .. } | Fault::BusOff { .. }));
         if failure.kind == Kind::Bus && !was_full {
             broken.push(("names the cause", format!("interrupted: {}", told())));
         }

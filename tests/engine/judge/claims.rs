@@ -38,7 +38,10 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Said, after: &[Holds], b
                     let value = unruly.device.value(*object, settled);
                     value.is_some_and(|value| value == *raw)
                 });
-                if !expedited && !held {
+                // It may have been written after that.
+                let is_written =
+                    spec.acts().any(|act| matches!(act, Act::Write { index, .. } if *index == object.index));
+                if !expedited && !held && !is_written {
                     broken.push(("reads what is there", format!("node {node} {object}: {raw:02X?}")));
                 }
             }
