@@ -3,14 +3,14 @@
 use super::args::{BusSpec, Duration, Nodes};
 use super::exit::stdout;
 use super::file::OutFile;
-use super::log::{refuse_to_send, sync_period, tell};
+use super::recording::{print_event, refuse_to_send, sync_interval};
 use super::{Format, Global, open};
 use crate::bus::Stamp;
 use crate::bus::claim::{Claim, Claims};
 use crate::canopen::id::NodeId;
 use crate::measure::expression::Expression;
 use crate::measure::expression::judge::Jury;
-use crate::measure::expression::verdict::{Ruling, Verdict};
+use crate::measure::expression::verdict::Verdict;
 use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
 use crate::output::events::words;
@@ -55,7 +55,7 @@ pub(crate) struct Check {
     #[arg(long = "for", value_name = "DUR")]
     duration: Option<Duration>,
     /// Send SYNC at this interval
-    #[arg(long, value_name = "DUR", requires = "duration", conflicts_with = "poll", value_parser = sync_period)]
+    #[arg(long, value_name = "DUR", requires = "duration", conflicts_with = "poll", value_parser = sync_interval)]
     sync: Option<Duration>,
     /// Read by SDO at this interval
     #[arg(long, value_name = "DUR", requires = "duration")]
@@ -178,19 +178,6 @@ fn print(verdicts: &[Verdict], format: Format) -> io::Result<()> {
     out.flush()
 }
 
-/// Says the verdicts of a recording on stderr: what failed as a warning.
-pub(super) fn say(console: &Console, verdicts: &[Verdict]) {
-    for verdict in verdicts {
-        let node = verdict.node.map(|node| format!("node {node}: ")).unwrap_or_default();
-        let line = format!("{node}{}: {}", verdict.text, verdict::findings(verdict));
-        match verdict.ruling {
-            Ruling::Ok => console.note(&format!("ok: {line}")),
-            Ruling::Fail => console.warn(&format!("not as expected: {line}")),
-            Ruling::NoData => console.warn(&line),
-        }
-    }
-}
-
 /// What is shown while it is measured.
 struct Screen {
     limits: Limits,
@@ -207,7 +194,7 @@ impl Observer for Screen {
     }
 
     fn note(&mut self, note: &Note, _at: Stamp) {
-        tell(&self.console, &words(note));
+        print_event(&self.console, &words(note));
     }
 
     fn standing(&mut self, jury: &Jury, at: Stamp) {

@@ -3,10 +3,11 @@
 mod files;
 mod screen;
 
-use super::args::{BusSpec, Duration, Nodes, SignalArg};
+use super::args::{Duration, Nodes, SignalArg};
 use super::exit::{Several, stdout};
 use super::file::OutFile;
-use super::{Format, Global, When, check, open};
+use super::recording::{print_verdicts, refuse_to_send, sync_interval};
+use super::{Format, Global, When, open};
 use crate::bus::claim::Claim;
 use crate::bus::interrupt::Interrupts;
 use crate::canopen::id::NodeId;
@@ -14,7 +15,7 @@ use crate::measure::decode::Wanted;
 use crate::measure::expression::Expression;
 use crate::measure::expression::verdict::Verdict;
 use crate::output::console::Console;
-use crate::output::events::{Events, Weight, Words};
+use crate::output::events::Events;
 use crate::output::progress::Progress;
 use crate::output::rows::Form;
 use crate::output::summary::{self, Written};
@@ -58,7 +59,7 @@ pub(crate) struct Log {
     #[arg(short = 'n', long, value_name = "N", value_parser = positive)]
     count: Option<u64>,
     /// Send SYNC at this interval
-    #[arg(long, value_name = "DUR", conflicts_with_all = ["poll", "passive"], value_parser = sync_period)]
+    #[arg(long, value_name = "DUR", conflicts_with_all = ["poll", "passive"], value_parser = sync_interval)]
     sync: Option<Duration>,
     /// Read by SDO at this interval
     #[arg(long, value_name = "DUR", conflicts_with = "passive")]
@@ -86,22 +87,6 @@ fn positive(text: &str) -> Result<u64, String> {
         .ok_or_else(|| format!("\"{text}\" is not a number of rows (1 or more)"))
 }
 
-/// The shortest interval of SYNC.
-const SHORTEST_SYNC: std::time::Duration = std::time::Duration::from_millis(1);
-
-pub(super) fn sync_period(text: &str) -> Result<Duration, String> {
-    let period: Duration = text.parse()?;
-    if period.0 < SHORTEST_SYNC { Err(format!("\"{text}\" is too short for SYNC (1ms or more)")) } else { Ok(period) }
-}
-
-/// Who only plays a recording cannot send at an interval.
-pub(super) fn refuse_to_send(global: &Global, interval: Option<Duration>) -> Result<(), Failure> {
-    if matches!(global.bus, Some(BusSpec::Replay(_))) && interval.is_some() {
-        return Err(Failure::new(Kind::Usage, "a recording (replay:) receives only: --sync and --poll send"));
-    }
-    Ok(())
-}
-
 impl Log {
     /// What it does not share with another cangauge.
     pub(super) fn claim(&self) -> Claim {
@@ -115,7 +100,7 @@ impl Log {
         self.files.refuse(form, self.sync.or(self.poll).is_some())?;
         let mut opened = self.files.open(form, self.count)?;
         let recorded = self.record(global, &mut opened)?;
-        check::say(&global.console(), &recorded.verdicts);
+        print_verdicts(&global.console(), &recorded.verdicts);
         self.finish(&recorded, &mut opened)
     }
 
@@ -283,13 +268,4 @@ fn end(mut screen: Screen, opened: &Opened, interrupted: bool) -> anyhow::Result
 
 fn rows(count: u64) -> String {
     if count == 1 { "1 row".to_owned() } else { format!("{count} rows") }
-}
-
-/// Says what happens while it is recorded.
-pub(super) fn tell(console: &Console, words: &Words) {
-    match words.weight {
-        Weight::Warning => console.warn(&words.text),
-        Weight::Note => console.note(&words.text),
-        Weight::Detail => console.detail(&words.text),
-    }
 }

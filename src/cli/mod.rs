@@ -21,6 +21,7 @@ mod open;
 pub mod parse;
 mod pdo;
 mod read;
+mod recording;
 mod scan;
 mod sdo;
 mod sim;

@@ -1,6 +1,6 @@
 //! Everything that a recording shows and writes while it runs.
 
-use super::tell;
+use super::super::recording::print_event;
 use crate::bus::claim::Claims;
 use crate::bus::{Mono, Stamp};
 use crate::measure::sample::{Sample, Source};
@@ -68,7 +68,7 @@ impl Screen {
     }
 
     fn event(&mut self, words: &Words, at: Stamp) {
-        tell(&self.console, words);
+        print_event(&self.console, words);
         let elapsed = self.rows.elapsed(at);
         if let Some(events) = &mut self.events
             && let Err(error) = events.add(at, elapsed, words)

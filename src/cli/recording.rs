@@ -1,0 +1,52 @@
+//! What `log` and `check` share: both record.
+
+use super::Global;
+use super::args::{BusSpec, Duration};
+use crate::measure::expression::verdict::{Ruling, Verdict};
+use crate::output::console::Console;
+use crate::output::events::{Weight, Words};
+use crate::output::verdict;
+use crate::tasks::{Failure, Kind};
+
+/// The shortest interval of SYNC.
+const SHORTEST_SYNC_INTERVAL: std::time::Duration = std::time::Duration::from_millis(1);
+
+/// Parses an interval of SYNC.
+pub(super) fn sync_interval(text: &str) -> Result<Duration, String> {
+    let interval: Duration = text.parse()?;
+    if interval.0 < SHORTEST_SYNC_INTERVAL {
+        Err(format!("\"{text}\" is too short for SYNC (1ms or more)"))
+    } else {
+        Ok(interval)
+    }
+}
+
+/// Refuses to send at an interval into a recording that is played back.
+pub(super) fn refuse_to_send(global: &Global, interval: Option<Duration>) -> Result<(), Failure> {
+    if matches!(global.bus, Some(BusSpec::Replay(_))) && interval.is_some() {
+        return Err(Failure::new(Kind::Usage, "a recording (replay:) receives only: --sync and --poll send"));
+    }
+    Ok(())
+}
+
+/// Prints an event of a recording on stderr.
+pub(super) fn print_event(console: &Console, words: &Words) {
+    match words.weight {
+        Weight::Warning => console.warn(&words.text),
+        Weight::Note => console.note(&words.text),
+        Weight::Detail => console.detail(&words.text),
+    }
+}
+
+/// Prints the verdicts of a recording on stderr, failed ones as warnings.
+pub(super) fn print_verdicts(console: &Console, verdicts: &[Verdict]) {
+    for verdict in verdicts {
+        let node = verdict.node.map(|node| format!("node {node}: ")).unwrap_or_default();
+        let line = format!("{node}{}: {}", verdict.text, verdict::findings(verdict));
+        match verdict.ruling {
+            Ruling::Ok => console.note(&format!("ok: {line}")),
+            Ruling::Fail => console.warn(&format!("not as expected: {line}")),
+            Ruling::NoData => console.warn(&line),
+        }
+    }
+}
