@@ -1,7 +1,7 @@
 //! Files that a command writes: opened before the bus, and none overwritten unasked.
 
 use super::exit::FileError;
-use crate::output::rows::{Kept, Target, look};
+use crate::output::rows::{ExistingLines, Target, existing_lines};
 use crate::tasks::{Failure, Kind};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Seek, Write};
@@ -76,12 +76,12 @@ impl OutFile {
     }
 
     /// What stays of a file that is continued.
-    pub(super) fn look(&mut self) -> anyhow::Result<Option<Kept>> {
+    pub(super) fn look(&mut self) -> anyhow::Result<Option<ExistingLines>> {
         if self.existing != Existing::Continue || self.new || !self.is_regular() {
             return Ok(None);
         }
         let what = || format!("read {}", self.path.display());
-        let kept = look(&mut self.file).map_err(|source| FileError { what: what(), source })?;
+        let kept = existing_lines(&mut self.file).map_err(|source| FileError { what: what(), source })?;
         self.keep = kept.as_ref().map_or(0, |kept| kept.length);
         Ok(kept)
     }

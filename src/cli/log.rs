@@ -17,7 +17,7 @@ use crate::measure::expression::verdict::Verdict;
 use crate::output::console::Console;
 use crate::output::events::Events;
 use crate::output::progress::Progress;
-use crate::output::rows::Form;
+use crate::output::rows::FileFormat;
 use crate::output::summary::{self, Written};
 use crate::tasks::check::{Expecting, all_met};
 use crate::tasks::log::{Mode, Outcome, Plan, log};
@@ -96,9 +96,9 @@ impl Log {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         refuse_to_send(global, self.sync.or(self.poll))?;
         self.refuse_at_once()?;
-        let form = if global.format == Format::Json { Form::Json } else { Form::Csv };
-        self.files.refuse(form, self.sync.or(self.poll).is_some())?;
-        let mut opened = self.files.open(form, self.count)?;
+        let format = if global.format == Format::Json { FileFormat::JsonLines } else { FileFormat::Csv };
+        self.files.refuse(format, self.sync.or(self.poll).is_some())?;
+        let mut opened = self.files.open(format, self.count)?;
         let recorded = self.record(global, &mut opened)?;
         print_verdicts(&global.console(), &recorded.verdicts);
         self.finish(&recorded, &mut opened)

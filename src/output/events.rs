@@ -1,6 +1,6 @@
-//! What happens on the way of a recording: in words for people, and as CSV for later.
+//! The events of a recording: as text for people, and as CSV.
 
-use super::rows::{Dialect, Sink, TimeForm, Times, push_number, push_seconds, push_text, push_texts};
+use super::rows::{Dialect, LineWriter, TimeForm, Times, push_number, push_seconds, push_text, push_texts};
 use crate::bus::time::spoken;
 use crate::bus::{Fault, ReceiveBuffer, Stamp};
 use crate::canopen::id::NodeId;
@@ -11,38 +11,38 @@ use std::time::Duration;
 /// The columns.
 pub const COLUMNS: [&str; 5] = ["time", "elapsed_s", "node", "event", "text"];
 
-/// How much something matters to who watches.
+/// How an event is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
-    /// It is not as it should be.
+    /// Something is wrong.
     Warning,
-    /// It is worth knowing.
+    /// For information.
     Note,
-    /// It is said when more is asked for.
+    /// Shown with `-v` only.
     Detail,
 }
 
-/// Something that happened, in words.
+/// An event as text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Words {
-    /// What stands in the column `event`; nothing for what is no event.
+    /// The word in the column `event`; `None` if it is not written to the file.
     pub event: Option<&'static str>,
-    /// Whom it concerns.
+    /// The node it concerns.
     pub node: Option<NodeId>,
     /// One line.
     pub text: String,
-    /// How much it matters.
+    /// How it is shown.
     pub weight: Weight,
 }
 
 impl Words {
-    /// An event that concerns no node.
+    /// An event that concerns no single node.
     pub fn of_all(event: &'static str, weight: Weight, text: String) -> Words {
         Words { event: Some(event), node: None, text, weight }
     }
 }
 
-/// What a recording tells, in words.
+/// The text of a recording's event.
 pub fn words(note: &Note) -> Words {
     use Weight::{Detail, Note as Remark, Warning};
     let of_node = |node: NodeId, event, weight, text| Words { event: Some(event), node: Some(node), text, weight };
@@ -121,42 +121,48 @@ fn buffer_text(buffer: ReceiveBuffer) -> String {
     format!("the receive buffer has {bytes} bytes")
 }
 
-/// Writes events.
+/// Writes events as CSV.
 #[derive(Debug)]
 pub struct Events {
-    sink: Sink,
+    writer: LineWriter,
     dialect: Dialect,
     times: Times,
-    /// Whether the header is still to be written.
-    is_new: bool,
+    /// Whether the header must still be written.
+    needs_header: bool,
 }
 
 impl Events {
-    /// Events into `sink`; one that continues has its header already.
-    pub fn new(sink: Sink, dialect: Dialect, time: TimeForm, continues: bool) -> Events {
-        Events { sink, dialect, times: Times::new(time), is_new: !continues }
+    /// Events for `writer`. With `continues` the file already has its header.
+    pub fn new(writer: LineWriter, dialect: Dialect, time: TimeForm, continues: bool) -> Events {
+        Events { writer, dialect, times: Times::new(time), needs_header: !continues }
     }
 
-    /// The header, as it stands in a file without byte order mark.
+    /// The header, without line end and byte order mark.
     pub fn header(dialect: Dialect) -> String {
         let mut head = Vec::new();
         push_texts(&mut head, COLUMNS, dialect.delimiter);
         String::from_utf8_lossy(&head).trim_end().to_owned()
     }
 
-    /// The recording has begun: a file without events has a header.
-    pub fn begin(&mut self) -> io::Result<()> {
-        if !std::mem::take(&mut self.is_new) {
-            return self.sink.check();
+    /// Writes the header: a file without events has one as well.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_header(&mut self) -> io::Result<()> {
+        if !std::mem::take(&mut self.needs_header) {
+            return self.writer.check();
         }
         let mark = if self.dialect.bom { "\u{feff}" } else { "" };
-        self.sink.head(false, format!("{mark}{}\n", Events::header(self.dialect)).into_bytes())
+        self.writer.put_header(format!("{mark}{}\n", Events::header(self.dialect)).into_bytes())
     }
 
-    /// Writes an event at once; `elapsed` is since the first row.
+    /// Writes an event at once. `elapsed` is the time since the first row.
+    ///
+    /// # Errors
+    /// The file cannot be written.
     pub fn add(&mut self, at: Stamp, elapsed: Option<Duration>, words: &Words) -> io::Result<()> {
         let Some(event) = words.event else { return Ok(()) };
-        self.begin()?;
+        self.write_header()?;
         let Dialect { delimiter, decimal, .. } = self.dialect;
         let mut line = Vec::new();
         self.times.write(&mut line, at.wall, decimal)?;
@@ -173,16 +179,19 @@ impl Events {
         line.push(delimiter);
         push_text(&mut line, &words.text, delimiter);
         line.push(b'\n');
-        self.sink.rows(&mut line, 1)
+        self.writer.put_rows(&mut line, 1)
     }
 
-    /// Waits until everything is written, or `give_up` says so, as [`super::rows::Rows::finish`] does.
+    /// Waits until everything is written, as [`super::rows::Rows::finish`] does.
+    ///
+    /// # Errors
+    /// The file cannot be written.
     pub fn finish(&mut self, give_up: &mut dyn FnMut() -> bool) -> io::Result<()> {
-        self.sink.finish(give_up)
+        self.writer.finish(give_up)
     }
 
     /// Events that were lost.
     pub fn lost(&self) -> u64 {
-        self.sink.lost()
+        self.writer.lost()
     }
 }

@@ -2,15 +2,14 @@
 
 use super::text::steers;
 use crate::canopen::id::NodeId;
-use crate::measure::sample::{Number, Sample, Source, Status};
+use crate::measure::sample::{Number, Source, Status};
 use crate::tasks::autozero::Zeroed;
 use crate::tasks::failure::Place;
 use crate::tasks::nmt::Report;
 use crate::tasks::scan::Found;
 use crate::tasks::store::Done;
 use crate::tasks::{Failure, Kind};
-use serde::ser::SerializeMap;
-use serde::{Serialize, Serializer as _};
+use serde::Serialize;
 use serde_json::ser::Formatter;
 use std::io::{self, Write};
 
@@ -241,57 +240,6 @@ pub fn reading(
         status: status.map(Status::as_str),
     };
     line(out, &reading)
-}
-
-/// A row of `log`.
-pub fn row(
-    out: &mut dyn Write,
-    time: &serde_json::Value,
-    elapsed_s: f64,
-    sample: &Sample,
-    source: &Source,
-) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Row<'a> {
-        time: &'a serde_json::Value,
-        elapsed_s: f64,
-        node: u8,
-        signal: &'a str,
-        value: JsonNumber,
-        unit: Option<&'a str>,
-        status: Option<&'a str>,
-        raw: String,
-    }
-    let row = Row {
-        time,
-        elapsed_s,
-        node: source.node.get(),
-        signal: &source.signal,
-        value: JsonNumber(sample.value),
-        unit: Some(&*source.unit).filter(|unit| !unit.is_empty()),
-        status: sample.status.map(Status::as_str),
-        raw: sample.raw.to_string(),
-    };
-    line(out, &row)
-}
-
-/// A row of `log` in the wide layout: value and status under the names of their columns.
-pub fn wide_row(
-    out: &mut dyn Write,
-    time: &serde_json::Value,
-    elapsed_s: f64,
-    cells: impl Iterator<Item = ([String; 2], (Option<Number>, Option<Status>))>,
-) -> io::Result<()> {
-    let mut serializer = serde_json::Serializer::new(&mut *out);
-    let mut row = serializer.serialize_map(None)?;
-    row.serialize_entry("time", time)?;
-    row.serialize_entry("elapsed_s", &elapsed_s)?;
-    for ([name, status_name], (value, status)) in cells {
-        row.serialize_entry(&name, &JsonNumber(value))?;
-        row.serialize_entry(&status_name, &status.map(Status::as_str))?;
-    }
-    row.end()?;
-    out.write_all(b"\n")
 }
 
 /// A value of the object dictionary.

@@ -4,7 +4,8 @@ use super::super::exit::FileError;
 use super::super::file::{Existing, OutFile};
 use crate::output::events::Events;
 use crate::output::rows::{
-    CAPACITY, Dialect, Form, Kept, Layout, OtherHead, Rotation, Rows, Series, Setup, Sink, Target, TimeForm, look,
+    Dialect, ExistingLines, FileFormat, HeaderMismatch, Layout, LineWriter, QUEUE_CAPACITY, Rotation, Rows, Series,
+    Setup, Target, TimeForm, existing_lines,
 };
 use crate::tasks::{Failure, Kind};
 use clap::{Args, ValueEnum};
@@ -143,7 +144,7 @@ pub(super) struct Opened {
     setup: Setup,
     /// The length of what stays.
     keep: u64,
-    events_kept: Option<Kept>,
+    events_kept: Option<ExistingLines>,
 }
 
 impl Files {
@@ -153,7 +154,7 @@ impl Files {
     }
 
     /// What can be known to be wrong before anything is opened.
-    pub(super) fn refuse(&self, form: Form, has_cycles: bool) -> Result<(), Failure> {
+    pub(super) fn refuse(&self, format: FileFormat, has_cycles: bool) -> Result<(), Failure> {
         let refuse = |message: &str, hint: &str| Err(Failure::new(Kind::Usage, message).hint(hint));
         if self.is_wide() && !has_cycles {
             return refuse(
@@ -162,7 +163,7 @@ impl Files {
             );
         }
         let of_csv = self.delimiter.is_some() || self.decimal.is_some() || self.bom;
-        if form == Form::Json && of_csv {
+        if format == FileFormat::JsonLines && of_csv {
             return refuse("--delimiter, --decimal and --bom are for CSV", "leave --format json out, or them");
         }
         let Dialect { delimiter, decimal, .. } = self.dialect();
@@ -201,14 +202,14 @@ impl Files {
     }
 
     /// Opens everything, before the bus.
-    pub(super) fn open(&self, form: Form, count: Option<u64>) -> anyhow::Result<Opened> {
+    pub(super) fn open(&self, format: FileFormat, count: Option<u64>) -> anyhow::Result<Opened> {
         let setup = Setup {
-            form,
+            format,
             layout: if self.is_wide() { Layout::Wide } else { Layout::Long },
             dialect: self.dialect(),
             time: self.time(),
             rotation: self.rotate.map(|rotation| rotation.0),
-            limit: count.filter(|_| self.is_wide()),
+            max_rows: count.filter(|_| self.is_wide()),
             ..Setup::default()
         };
         let open = |path: &PathBuf| OutFile::open(path, self.existing());
@@ -221,7 +222,7 @@ impl Files {
                 if let Some(kept) = file.look()? {
                     opened.keep = kept.length;
                     opened.setup.continues = true;
-                    opened.setup.before = Some(kept.head);
+                    opened.setup.existing_header = Some(kept.header);
                 }
                 if file.is_regular() {
                     opened.series = Some(Series::new(path, 2, self.force));
@@ -232,14 +233,14 @@ impl Files {
             None => {}
         }
         if let (false, Some(file)) = (self.is_wide(), &opened.rows) {
-            opened.setup.fits().map_err(|other| other_head(file.path(), &other))?;
+            opened.setup.check_long().map_err(|other| other_head(file.path(), &other))?;
         }
         opened.events = self.events.as_ref().map(open).transpose()?;
         if let Some(file) = &mut opened.events {
             opened.events_kept = file.look()?;
-            let wanted = Events::header(self.dialect());
-            if let Some(kept) = opened.events_kept.as_ref().filter(|kept| kept.head != wanted) {
-                return Err(other_head(file.path(), &OtherHead { found: kept.head.clone(), wanted }).into());
+            let expected = Events::header(self.dialect());
+            if let Some(kept) = opened.events_kept.as_ref().filter(|kept| kept.header != expected) {
+                return Err(other_head(file.path(), &HeaderMismatch { found: kept.header.clone(), expected }).into());
             }
         }
         let summary = self.summary.as_ref().filter(|path| path.as_path() != Path::new("-"));
@@ -255,7 +256,7 @@ impl Files {
         let numbers = Series::existing(base)
             .map_err(|source| FileError { what: format!("create {}", Series::name(base, 1).display()), source })?;
         let mut first = 1;
-        let mut mending = None;
+        let mut last_file = None;
         match (numbers.last(), self.existing()) {
             (Some(_), Existing::Refuse) => {
                 let name = Series::name(base, *numbers.first().unwrap_or(&1));
@@ -266,14 +267,14 @@ impl Files {
                 let path = Series::name(base, *last);
                 let read = |path: &Path| -> io::Result<_> {
                     let mut file = OpenOptions::new().read(true).write(true).open(path)?;
-                    let kept = look(&mut file)?;
+                    let kept = existing_lines(&mut file)?;
                     Ok((file, kept))
                 };
                 let (file, kept) =
                     read(&path).map_err(|source| FileError { what: format!("read {}", path.display()), source })?;
                 first = last.saturating_add(1);
-                opened.setup.before = kept.as_ref().map(|kept| kept.head.clone());
-                mending = Some((file, kept.map_or(0, |kept| kept.length)));
+                opened.setup.existing_header = kept.as_ref().map(|kept| kept.header.clone());
+                last_file = Some((file, kept.map_or(0, |kept| kept.length)));
             }
             _ => {}
         }
@@ -281,8 +282,8 @@ impl Files {
         opened.rows = Some(OutFile::open(&Series::name(base, first), existing)?);
         opened.setup.has_series = true;
         let series = Series::new(base, first.saturating_add(1), self.force);
-        opened.series = Some(match mending {
-            Some((file, length)) => series.mending(file, length),
+        opened.series = Some(match last_file {
+            Some((file, length)) => series.with_last(file, length),
             None => series,
         });
         Ok(())
@@ -296,7 +297,7 @@ impl Opened {
             Some(file) => file.target(self.keep)?,
             None => Target::Stream(Box::new(io::stdout())),
         };
-        Ok(Rows::new(sink(target, self.series.take(), waits)?, self.setup.clone()))
+        Ok(Rows::new(line_writer(target, self.series.take(), waits)?, self.setup.clone()))
     }
 
     /// The events' writer, if events are wanted.
@@ -304,26 +305,26 @@ impl Opened {
         let Some(file) = &self.events else { return Ok(None) };
         let (dialect, kept) = (self.setup.dialect, self.events_kept.as_ref());
         let target = file.target(kept.map_or(0, |kept| kept.length))?;
-        let sink = sink(target, None, waits)?;
-        Ok(Some(Events::new(sink, dialect, self.setup.time, kept.is_some())))
+        let writer = line_writer(target, None, waits)?;
+        Ok(Some(Events::new(writer, dialect, self.setup.time, kept.is_some())))
     }
 
     /// That the file which was to be continued has other columns.
-    pub(super) fn other_head(&self, other: &OtherHead) -> Failure {
+    pub(super) fn other_head(&self, other: &HeaderMismatch) -> Failure {
         other_head(self.rows.as_ref().map_or(Path::new("stdout"), OutFile::path), other)
     }
 }
 
-fn sink(target: Target, series: Option<Series>, waits: bool) -> anyhow::Result<Sink> {
+fn line_writer(target: Target, series: Option<Series>, waits: bool) -> anyhow::Result<LineWriter> {
     if waits {
-        return Ok(Sink::direct(target, series));
+        return Ok(LineWriter::direct(target, series));
     }
-    let sink = Sink::queued(target, series, CAPACITY);
-    Ok(sink.map_err(|source| FileError { what: "start a thread".to_owned(), source })?)
+    let writer = LineWriter::queued(target, series, QUEUE_CAPACITY);
+    Ok(writer.map_err(|source| FileError { what: "start a thread".to_owned(), source })?)
 }
 
-fn other_head(path: &Path, other: &OtherHead) -> Failure {
-    let message = format!("{} has other columns: \"{}\", not \"{}\"", path.display(), other.found, other.wanted);
+fn other_head(path: &Path, other: &HeaderMismatch) -> Failure {
+    let message = format!("{} has other columns: \"{}\", not \"{}\"", path.display(), other.found, other.expected);
     Failure::new(Kind::Usage, message).hint("name another file, or overwrite it with --force")
 }
 

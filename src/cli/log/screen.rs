@@ -7,7 +7,7 @@ use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
 use crate::output::events::{Events, Weight, Words, words};
 use crate::output::progress::Progress;
-use crate::output::rows::{OtherHead, Rows};
+use crate::output::rows::{HeaderMismatch, Rows};
 use crate::tasks::log::{Note, Observer};
 use crate::tasks::{Failure, Kind};
 use std::io;
@@ -31,7 +31,7 @@ pub(super) struct Screen {
     pub(super) console: Console,
     pub(super) error: Option<Unwritten>,
     /// The file that is to be continued has other columns than will come.
-    pub(super) other_head: Option<OtherHead>,
+    pub(super) other_head: Option<HeaderMismatch>,
     /// What is kept from others until the recording has begun.
     pub(super) claims: Option<Claims>,
     begun: Option<Mono>,
@@ -79,9 +79,9 @@ impl Screen {
 
     fn take(&mut self, cycle: Option<u64>, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
         self.progress.take(samples, sources);
-        let mut result = self.rows.add(cycle, samples, sources);
+        let mut result = self.rows.put(cycle, samples, sources);
         if let (Ok(()), Some(last)) = (&result, samples.last()) {
-            result = self.rows.pass(last.at);
+            result = self.rows.advance(last.at);
             self.look(last.at);
         }
         self.rows_or_break(result)?;
@@ -94,15 +94,15 @@ impl Screen {
             return;
         }
         self.looked = Some(at.mono);
-        if let Some(Err(error)) = self.events.as_mut().map(Events::begin) {
+        if let Some(Err(error)) = self.events.as_mut().map(Events::write_header) {
             self.error.get_or_insert(Unwritten::Events(error));
         }
-        let changes = self.rows.changes();
+        let changes = self.rows.column_changes();
         if changes > std::mem::replace(&mut self.changes, changes) {
             let text = "a mapping or a unit has changed: the rows go on with new columns, of a file in the next file";
             self.event(&Words::of_all("columns", Weight::Warning, text.to_owned()), at);
         }
-        let lost = self.rows.late();
+        let lost = self.rows.overflowed();
         let more = lost > std::mem::replace(&mut self.lost, lost);
         match (self.is_losing, more) {
             (false, true) => {
@@ -122,14 +122,14 @@ impl Screen {
 
 impl Observer for Screen {
     fn sources(&mut self, sources: &[Source]) -> Result<(), Failure> {
-        self.rows.columns(sources).map_err(|other| {
+        self.rows.set_sources(sources).map_err(|other| {
             self.other_head = Some(other);
             Failure::new(Kind::Usage, "the file has other columns")
         })
     }
 
     fn cycle(&mut self, number: u64, at: Stamp) -> ControlFlow<()> {
-        let result = self.rows.cycle(number, at);
+        let result = self.rows.start_cycle(number, at);
         self.rows_or_break(result)?;
         if self.rows.is_complete() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
@@ -151,7 +151,7 @@ impl Observer for Screen {
         self.claims = None;
         let begun = *self.begun.get_or_insert(at.mono);
         self.progress.tick(at.mono.since(begun), self.rows.count());
-        let result = self.rows.pass(at);
+        let result = self.rows.advance(at);
         if self.rows.count() > 0 {
             self.look(at);
         }

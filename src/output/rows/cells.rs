@@ -1,18 +1,18 @@
-//! The cells of a row: times, numbers and text, each written without an allocation.
+//! The cells of a CSV row: times, numbers and text. Nothing is allocated.
 
 use crate::bus::time::Wall;
 use crate::measure::sample::{Number, Raw};
 use std::io::{self, Write};
 use std::time::Duration;
 
-/// How CSV is written, for the spreadsheets of different countries.
+/// The separators of CSV: spreadsheets of different countries expect different ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dialect {
-    /// Between two cells: one ASCII character.
+    /// Separates two cells: one ASCII character.
     pub delimiter: u8,
-    /// Between a number's digits: `.` or `,`.
+    /// The decimal sign: `.` or `,`.
     pub decimal: u8,
-    /// Whether a file begins with a byte order mark.
+    /// Whether a file starts with a byte order mark.
     pub bom: bool,
 }
 
@@ -43,10 +43,10 @@ const DAYS_BEFORE_1970: u64 = 25_569;
 /// Microseconds of a day.
 const DAY_US: u128 = 86_400_000_000;
 
-/// Digits behind the point of a day: finer than a microsecond.
+/// Decimals of a day: finer than a microsecond.
 const DAY_DIGITS: usize = 11;
 
-/// Writes times; the text of a second is made once.
+/// Writes times. The text of a second is kept until the next second.
 #[derive(Debug, Default)]
 pub(in crate::output) struct Times {
     form: TimeForm,
@@ -60,7 +60,7 @@ impl Times {
         Times { form, ..Times::default() }
     }
 
-    /// A time as JSON has it: in quotes, or a number.
+    /// A time as a JSON value: text or a number.
     pub(in crate::output) fn json(&mut self, wall: Wall) -> io::Result<serde_json::Value> {
         let mut text = Vec::new();
         self.write(&mut text, wall, b'.')?;
@@ -81,7 +81,7 @@ impl Times {
                     self.text.clear();
                     self.second = None;
                     let whole = Wall::at(Duration::from_secs(since.as_secs())).system_time();
-                    // Years beyond 9999 have no such text.
+                    // RFC 3339 has no years beyond 9999.
                     write!(self.text, "{}", humantime::format_rfc3339_seconds(whole)).map_err(io::Error::other)?;
                     self.text.pop();
                     self.second = Some(since.as_secs());
@@ -95,7 +95,7 @@ impl Times {
             TimeForm::Excel => {
                 let rest = since.as_micros() % DAY_US;
                 let scale = 10u128.pow(11);
-                // Half a unit is added to round; what rounds up to a whole day is the next one.
+                // Half a unit is added for rounding, which may carry into the next day.
                 let fraction = (rest * scale + DAY_US / 2) / DAY_US;
                 let days = u64::try_from(since.as_micros() / DAY_US + fraction / scale).unwrap_or(u64::MAX);
                 push_number(out, days.saturating_add(DAYS_BEFORE_1970));
@@ -119,7 +119,7 @@ pub(in crate::output) fn push_number(out: &mut Vec<u8>, number: u64) {
     push_padded(out, number, 1);
 }
 
-/// An integer with zeros in front, up to `width` digits.
+/// An integer with leading zeros, at least `width` digits.
 fn push_padded(out: &mut Vec<u8>, mut number: u64, width: usize) {
     let mut digits = [b'0'; 20];
     let mut at = digits.len();
@@ -131,7 +131,7 @@ fn push_padded(out: &mut Vec<u8>, mut number: u64, width: usize) {
     out.extend_from_slice(&digits[at..]);
 }
 
-/// A measured number; nothing where there is none.
+/// A measured number; nothing if there is none.
 pub(super) fn push_value(out: &mut Vec<u8>, value: Option<Number>, decimal: u8) -> io::Result<()> {
     match value {
         None => {}
@@ -158,7 +158,7 @@ pub(super) fn push_value(out: &mut Vec<u8>, value: Option<Number>, decimal: u8) 
     Ok(())
 }
 
-/// The bytes on the wire.
+/// Bytes in wire order, after `0x`.
 pub(super) fn push_raw(out: &mut Vec<u8>, raw: &Raw) {
     const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
     out.extend_from_slice(b"0x");
@@ -167,7 +167,7 @@ pub(super) fn push_raw(out: &mut Vec<u8>, raw: &Raw) {
     }
 }
 
-/// Text; in quotes where it needs them: a delimiter, a quote, or a line end inside.
+/// Text; in quotes if it contains a delimiter, a quote or a line end.
 pub(in crate::output) fn push_text(out: &mut Vec<u8>, text: &str, delimiter: u8) {
     if text.bytes().any(|byte| byte == delimiter || matches!(byte, b'"' | b'\n' | b'\r')) {
         out.push(b'"');
@@ -180,7 +180,7 @@ pub(in crate::output) fn push_text(out: &mut Vec<u8>, text: &str, delimiter: u8)
     }
 }
 
-/// A line of texts.
+/// A line of text cells.
 pub(in crate::output) fn push_texts<'a>(out: &mut Vec<u8>, texts: impl IntoIterator<Item = &'a str>, delimiter: u8) {
     for (at, text) in texts.into_iter().enumerate() {
         if at > 0 {
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn the_text_of_a_second_is_that_of_the_next_one_only_once() {
+    fn time_text_follows_the_second() {
         let mut times = Times::default();
         let mut out = Vec::new();
         for micros in [1_999_999, 2_000_000, 1_000_000] {
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn quotes_where_needed() {
+    fn text_is_quoted_if_necessary() {
         let line = |delimiter| {
             let mut out = Vec::new();
             push_texts(&mut out, ["a,b", "c;d", "e\"f", ""], delimiter);
@@ -256,7 +256,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn numbers_and_times_are_those_of_their_own_display(
+        fn numbers_and_times_match_their_display(
             mantissa in any::<i128>(), small in any::<i64>(), digits in 0u8..=38, since in 0u64..250_000_000_000_000_000,
         ) {
             for mantissa in [mantissa, i128::from(small), i128::from(small % 1000)] {

@@ -1,48 +1,48 @@
-//! What stands in a file that is to be continued.
+//! Reads what a file to be continued contains.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// The beginning and the end of a file.
+/// The first line of a file, and how far its whole lines go.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Kept {
-    /// Its first line, without line end and byte order mark.
-    pub head: String,
-    /// How many bytes its whole lines have: a last line without line end was cut off by a kill.
+pub struct ExistingLines {
+    /// The first line, without line end and byte order mark.
+    pub header: String,
+    /// Bytes of all whole lines. A last line without line end was cut off by a kill.
     pub length: u64,
 }
 
-/// A first line longer than this is no header.
-const LONGEST_HEAD: u64 = 1 << 20;
+/// A longer first line is not a header.
+const MAX_HEADER: u64 = 1 << 20;
 
-/// How much is looked at, at a time.
-const STEP: u64 = 64 * 1024;
+/// How many bytes are read at a time.
+const CHUNK: u64 = 64 * 1024;
 
-/// Looks at a file that is open for reading; nothing where it has no whole line.
+/// Reads a file that is open for reading; `None` if it has no whole line.
 ///
 /// # Errors
-/// It cannot be read.
-pub fn look(file: &mut File) -> io::Result<Option<Kept>> {
+/// The file cannot be read.
+pub fn existing_lines(file: &mut File) -> io::Result<Option<ExistingLines>> {
     let mut end = file.metadata()?.len();
     let length = loop {
         if end == 0 {
             return Ok(None);
         }
-        let begin = end.saturating_sub(STEP);
+        let start = end.saturating_sub(CHUNK);
         let mut bytes = Vec::new();
-        file.seek(SeekFrom::Start(begin))?;
-        Read::by_ref(file).take(end - begin).read_to_end(&mut bytes)?;
+        file.seek(SeekFrom::Start(start))?;
+        Read::by_ref(file).take(end - start).read_to_end(&mut bytes)?;
         match bytes.iter().rposition(|&byte| byte == b'\n') {
-            Some(at) => break begin + at as u64 + 1,
-            None => end = begin,
+            Some(at) => break start + at as u64 + 1,
+            None => end = start,
         }
     };
     let mut bytes = Vec::new();
     file.seek(SeekFrom::Start(0))?;
-    Read::by_ref(file).take(length.min(LONGEST_HEAD)).read_to_end(&mut bytes)?;
+    Read::by_ref(file).take(length.min(MAX_HEADER)).read_to_end(&mut bytes)?;
     let line = bytes.split(|&byte| byte == b'\n').next().unwrap_or_default();
     let line = line.strip_prefix(super::cells::BOM).unwrap_or(line);
-    Ok(Some(Kept { head: String::from_utf8_lossy(line).into_owned(), length }))
+    Ok(Some(ExistingLines { header: String::from_utf8_lossy(line).into_owned(), length }))
 }
 
 #[cfg(test)]
@@ -50,21 +50,21 @@ mod tests {
     use super::*;
     use std::io::Write;
 
-    fn kept(text: &[u8]) -> Option<(String, u64)> {
+    fn lines(text: &[u8]) -> Option<(String, u64)> {
         let mut file = tempfile::tempfile().expect("a file");
         file.write_all(text).expect("written");
-        look(&mut file).expect("read").map(|kept| (kept.head, kept.length))
+        existing_lines(&mut file).expect("read").map(|lines| (lines.header, lines.length))
     }
 
     #[test]
-    fn whole_lines() {
-        assert_eq!(kept(b""), None);
-        assert_eq!(kept(b"time,elap"), None);
-        assert_eq!(kept(b"a,b\n"), Some(("a,b".to_owned(), 4)));
-        assert_eq!(kept(b"a,b\n1,2\n3,"), Some(("a,b".to_owned(), 8)));
-        assert_eq!(kept(b"\xef\xbb\xbfa,b\n1"), Some(("a,b".to_owned(), 7)));
+    fn whole_lines_are_found() {
+        assert_eq!(lines(b""), None);
+        assert_eq!(lines(b"time,elap"), None);
+        assert_eq!(lines(b"a,b\n"), Some(("a,b".to_owned(), 4)));
+        assert_eq!(lines(b"a,b\n1,2\n3,"), Some(("a,b".to_owned(), 8)));
+        assert_eq!(lines(b"\xef\xbb\xbfa,b\n1"), Some(("a,b".to_owned(), 7)));
         let long = [b"a\n".repeat(100_000), vec![b'x'; 200_000]].concat();
-        assert_eq!(kept(&long), Some(("a".to_owned(), 200_000)));
-        assert_eq!(kept(&vec![b'x'; 200_000]), None);
+        assert_eq!(lines(&long), Some(("a".to_owned(), 200_000)));
+        assert_eq!(lines(&vec![b'x'; 200_000]), None);
     }
 }

@@ -5,30 +5,31 @@ use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Names that follow each other.
+/// The numbered files of one recording.
 #[derive(Debug)]
 pub struct Series {
     base: PathBuf,
     next: u32,
     force: bool,
-    mend: Option<(File, u64)>,
+    /// The last file of an earlier run, and its length without the line that was cut off.
+    last: Option<(File, u64)>,
 }
 
 impl Series {
-    /// The files beside `base`, `run.csv`, from this number on. What exists is overwritten only with `force`,
-    /// otherwise its number is passed over.
+    /// The files `run-NNNN.csv` for the `base` `run.csv`, from the number `next`. With `force` existing files are
+    /// overwritten; without it their numbers are skipped.
     pub fn new(base: &Path, next: u32, force: bool) -> Series {
-        Series { base: base.to_owned(), next, force, mend: None }
+        Series { base: base.to_owned(), next, force, last: None }
     }
 
-    /// Cuts the file before the first one back to so many bytes, once there is something to write.
+    /// Before the first row is written, cuts the last file of an earlier run to this many bytes.
     #[must_use]
-    pub fn mending(self, file: File, length: u64) -> Series {
-        Series { mend: Some((file, length)), ..self }
+    pub fn with_last(self, file: File, length: u64) -> Series {
+        Series { last: Some((file, length)), ..self }
     }
 
-    pub(super) fn mend(&mut self) -> io::Result<()> {
-        self.mend.take().map_or(Ok(()), |(file, length)| file.set_len(length))
+    pub(super) fn repair_last(&mut self) -> io::Result<()> {
+        self.last.take().map_or(Ok(()), |(file, length)| file.set_len(length))
     }
 
     /// The file with this number.
@@ -42,7 +43,7 @@ impl Series {
         base.with_file_name(name)
     }
 
-    /// The numbers that exist, in ascending order.
+    /// The numbers of the existing files, in ascending order.
     ///
     /// # Errors
     /// The folder cannot be read.
@@ -52,7 +53,7 @@ impl Series {
         for entry in fs::read_dir(folder)? {
             let name = entry?.file_name();
             let number = Path::new(&name).file_stem().and_then(|stem| stem.to_str()?.rsplit_once('-')?.1.parse().ok());
-            // `run-1.csv` and `run-+0001.csv` are not ours.
+            // `run-1.csv` and `run-+0001.csv` do not belong to the series.
             numbers.extend(number.filter(|&number| Series::name(base, number).file_name() == Some(&name)));
         }
         numbers.sort_unstable();
@@ -92,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn what_exists_is_found_and_passed_over() {
+    fn existing_files_are_found_and_skipped() {
         let folder = tempfile::tempdir().expect("a folder");
         for name in ["run-0002.csv", "run-0010.csv", "run-1.csv", "run-0003.txt", "other-0004.csv", "run.csv"] {
             fs::write(folder.path().join(name), name).expect("written");

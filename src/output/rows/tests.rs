@@ -1,9 +1,9 @@
-//! Rows as they stand in files and streams.
+//! Rows as files and streams receive them.
 
 use super::*;
-use crate::bus::Wall;
+use crate::bus::{Mono, Wall};
 use crate::canopen::id::NodeId;
-use crate::measure::sample::{Number, Raw};
+use crate::measure::sample::{Number, Raw, Status};
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -31,14 +31,14 @@ impl Shared {
 
 fn stream(setup: Setup) -> (Shared, Rows) {
     let shared = Shared::default();
-    let sink = Sink::direct(Target::Stream(Box::new(shared.clone())), None);
-    (shared, Rows::new(sink, setup))
+    let writer = LineWriter::direct(Target::Stream(Box::new(shared.clone())), None);
+    (shared, Rows::new(writer, setup))
 }
 
 fn text(setup: Setup, samples: &[(Sample, Source)]) -> String {
     let (shared, mut rows) = stream(setup);
     for (sample, source) in samples {
-        rows.add(None, std::slice::from_ref(sample), std::slice::from_ref(source)).expect("memory");
+        rows.put(None, std::slice::from_ref(sample), std::slice::from_ref(source)).expect("memory");
     }
     rows.finish(&mut || false).expect("memory");
     shared.text()
@@ -83,7 +83,7 @@ fn csv_rows() {
 }
 
 #[test]
-fn csv_rows_for_other_countries() {
+fn csv_rows_with_other_separators() {
     let dialect = Dialect { delimiter: b';', decimal: b',', bom: true };
     let setup = Setup { dialect, time: TimeForm::Unix, ..Setup::default() };
     assert_eq!(
@@ -105,7 +105,7 @@ fn json_rows() {
         (sample(10_000, Some(Number::Real32(1.1)), Some(Status::Ok), &[1]), source("pressure", "bar")),
         (sample(20_000, None, Some(Status::Invalid), &[2]), source("ch1", "")),
     ];
-    let json = |time| text(Setup { form: Form::Json, time, ..Setup::default() }, &rows);
+    let json = |time| text(Setup { format: FileFormat::JsonLines, time, ..Setup::default() }, &rows);
     assert_eq!(
         json(TimeForm::Rfc3339),
         "{\"time\":\"2023-11-14T22:13:20.000000Z\",\"elapsed_s\":0.0,\"node\":5,\"signal\":\"pressure\",\"value\":17.898,\"unit\":\"psi\",\"status\":null,\"raw\":\"0xEA450000\"}\n\
@@ -116,20 +116,20 @@ fn json_rows() {
 }
 
 #[test]
-fn wide_rows_and_columns_that_change() {
-    for form in [Form::Csv, Form::Json] {
-        let (shared, mut rows) = stream(Setup { form, layout: Layout::Wide, ..Setup::default() });
+fn wide_rows_and_changed_columns() {
+    for format in [FileFormat::Csv, FileFormat::JsonLines] {
+        let (shared, mut rows) = stream(Setup { format, layout: Layout::Wide, ..Setup::default() });
         let sources = [source("pressure", "bar"), source("ch1", ""), source("pressure", "psi")];
-        rows.columns(&sources[..2]).expect("a new file");
+        rows.set_sources(&sources[..2]).expect("a new file");
         let value = |us, source, status| Sample { source, ..sample(us, Some(Number::Real32(1.5)), status, &[]) };
-        rows.cycle(0, at(0)).expect("memory");
-        rows.add(None, &[value(10, 0, Some(Status::Ok))], &sources).expect("memory");
-        rows.add(None, &[value(20, 1, None)], &sources).expect("memory");
-        rows.cycle(1, at(1000)).expect("memory");
-        rows.add(None, &[value(1010, 2, None)], &sources).expect("memory");
+        rows.start_cycle(0, at(0)).expect("memory");
+        rows.put(None, &[value(10, 0, Some(Status::Ok))], &sources).expect("memory");
+        rows.put(None, &[value(20, 1, None)], &sources).expect("memory");
+        rows.start_cycle(1, at(1000)).expect("memory");
+        rows.put(None, &[value(1010, 2, None)], &sources).expect("memory");
         assert_eq!(rows.elapsed(at(510)), Some(Duration::from_micros(500)));
         rows.finish(&mut || false).expect("memory");
-        assert_eq!((rows.count(), rows.changes(), rows.left_out()), (2, 1, 0));
+        assert_eq!((rows.count(), rows.column_changes(), rows.left_out()), (2, 1, 0));
         let csv = "time,elapsed_s,5.pressure [bar],5.pressure.status,5.ch1,5.ch1.status\n\
                    2023-11-14T22:13:20.000010Z,0.000000,1.5,ok,1.5,\n\
                    \n\
@@ -137,27 +137,27 @@ fn wide_rows_and_columns_that_change() {
                    2023-11-14T22:13:20.001010Z,0.001000,1.5,,,\n";
         let json = "{\"time\":\"2023-11-14T22:13:20.000010Z\",\"elapsed_s\":0.0,\"5.pressure [bar]\":1.5,\"5.pressure.status\":\"ok\",\"5.ch1\":1.5,\"5.ch1.status\":null}\n\
                     {\"time\":\"2023-11-14T22:13:20.001010Z\",\"elapsed_s\":0.001,\"5.pressure [psi]\":1.5,\"5.pressure.status\":null,\"5.ch1\":null,\"5.ch1.status\":null}\n";
-        assert_eq!(shared.text(), if form == Form::Csv { csv } else { json });
+        assert_eq!(shared.text(), if format == FileFormat::Csv { csv } else { json });
     }
 }
 
-/// Rows into `run-0001.csv` and so on, one every 250 ms; what stands in each file.
+/// Writes a row every 250 ms to `run-0001.csv` and so on; returns the text of each file.
 fn rotated(rotation: Rotation, count: u64) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let base = folder.path().join("run.csv");
     let file = fs::File::create(Series::name(&base, 1)).expect("created");
-    let sink = Sink::direct(Target::File { file, keep: 0 }, Some(Series::new(&base, 2, false)));
-    let mut rows = Rows::new(sink, Setup { rotation: Some(rotation), has_series: true, ..Setup::default() });
+    let writer = LineWriter::direct(Target::File { file, keep: 0 }, Some(Series::new(&base, 2, false)));
+    let mut rows = Rows::new(writer, Setup { rotation: Some(rotation), has_series: true, ..Setup::default() });
     for number in 0..count {
         let row = sample(number * 250_000, Some(Number::Decimal { mantissa: number.into(), digits: 0 }), None, &[]);
-        rows.add(None, &[row], &[source("ch1", "")]).expect("written");
+        rows.put(None, &[row], &[source("ch1", "")]).expect("written");
     }
     rows.finish(&mut || false).expect("written");
     let read = |number| fs::read_to_string(Series::name(Path::new(&base), number)).expect("a file");
     Series::existing(&base).expect("the folder").into_iter().map(read).collect()
 }
 
-/// The values in the files, each of which begins with the header.
+/// The values in the files. Each file must start with the header.
 fn values(files: &[String]) -> Vec<Vec<u64>> {
     let values = |text: &String| {
         let mut lines = text.lines();
@@ -168,56 +168,56 @@ fn values(files: &[String]) -> Vec<Vec<u64>> {
 }
 
 #[test]
-fn a_new_file_every_second_with_no_row_lost_at_the_seam() {
+fn rotation_by_time_loses_no_row() {
     let files = values(&rotated(Rotation::Every(Duration::from_secs(1)), 10));
     assert_eq!(files, [vec![0, 1, 2, 3], vec![4, 5, 6, 7], vec![8, 9]]);
 }
 
 #[test]
-fn a_new_file_when_a_row_no_longer_fits() {
+fn rotation_by_size_fills_each_file() {
     let files = rotated(Rotation::Size(49 + 3 * 50), 2000);
     assert!(files.iter().all(|file| file.len() <= 49 + 3 * 50));
     let values = values(&files);
     assert!(values[..values.len() - 1].iter().all(|values| (2..=3).contains(&values.len())), "as many as fit");
     assert_eq!(values.concat(), (0..2000).collect::<Vec<_>>());
     let each = self::values(&rotated(Rotation::Size(1), 3));
-    assert_eq!(each, [[0], [1], [2]], "a row that never fits has a file of its own");
+    assert_eq!(each, [[0], [1], [2]], "a row that never fits gets its own file");
 }
 
 #[test]
-fn what_does_not_fit_is_counted_and_a_file_that_is_continued_keeps_its_header() {
+fn continued_file_keeps_its_whole_lines() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.csv");
     let head = "time,elapsed_s,node,signal,value,unit,status,raw";
     fs::write(&path, format!("{head}\n1,2\n3,4")).expect("written");
     let mut file = fs::OpenOptions::new().read(true).write(true).open(&path).expect("opened");
-    let kept = look(&mut file).expect("read").expect("lines");
-    let setup = Setup { before: Some(kept.head), continues: true, ..Setup::default() };
-    assert_eq!(setup.fits(), Ok(()));
-    let mut rows = Rows::new(Sink::direct(Target::File { file, keep: kept.length }, None), setup);
+    let existing = existing_lines(&mut file).expect("read").expect("lines");
+    let setup = Setup { existing_header: Some(existing.header), continues: true, ..Setup::default() };
+    assert_eq!(setup.check_long(), Ok(()));
+    let mut rows = Rows::new(LineWriter::direct(Target::File { file, keep: existing.length }, None), setup);
     assert_eq!(fs::read_to_string(&path).expect("read").len(), 48 + 1 + 4 + 3, "nothing before the first row");
-    rows.add(None, &[three()[1].0.clone()], &[source("pressure", "bar")]).expect("written");
+    rows.put(None, &[three()[1].0.clone()], &[source("pressure", "bar")]).expect("written");
     rows.finish(&mut || false).expect("written");
     let row = "2023-11-14T22:13:21.010001Z,0.000000,5,pressure,1.1,bar,ok,0xCDCC8C3F";
     assert_eq!(fs::read_to_string(&path).expect("read"), format!("{head}\n1,2\n{row}\n"));
 }
 
 #[test]
-fn no_row_waits_for_longer_than_half_a_second() {
+fn no_row_waits_longer_than_half_a_second() {
     for layout in [Layout::Long, Layout::Wide] {
         let (shared, mut rows) = stream(Setup { layout, ..Setup::default() });
         let sources = [source("ch1", "")];
-        rows.columns(&sources).expect("a new file");
+        rows.set_sources(&sources).expect("a new file");
         for number in 0..200u64 {
             let us = number * 10_000;
-            rows.cycle(number, at(us)).expect("memory");
-            rows.add(None, &[sample(us, Some(Number::Real32(1.5)), None, &[])], &sources).expect("memory");
-            rows.pass(at(us)).expect("memory");
+            rows.start_cycle(number, at(us)).expect("memory");
+            rows.put(None, &[sample(us, Some(Number::Real32(1.5)), None, &[])], &sources).expect("memory");
+            rows.advance(at(us)).expect("memory");
             let handed_over = shared.text().lines().skip(1).count() as u64;
             assert!(number + 1 - handed_over <= 50, "{handed_over} of {}", number + 1);
         }
-        // And when nothing follows.
-        rows.pass(at(199 * 10_000 + 500_000)).expect("memory");
+        // The last rows do not wait for others.
+        rows.advance(at(199 * 10_000 + 500_000)).expect("memory");
         assert_eq!(shared.text().lines().count(), 201);
     }
 }

@@ -1,28 +1,26 @@
 //! The wide layout: one row per cycle of SYNC or polling, with two columns per signal.
 //!
-//! A value belongs to the cycle in which it was received, a polled one to that in which it was asked for.
-//! Its row waits for it, until every column has come or another cycle, at most half a second, has passed.
-//! What comes later, and what comes a second time in a cycle, has no place.
+//! A value belongs to the cycle in which it was received; a polled value to the cycle in which it was requested.
+//! A row is complete when every column has a value. If values are missing, it waits for another cycle, at most
+//! half a second. Later values, and a second value of a signal in one cycle, are left out.
 
+use super::row::{Cell, Column};
 use crate::bus::{Mono, Stamp};
-use crate::measure::sample::{Number, Sample, Source, Status};
+use crate::measure::sample::{Sample, Source};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// A row waits for its last values no longer than this after its cycle.
-const LONGEST_WAIT: Duration = Duration::from_millis(500);
-
-/// What stands in the two cells of a signal.
-pub(super) type Cell = Option<(Option<Number>, Option<Status>)>;
+/// How long a row waits for missing values after its cycle.
+const MAX_WAIT: Duration = Duration::from_millis(500);
 
 /// One cycle.
 #[derive(Debug)]
 pub(super) struct Cycle {
     number: u64,
-    begin: Stamp,
-    /// When the first value came.
+    start: Stamp,
+    /// When the first value was received.
     first: Option<Stamp>,
-    pub(super) cells: Vec<Cell>,
+    pub(super) cells: Vec<Option<Cell>>,
     filled: usize,
 }
 
@@ -31,90 +29,81 @@ impl Cycle {
         self.filled == self.cells.len()
     }
 
-    /// The time of the row: that of its first value. In a cycle to which nothing came while it lasted, and so
-    /// that rows stand in order of time, it is the cycle's beginning.
-    pub(super) fn at(&self, next: Option<Mono>) -> Stamp {
-        self.first.filter(|first| next.is_none_or(|next| first.mono < next)).unwrap_or(self.begin)
+    /// The time of the row: that of its first value. If no value was received before the next cycle, the row
+    /// gets the start of its own cycle: rows stay in order of time.
+    fn at(&self, next: Option<Mono>) -> Stamp {
+        self.first.filter(|first| next.is_none_or(|next| first.mono < next)).unwrap_or(self.start)
     }
 }
 
-/// Puts values into rows.
+/// Collects the values of each cycle.
 #[derive(Debug, Default)]
 pub(super) struct Wide {
-    /// Which source stands in which column.
-    columns: Vec<usize>,
-    /// And the other way round.
+    columns: Vec<Column>,
+    /// For each source the place of its column.
     places: Vec<Option<usize>>,
-    names: Vec<Source>,
     open: VecDeque<Cycle>,
-    /// A row with a value was written; before it there are none.
-    begun: bool,
-    /// Values without a place.
+    /// Whether a cycle had a value. Empty cycles before the first value make no rows.
+    has_values: bool,
+    /// Values that are in no row.
     pub(super) left_out: u64,
 }
 
 impl Wide {
-    /// One column pair for each of the sources.
-    pub(super) fn set(&mut self, sources: &[Source]) {
-        self.columns = (0..sources.len()).collect();
-        self.index(sources);
+    /// One column for each of the sources.
+    pub(super) fn set_sources(&mut self, sources: &[Source]) {
+        self.columns = sources.iter().enumerate().map(|(number, source)| Column::new(number, source)).collect();
+        self.index(sources.len());
     }
 
-    fn index(&mut self, sources: &[Source]) {
-        self.places = vec![None; sources.len()];
-        for (place, &source) in self.columns.iter().enumerate() {
-            self.places[source] = Some(place);
+    fn index(&mut self, sources: usize) {
+        self.places = vec![None; sources];
+        for (place, column) in self.columns.iter().enumerate() {
+            self.places[column.number] = Some(place);
         }
-        self.names = self.columns.iter().map(|&source| sources[source].clone()).collect();
     }
 
-    /// The names of the columns, of value and status.
-    pub(super) fn names(&self) -> impl Iterator<Item = [String; 2]> + '_ {
-        self.names.iter().map(|source| {
-            let name = format!("{}.{}", source.node, source.signal);
-            let status = format!("{name}.status");
-            // The bits of a status object that was asked for are not the status in words.
-            let unit = if source.signal.ends_with(".status") { "code" } else { &*source.unit };
-            [if unit.is_empty() { name } else { format!("{name} [{unit}]") }, status]
-        })
+    /// The columns of the rows to come.
+    pub(super) fn columns(&self) -> &[Column] {
+        &self.columns
     }
 
-    /// A cycle begins.
-    pub(super) fn begin(&mut self, number: u64, at: Stamp) {
+    /// A cycle starts.
+    pub(super) fn start_cycle(&mut self, number: u64, at: Stamp) {
         let cells = vec![None; self.columns.len()];
-        self.open.push_back(Cycle { number, begin: at, first: None, cells, filled: 0 });
+        self.open.push_back(Cycle { number, start: at, first: None, cells, filled: 0 });
     }
 
     /// Whether the sample has a column.
-    pub(super) fn knows(&self, sample: &Sample) -> bool {
+    pub(super) fn has_column(&self, sample: &Sample) -> bool {
         self.places.get(sample.source).is_some_and(Option::is_some)
     }
 
-    /// Makes a column for the source of a sample: in the place of that of the same name, or behind those of the
-    /// same node. The rows that are not written yet come along.
-    pub(super) fn change(&mut self, sample: &Sample, sources: &[Source]) {
+    /// Adds a column for the source of a sample. It replaces the column of the same signal, or follows the last
+    /// one of its node. Open cycles get the column as well.
+    pub(super) fn add_column(&mut self, sample: &Sample, sources: &[Source]) {
         let Some(new) = sources.get(sample.source) else { return };
-        let same = |source: &Source| (source.node, &source.signal) == (new.node, &new.signal);
-        if let Some(place) = self.names.iter().position(same) {
-            self.columns[place] = sample.source;
+        let column = Column::new(sample.source, new);
+        if let Some(place) = self.columns.iter().position(|column| column.is_same_signal(new)) {
+            self.columns[place] = column;
             for cycle in &mut self.open {
                 cycle.filled -= usize::from(cycle.cells[place].take().is_some());
             }
         } else {
-            let behind = self.names.iter().rposition(|source| source.node == new.node);
-            let place = behind.map_or(self.columns.len(), |last| last + 1);
-            self.columns.insert(place, sample.source);
+            let last = self.columns.iter().rposition(|column| column.source.node == new.node);
+            let place = last.map_or(self.columns.len(), |last| last + 1);
+            self.columns.insert(place, column);
             self.open.iter_mut().for_each(|cycle| cycle.cells.insert(place, None));
         }
-        self.index(sources);
+        self.index(sources.len());
     }
 
-    /// Takes a sample, into the cycle of this number if it was polled.
+    /// Takes a sample. A polled sample comes with the number of the cycle in which it was requested.
     pub(super) fn put(&mut self, number: Option<u64>, sample: &Sample) {
         let place = self.places.get(sample.source).copied().flatten();
         let cycle = match number {
             Some(number) => self.open.iter_mut().find(|cycle| cycle.number == number),
-            None => self.open.iter_mut().rev().find(|cycle| cycle.begin.mono <= sample.at.mono),
+            None => self.open.iter_mut().rev().find(|cycle| cycle.start.mono <= sample.at.mono),
         };
         let (Some(place), Some(cycle)) = (place, cycle) else {
             self.left_out += 1;
@@ -124,36 +113,37 @@ impl Wide {
             self.left_out += 1;
             return;
         }
-        cycle.cells[place] = Some((sample.value, sample.status));
+        cycle.cells[place] = Some(Cell::of(sample));
         cycle.filled += 1;
         cycle.first.get_or_insert(sample.at);
     }
 
-    /// The next row that can be written now, with its time; all but the last cycle with `older`.
-    pub(super) fn pop(&mut self, now: Mono, older: bool) -> Option<(Stamp, Cycle)> {
+    /// The next row that can be written now, with its time. With `all_but_last` no row waits, except that of the
+    /// last cycle.
+    pub(super) fn pop(&mut self, now: Mono, all_but_last: bool) -> Option<(Stamp, Cycle)> {
         loop {
-            let next = self.open.get(1).map(|next| next.begin.mono);
+            let next = self.open.get(1).map(|next| next.start.mono);
             let front = self.open.front()?;
-            let over =
-                next.is_some_and(|next| older || now.since(next) >= next.since(front.begin.mono).min(LONGEST_WAIT));
-            if !front.is_full() && !over {
+            let is_over =
+                next.is_some_and(|next| all_but_last || now.since(next) >= next.since(front.start.mono).min(MAX_WAIT));
+            if !front.is_full() && !is_over {
                 return None;
             }
             let cycle = self.open.pop_front()?;
-            self.begun |= cycle.filled > 0;
-            if self.begun {
+            self.has_values |= cycle.filled > 0;
+            if self.has_values {
                 return Some((cycle.at(next), cycle));
             }
         }
     }
 
-    /// The next row at the end; cycles behind the last value are none.
+    /// The next row at the end of the recording. Empty cycles after the last value make no rows.
     pub(super) fn drain(&mut self) -> Option<(Stamp, Cycle)> {
         while self.open.iter().any(|cycle| cycle.filled > 0) {
-            let next = self.open.get(1).map(|next| next.begin.mono);
+            let next = self.open.get(1).map(|next| next.start.mono);
             let cycle = self.open.pop_front()?;
-            self.begun |= cycle.filled > 0;
-            if self.begun {
+            self.has_values |= cycle.filled > 0;
+            if self.has_values {
                 return Some((cycle.at(next), cycle));
             }
         }
@@ -166,7 +156,7 @@ mod tests {
     use super::*;
     use crate::bus::Wall;
     use crate::canopen::id::NodeId;
-    use crate::measure::sample::Raw;
+    use crate::measure::sample::{Number, Raw};
 
     fn at(ms: u64) -> Stamp {
         let since = Duration::from_millis(ms);
@@ -184,8 +174,8 @@ mod tests {
 
     /// `12: 1 -`: the time in milliseconds and the cells.
     fn text((time, cycle): (Stamp, Cycle)) -> String {
-        let cell = |cell: &Cell| match cell {
-            Some((Some(value), _)) => format!(" {value}"),
+        let cell = |cell: &Option<Cell>| match cell {
+            Some(Cell { value: Some(value), .. }) => format!(" {value}"),
             _ => " -".to_owned(),
         };
         let cells: String = cycle.cells.iter().map(cell).collect();
@@ -202,14 +192,14 @@ mod tests {
 
     fn two() -> Wide {
         let mut wide = Wide::default();
-        wide.set(&[source(1, "pressure", "bar"), source(2, "pressure", "psi")]);
+        wide.set_sources(&[source(1, "pressure", "bar"), source(2, "pressure", "psi")]);
         wide
     }
 
     #[test]
-    fn a_row_is_whole_with_its_last_value() {
+    fn row_is_complete_with_its_last_value() {
         let mut wide = two();
-        wide.begin(0, at(0));
+        wide.start_cycle(0, at(0));
         wide.put(None, &sample(2, 1, 7));
         assert_eq!(popped(&mut wide, 3), [""; 0]);
         wide.put(None, &sample(3, 0, 8));
@@ -218,12 +208,12 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_was_received_before_belongs_to_the_cycle_before() {
+    fn value_belongs_to_the_cycle_of_its_receive_time() {
         let mut wide = two();
-        wide.begin(0, at(0));
+        wide.start_cycle(0, at(0));
         wide.put(None, &sample(2, 0, 1));
-        // The program was late: what it hears after the SYNC was received before it.
-        wide.begin(1, at(10));
+        // The program was late: it reads a frame after the SYNC that was received before it.
+        wide.start_cycle(1, at(10));
         wide.put(None, &sample(9, 1, 2));
         wide.put(None, &sample(12, 1, 4));
         wide.put(None, &sample(13, 1, 5));
@@ -233,72 +223,72 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_belongs_to_the_cycle_of_its_request() {
+    fn polled_value_belongs_to_the_cycle_of_its_request() {
         let mut wide = two();
-        wide.begin(0, at(0));
+        wide.start_cycle(0, at(0));
         wide.put(Some(0), &sample(2, 0, 1));
-        wide.begin(1, at(10));
+        wide.start_cycle(1, at(10));
         wide.put(Some(1), &sample(12, 0, 3));
         wide.put(Some(0), &sample(13, 1, 2));
         assert_eq!(popped(&mut wide, 13), ["2: 1 2"]);
-        wide.begin(2, at(20));
+        wide.start_cycle(2, at(20));
         assert_eq!(popped(&mut wide, 29), [""; 0]);
-        wide.begin(3, at(30));
+        wide.start_cycle(3, at(30));
         assert_eq!(popped(&mut wide, 30), ["12: 3 -"]);
-        // Its row is written: it goes into none.
+        // The row of this cycle is already written.
         wide.put(Some(1), &sample(31, 1, 9));
         assert_eq!(wide.left_out, 1);
-        // Came in the next cycle: the row's time is the beginning of its own.
+        // Received in the next cycle: the row gets the start of its own cycle.
         wide.put(Some(2), &sample(33, 0, 5));
         wide.put(Some(3), &sample(34, 0, 6));
         assert_eq!(drained(&mut wide), ["20: 5 -", "34: 6 -"]);
     }
 
     #[test]
-    fn empty_cycles_stand_between_values_only() {
+    fn empty_cycles_make_rows_only_between_values() {
         let mut wide = two();
-        (0..3).for_each(|cycle| wide.begin(cycle, at(cycle * 10)));
-        assert_eq!(popped(&mut wide, 20), [""; 0], "nothing came yet");
+        (0..3).for_each(|cycle| wide.start_cycle(cycle, at(cycle * 10)));
+        assert_eq!(popped(&mut wide, 20), [""; 0], "no value yet");
         wide.put(None, &sample(25, 0, 1));
-        (3..6).for_each(|cycle| wide.begin(cycle, at(cycle * 10)));
+        (3..6).for_each(|cycle| wide.start_cycle(cycle, at(cycle * 10)));
         assert_eq!(popped(&mut wide, 50), ["25: 1 -", "30: - -"]);
         assert_eq!(drained(&mut wide), [""; 0]);
         let mut wide = two();
-        (0..4).for_each(|cycle| wide.begin(cycle, at(cycle * 10)));
+        (0..4).for_each(|cycle| wide.start_cycle(cycle, at(cycle * 10)));
         wide.put(None, &sample(15, 0, 1));
         wide.put(None, &sample(35, 0, 2));
         assert_eq!(drained(&mut wide), ["15: 1 -", "20: - -", "35: 2 -"]);
     }
 
     #[test]
-    fn a_long_cycle_is_written_half_a_second_after_it() {
+    fn row_of_a_long_cycle_waits_half_a_second() {
         let mut wide = two();
-        wide.begin(0, at(0));
+        wide.start_cycle(0, at(0));
         wide.put(None, &sample(1, 0, 1));
-        wide.begin(1, at(10_000));
+        wide.start_cycle(1, at(10_000));
         assert_eq!(popped(&mut wide, 10_499), [""; 0]);
         assert_eq!(popped(&mut wide, 10_500), ["1: 1 -"]);
     }
 
     #[test]
-    fn a_unit_that_changes_takes_the_place_and_a_new_signal_a_new_one() {
+    fn changed_unit_replaces_its_column_and_new_signal_adds_one() {
         let mut wide = two();
-        wide.begin(0, at(0));
+        wide.start_cycle(0, at(0));
         wide.put(None, &sample(1, 0, 1));
         wide.put(None, &sample(2, 1, 2));
         let mut sources = vec![source(1, "pressure", "bar"), source(2, "pressure", "psi")];
         sources.extend([source(1, "pressure", "Pa"), source(1, "temperature", ""), source(1, "pressure.status", "")]);
-        wide.begin(1, at(10));
+        wide.start_cycle(1, at(10));
         assert_eq!(std::iter::from_fn(|| wide.pop(at(11).mono, true)).map(text).collect::<Vec<_>>(), ["1: 1 2"]);
         wide.put(None, &sample(12, 1, 3));
         for new in 2..5 {
-            assert!(!wide.knows(&sample(13, new, 0)));
-            wide.change(&sample(13, new, 0), &sources);
+            assert!(!wide.has_column(&sample(13, new, 0)));
+            wide.add_column(&sample(13, new, 0), &sources);
             wide.put(None, &sample(13, new, new as i128));
         }
-        let names: Vec<String> = wide.names().map(|[value, _]| value).collect();
+        let names: Vec<String> = wide.columns().iter().map(|column| column.value_name.clone()).collect();
         assert_eq!(names, ["1.pressure [Pa]", "1.temperature", "1.pressure.status [code]", "2.pressure [psi]"]);
         assert_eq!(popped(&mut wide, 13), ["12: 2 3 4 3"]);
-        assert!(!wide.knows(&sample(14, 0, 0)), "and back again is a change, too");
+        assert!(!wide.has_column(&sample(14, 0, 0)), "the old unit is a change as well");
     }
 }

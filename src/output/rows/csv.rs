@@ -1,0 +1,107 @@
+//! Rows as CSV, in both layouts.
+
+use super::cells::{
+    BOM, Dialect, TimeForm, Times, push_number, push_raw, push_seconds, push_text, push_texts, push_value,
+};
+use super::format::{HeaderMismatch, RowFormat};
+use super::row::{Columns, Row, Values};
+use crate::measure::sample::Status;
+use std::io;
+
+/// Writes CSV.
+#[derive(Debug)]
+pub(super) struct CsvRows {
+    dialect: Dialect,
+    times: Times,
+}
+
+impl CsvRows {
+    pub(super) fn new(dialect: Dialect, time: TimeForm) -> CsvRows {
+        CsvRows { dialect, times: Times::new(time) }
+    }
+
+    fn names(&self, columns: Columns<'_>) -> Vec<u8> {
+        let mut line = Vec::new();
+        push_texts(&mut line, columns.names().iter().map(String::as_str), self.dialect.delimiter);
+        line
+    }
+}
+
+impl RowFormat for CsvRows {
+    fn header(&self, columns: Columns<'_>) -> Vec<u8> {
+        let mut header = if self.dialect.bom { BOM.to_vec() } else { Vec::new() };
+        header.extend(self.names(columns));
+        header
+    }
+
+    /// An empty line separates the two tables.
+    fn new_columns(&self, columns: Columns<'_>) -> Vec<u8> {
+        let mut lines = vec![b'\n'];
+        lines.extend(self.names(columns));
+        lines
+    }
+
+    fn check_header(&self, first_line: &str, columns: Columns<'_>) -> Result<(), HeaderMismatch> {
+        let names = self.names(columns);
+        let expected = String::from_utf8_lossy(&names).trim_end_matches('\n').to_owned();
+        if first_line.trim_end_matches('\r') == expected {
+            return Ok(());
+        }
+        Err(HeaderMismatch { found: first_line.to_owned(), expected })
+    }
+
+    fn write(&mut self, row: &Row<'_>, out: &mut Vec<u8>) -> io::Result<()> {
+        let Dialect { delimiter, decimal, .. } = self.dialect;
+        self.times.write(out, row.time, decimal)?;
+        out.push(delimiter);
+        push_seconds(out, row.elapsed, decimal);
+        match row.values {
+            Values::One { sample, source } => {
+                out.push(delimiter);
+                push_number(out, u64::from(source.node.get()));
+                out.push(delimiter);
+                push_text(out, &source.signal, delimiter);
+                out.push(delimiter);
+                push_value(out, sample.value, decimal)?;
+                out.push(delimiter);
+                push_text(out, &source.unit, delimiter);
+                out.push(delimiter);
+                push_status(out, sample.status);
+                out.push(delimiter);
+                push_raw(out, &sample.raw);
+            }
+            Values::Cycle { cells, .. } => {
+                for cell in cells {
+                    let cell = cell.unwrap_or_default();
+                    out.push(delimiter);
+                    push_value(out, cell.value, decimal)?;
+                    out.push(delimiter);
+                    push_status(out, cell.status);
+                }
+            }
+        }
+        out.push(b'\n');
+        Ok(())
+    }
+}
+
+/// A status word; nothing if the device reports no status.
+fn push_status(out: &mut Vec<u8>, status: Option<Status>) {
+    out.extend_from_slice(status.map_or("", Status::as_str).as_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_same_columns_may_follow() {
+        let csv = CsvRows::new(Dialect { bom: true, ..Dialect::default() }, TimeForm::default());
+        let long = "time,elapsed_s,node,signal,value,unit,status,raw";
+        assert_eq!(csv.check_header(long, Columns::Long), Ok(()));
+        assert_eq!(csv.check_header(&format!("{long}\r"), Columns::Long), Ok(()));
+        let mismatch = HeaderMismatch { found: "a;b".to_owned(), expected: long.to_owned() };
+        assert_eq!(csv.check_header("a;b", Columns::Long), Err(mismatch));
+        assert!(csv.check_header("{}", Columns::Long).is_err());
+    }
+}

@@ -1,0 +1,58 @@
+//! The file formats of a recording. Each one is a file of its own beside this one.
+
+use super::csv::CsvRows;
+use super::json_lines::JsonRows;
+use super::row::{Columns, Row};
+use super::setup::Setup;
+use std::fmt::Debug;
+use std::io;
+
+/// The format of a recording.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FileFormat {
+    /// CSV.
+    #[default]
+    Csv,
+    /// JSON Lines.
+    JsonLines,
+}
+
+/// Turns typed rows into lines.
+pub(super) trait RowFormat: Debug {
+    /// The lines before the first row of a file; empty if the format has none.
+    fn header(&self, columns: Columns<'_>) -> Vec<u8>;
+
+    /// The lines in the middle of a stream, before the first row with other columns; empty if the format has none.
+    fn new_columns(&self, columns: Columns<'_>) -> Vec<u8>;
+
+    /// Whether rows with these columns may follow in a file that begins with `first_line`.
+    ///
+    /// # Errors
+    /// The file has other columns.
+    fn check_header(&self, first_line: &str, columns: Columns<'_>) -> Result<(), HeaderMismatch>;
+
+    /// Appends one row, with its line end.
+    ///
+    /// # Errors
+    /// The time cannot be represented.
+    fn write(&mut self, row: &Row<'_>, out: &mut Vec<u8>) -> io::Result<()>;
+}
+
+impl FileFormat {
+    /// The writer of this format.
+    pub(super) fn writer(self, setup: &Setup) -> Box<dyn RowFormat> {
+        match self {
+            FileFormat::Csv => Box::new(CsvRows::new(setup.dialect, setup.time)),
+            FileFormat::JsonLines => Box::new(JsonRows::new(setup.time)),
+        }
+    }
+}
+
+/// A file to be continued has other columns than the rows to come.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HeaderMismatch {
+    /// The first line of the file.
+    pub found: String,
+    /// The columns of the rows to come.
+    pub expected: String,
+}
