@@ -11,13 +11,15 @@
 //!   matching. Never prints; time is told by what is received.
 //! - [`sim`] → bus, device, canopen (frames, ids, values only). Simulated devices, written from the
 //!   standard and the manuals and not with the client's encoders.
-//! - [`measure`] → master, device, canopen, bus (moments). From TPDOs and SDO answers to samples, and their
-//!   statistics. When something came is an argument.
-//! - [`tasks`] → measure, master, device, canopen, bus (the trait). The procedures that users think in.
+//! - [`measure`] → device, canopen, bus (moments). From TPDOs and SDO answers to samples, and their
+//!   statistics. Drives no bus. When something came is an argument.
+//! - [`node`] → master, measure, device, canopen, bus (the trait). One node that the program talks to: what is known
+//!   of it, the only way to read and write it, the only wait loop.
+//! - [`tasks`] → node, measure, master, device, canopen, bus (the trait). The procedures that users think in.
 //!   They return reports and print nothing.
-//! - [`output`] → tasks (reports), measure, device, canopen (values), bus (moments, faults). Rows and text; knows no
+//! - [`output`] → tasks (reports), node, measure, device, canopen (values), bus (moments, faults). Rows and text; knows no
 //!   transport and no command line.
-//! - [`cli`] → tasks, output, measure, master, sim, bus, device, canopen (values). Holds no protocol bytes and
+//! - [`cli`] → tasks, output, node, measure, master, sim, bus, device, canopen (values). Holds no protocol bytes and
 //!   no sockets. One file a subcommand.
 
 pub mod bus;
@@ -26,6 +28,7 @@ pub mod cli;
 pub mod device;
 pub mod master;
 pub mod measure;
+pub mod node;
 pub mod output;
 pub mod sim;
 pub mod tasks;

@@ -11,6 +11,7 @@ const ONLY: &[(&str, &str, &[&str])] = &[
     ("bus", "canopen", &["frame", "id", "wire_length"]),
     ("master", "bus", THE_TRAIT),
     ("tasks", "bus", THE_TRAIT),
+    ("node", "bus", THE_TRAIT),
     ("measure", "bus", STAMPS),
     ("output", "bus", TOLD),
     ("output", "canopen", &["id", "lss", "value"]),

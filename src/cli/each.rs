@@ -6,7 +6,7 @@ use super::exit::Several;
 use super::open;
 use crate::canopen::id::NodeId;
 use crate::master::Master;
-use crate::measure::survey::Overrides;
+use crate::node::Overrides;
 use crate::tasks::failure::together;
 use crate::tasks::{Failure, Kind};
 

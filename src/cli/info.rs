@@ -47,7 +47,7 @@ impl Info {
 
 /// Every object of the page in a row.
 fn table(out: &mut dyn Write, page: &Page) -> io::Result<()> {
-    let node = page.instrument.node.to_string();
+    let node = page.instrument.id.to_string();
     let settings = page.channels.iter().flat_map(|channel| &channel.settings);
     let rows =
         page.communication.iter().chain(settings).chain(&page.own).map(|Setting { object, name, value, text }| {

@@ -8,7 +8,7 @@ use super::{Format, Global, open};
 use crate::canopen::id::NodeId;
 use crate::device::catalog::Model;
 use crate::master::Master;
-use crate::measure::survey::Overrides;
+use crate::node::Overrides;
 use crate::output::{csv, json_lss, table};
 use crate::tasks::lss::{LssAddress, LssRange, Named, Note, Slave, Target, activate, identify, inquire, scan, store};
 use crate::tasks::{Failure, Kind};

@@ -14,7 +14,7 @@ use crate::canopen::id::NodeId;
 use crate::device::catalog::{self, Model};
 use crate::device::eds;
 use crate::master::Master;
-use crate::measure::survey::Overrides;
+use crate::node::Overrides;
 use crate::sim::{Bench, BenchError};
 use crate::tasks::{Failure, Kind};
 use std::fs::File;

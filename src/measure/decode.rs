@@ -1,6 +1,6 @@
 //! The decoding of TPDOs into samples, by mapping, type, digits and status.
 
-use super::instrument::{Instrument, Signal, Tpdo};
+use super::layout::{Layout, Signal, Tpdo};
 use super::sample::{Number, Raw, Sample, Source, Status};
 use crate::bus::{Received, Stamp};
 use crate::canopen::id::{CanId, NodeId};
@@ -93,7 +93,7 @@ struct Plan {
     wrong_length: u64,
 }
 
-/// Decodes the TPDOs of several instruments.
+/// Decodes the TPDOs of several nodes.
 #[derive(Debug, Default)]
 pub struct Decoder {
     plans: HashMap<CanId, Plan>,
@@ -124,24 +124,24 @@ impl Decoder {
         self.sources.len() - 1
     }
 
-    /// Plans for every valid TPDO of an instrument; with `wanted`, only for what was asked for.
-    pub fn add(&mut self, instrument: &Instrument, wanted: &[Wanted]) {
-        for tpdo in instrument.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()) {
-            let mut plan = self.plan(instrument, tpdo, wanted);
+    /// Plans for every valid TPDO of a node; with `wanted`, only for what was asked for.
+    pub fn add(&mut self, layout: Layout<'_>, wanted: &[Wanted]) {
+        for tpdo in layout.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()) {
+            let mut plan = self.plan(layout, tpdo, wanted);
             let id = tpdo.cob_id.can_id();
             // Two nodes that send with one identifier: nothing tells whose values come.
-            if let Some(other) = self.plans.get(&id).filter(|other| other.node != instrument.node) {
+            if let Some(other) = self.plans.get(&id).filter(|other| other.node != layout.node) {
                 plan.held = true;
-                self.contested.insert(id, (other.node, instrument.node));
+                self.contested.insert(id, (other.node, layout.node));
             }
             self.plans.insert(id, plan);
         }
     }
 
-    /// The plans of an instrument that has been read again, in place of those that it had.
-    pub fn renew(&mut self, instrument: &Instrument, wanted: &[Wanted]) {
-        self.remove(instrument.node);
-        self.add(instrument, wanted);
+    /// The plans of a node that was read again; they replace the old ones.
+    pub fn renew(&mut self, layout: Layout<'_>, wanted: &[Wanted]) {
+        self.remove(layout.node);
+        self.add(layout, wanted);
     }
 
     /// Decodes nothing of a node any more: its TPDOs are nobody's.
@@ -154,25 +154,25 @@ impl Decoder {
         self.plans.values_mut().filter(|plan| plan.node == node).for_each(|plan| plan.held = true);
     }
 
-    fn plan(&mut self, instrument: &Instrument, tpdo: &Tpdo, wanted: &[Wanted]) -> Plan {
+    fn plan(&mut self, layout: Layout<'_>, tpdo: &Tpdo, wanted: &[Wanted]) -> Plan {
         let fields = lay_out(&tpdo.mapping);
         let bits: usize = tpdo.mapping.iter().map(|entry| usize::from(entry.bits)).sum();
         let mut parts = Vec::new();
         for field in &fields {
             let object = field.entry.object;
-            let data_type = instrument.data_type(object, field.entry.bits);
+            let data_type = layout.mapped_type(object, field.entry.bits);
             let mut add = |name: &str, unit: String, reading: &dyn Fn(usize) -> Reading, status: Option<Field>| {
-                let source = self.add_source(Source { node: instrument.node, signal: name.into(), unit: unit.into() });
+                let source = self.add_source(Source { node: layout.node, signal: name.into(), unit: unit.into() });
                 parts.push(Part { field: *field, reading: reading(source), status });
             };
             let asked = |item: &Wanted| wanted.contains(item);
-            if let Some(signal) = instrument.signals.iter().find(|signal| signal.is_value(object)) {
+            if let Some(signal) = layout.signals.iter().find(|signal| signal.is_value(object)) {
                 if wanted.is_empty() || asked(&Wanted::Signal(signal.name.clone())) {
                     let status = fields.iter().find(|other| Some(other.entry.object) == signal.status).copied();
                     let unit = signal.unit.map(|unit| unit.to_string()).unwrap_or_default();
                     add(&signal.name, unit, &|source| Reading::of_signal(signal, data_type, source), status);
                 }
-            } else if let Some(signal) = instrument.signals.iter().find(|signal| signal.status == Some(object)) {
+            } else if let Some(signal) = layout.signals.iter().find(|signal| signal.status == Some(object)) {
                 if asked(&Wanted::Status(signal.name.clone())) {
                     let name = format!("{}.status", signal.name);
                     add(&name, String::new(), &|source| Reading::plain(data_type, source), None);
@@ -184,7 +184,7 @@ impl Decoder {
                 add(&object.to_string(), String::new(), &|source| Reading::plain(data_type, source), None);
             }
         }
-        Plan { node: instrument.node, length: bits.div_ceil(8), parts, held: false, wrong_length: 0 }
+        Plan { node: layout.node, length: bits.div_ceil(8), parts, held: false, wrong_length: 0 }
     }
 
     /// Every source, in the order of their numbers.
@@ -250,8 +250,22 @@ mod tests {
     use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber};
     use crate::device::unit::Unit;
 
-    fn instrument(value: (ObjectId, DataType), words: &[u32], signal: impl Fn(&mut Signal)) -> Instrument {
-        let node = NodeId::new(1).expect("a node-ID");
+    #[derive(Clone)]
+    struct Node {
+        id: NodeId,
+        model: Option<Arc<Model>>,
+        signals: Vec<Signal>,
+        tpdos: Vec<Tpdo>,
+    }
+
+    impl Node {
+        fn layout(&self) -> Layout<'_> {
+            Layout { node: self.id, model: self.model.as_deref(), signals: &self.signals, tpdos: &self.tpdos }
+        }
+    }
+
+    fn node(value: (ObjectId, DataType), words: &[u32], signal: impl Fn(&mut Signal)) -> Node {
+        let id = NodeId::new(1).expect("a node-ID");
         let mut pressure = Signal {
             name: "pressure".into(),
             channel: 1,
@@ -263,21 +277,19 @@ mod tests {
             digits: Some(3),
         };
         signal(&mut pressure);
-        let mut instrument = Instrument::new(node);
-        instrument.signals.push(pressure);
-        instrument.tpdos.push(Tpdo {
+        let tpdo = Tpdo {
             number: TpdoNumber::new(1).expect("a number"),
             cob_id: CobId(0x4000_0181),
             transmission: None,
             event_timer_ms: None,
             mapping: words.iter().map(|&word| MappingEntry::from_word(word)).collect(),
-        });
-        instrument
+        };
+        Node { id, model: None, signals: vec![pressure], tpdos: vec![tpdo] }
     }
 
-    fn rows(instrument: &Instrument, wanted: &[Wanted], frame: &str) -> Vec<(String, String, &'static str)> {
+    fn rows(node: &Node, wanted: &[Wanted], frame: &str) -> Vec<(String, String, &'static str)> {
         let mut decoder = Decoder::default();
-        decoder.add(instrument, wanted);
+        decoder.add(node.layout(), wanted);
         let received = Received { frame: frame.parse().expect("a frame"), at: Stamp::default() };
         let mut samples = Vec::new();
         decoder.decode(&received, &mut samples);
@@ -299,7 +311,7 @@ mod tests {
 
     #[test]
     fn mh4_real_with_status() {
-        let mh4 = instrument(REAL, &[0x6130_0120, 0x6150_0108], |signal| {
+        let mh4 = node(REAL, &[0x6130_0120, 0x6150_0108], |signal| {
             signal.status = Some(ObjectId::new(0x6150, 1));
             signal.marker = true;
         });
@@ -319,7 +331,7 @@ mod tests {
     #[test]
     fn each_channel_has_its_own_status() {
         let words = [0x6150_0108, 0x6130_0220, 0x6150_0208];
-        let second = instrument((ObjectId::new(0x6130, 2), DataType::Real32), &words, |signal| {
+        let second = node((ObjectId::new(0x6130, 2), DataType::Real32), &words, |signal| {
             signal.status = Some(ObjectId::new(0x6150, 2));
         });
         assert_eq!(rows(&second, &[], "181#030000803F00"), [row("0x6150:1", "3", ""), row("pressure", "1", "ok")]);
@@ -328,20 +340,20 @@ mod tests {
 
     #[test]
     fn what_two_nodes_send_with_one_identifier_is_nobodys() {
-        let one = instrument(REAL, &[0x6130_0120], |_| {});
-        let other = Instrument { node: NodeId::new(2).expect("a node-ID"), ..one.clone() };
+        let one = node(REAL, &[0x6130_0120], |_| {});
+        let other = Node { id: NodeId::new(2).expect("a node-ID"), ..one.clone() };
         let mut decoder = Decoder::default();
-        decoder.add(&one, &[]);
-        decoder.add(&other, &[]);
+        decoder.add(one.layout(), &[]);
+        decoder.add(other.layout(), &[]);
         let received = Received { frame: "181#0000803F".parse().expect("a frame"), at: Stamp::default() };
         let mut samples = Vec::new();
         assert!(matches!(decoder.decode(&received, &mut samples), Decoded::Held(_)) && samples.is_empty());
-        assert_eq!(decoder.take_contested().into_values().collect::<Vec<_>>(), [(one.node, other.node)]);
+        assert_eq!(decoder.take_contested().into_values().collect::<Vec<_>>(), [(one.id, other.id)]);
     }
 
     #[test]
     fn dps_integer_with_digits_tells_no_status() {
-        let dps = instrument((ObjectId::new(0x6130, 1), DataType::Integer(4)), &[0x6130_0120], |_| {});
+        let dps = node((ObjectId::new(0x6130, 1), DataType::Integer(4)), &[0x6130_0120], |_| {});
         let mut dps = dps;
         // Without a description 6130h is REAL32 by the standard.
         assert_eq!(rows(&dps, &[], "181#50C30000"), [row("pressure", "7.0065e-41", "")]);
@@ -359,21 +371,21 @@ mod tests {
 
     #[test]
     fn markers_only_where_the_device_has_them() {
-        let marked = instrument(REAL, &[0x9130_0120], |signal| signal.marker = true);
+        let marked = node(REAL, &[0x9130_0120], |signal| signal.marker = true);
         assert_eq!(rows(&marked, &[], "181#00000080"), [row("pressure", "", "invalid")]);
         assert_eq!(rows(&marked, &[], "181#D2040000"), [row("pressure", "1.234", "ok")]);
         // NaN is no number on any device.
-        let other = instrument(REAL, &[0x6130_0120], |_| {});
+        let other = node(REAL, &[0x6130_0120], |_| {});
         assert_eq!(rows(&other, &[], "181#0000C07F"), [row("pressure", "", "invalid")]);
         assert_eq!(rows(&other, &[], "181#0000807F"), [row("pressure", "", "invalid")]);
     }
 
     #[test]
     fn other_indices_of_the_same_quantity_and_objects_that_are_no_signal() {
-        let d20 = instrument(REAL, &[0x2090_0020], |_| {});
+        let d20 = node(REAL, &[0x2090_0020], |_| {});
         // Without a description 2090h's type is not known; it is the signal all the same.
         assert_eq!(rows(&d20, &[], "181#D2040000"), [row("pressure", "1.234", "")]);
-        let raw = instrument(REAL, &[0x7100_0110, 0x0005_0008], |_| {});
+        let raw = node(REAL, &[0x7100_0110, 0x0005_0008], |_| {});
         assert_eq!(rows(&raw, &[], "181#100E00"), [row("0x7100:1", "3600", "")]);
         // The D-20-9 sends no data while its mapping is switched off.
         assert_eq!(rows(&d20, &[], "181#"), []);

@@ -5,7 +5,6 @@
 pub mod decode;
 pub mod expression;
 pub mod histogram;
-pub mod instrument;
+pub mod layout;
 pub mod sample;
 pub mod statistics;
-pub mod survey;

@@ -38,7 +38,7 @@ pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
     let instrument = &info.instrument;
     let described = instrument.model.as_ref().map(|model| &model.description);
     let title = described.map_or("not a device that is known", |description| description.title.as_str());
-    writeln!(out, "node {}: {title}", instrument.node)?;
+    writeln!(out, "node {}: {title}", instrument.id)?;
     section(out, "identity", &identity(info))?;
     let mut rows: Rows = Vec::new();
     rows.extend(info.bit_rate.map(|rate| row("bit rate", format!("{} kbit/s", f64::from(rate) / 1000.0))));
@@ -60,7 +60,7 @@ pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
 
 /// The NMT state, or how it is found out.
 fn state(info: &Info) -> String {
-    let ask = || format!("no heartbeat tells it: cangauge nmt state {} (--probe)", info.instrument.node);
+    let ask = || format!("no heartbeat tells it: cangauge nmt state {} (--probe)", info.instrument.id);
     info.state.map_or_else(ask, |state| format!("{state}, by its heartbeat"))
 }
 

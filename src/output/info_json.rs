@@ -155,7 +155,7 @@ pub fn object(out: &mut dyn Write, info: &Info) -> io::Result<()> {
     line(
         out,
         &JsonInfo {
-            node: instrument.node.get(),
+            node: instrument.id.get(),
             device: described.map(|description| description.name.as_str()),
             title: described.map(|description| description.title.as_str()),
             identity: JsonIdentity {

@@ -13,9 +13,10 @@ pub use safety::Limit;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
 use crate::master::{Master, SdoFailure};
-use crate::measure::instrument::Instrument;
 use crate::measure::sample::Number;
-use crate::measure::survey::{Overrides, instruments};
+use crate::node::Node;
+use crate::node::Overrides;
+use crate::node::survey::survey_nodes;
 use crate::tasks::signature::{may_have_acted, sign};
 use crate::tasks::store::{self, Group, Plan};
 use crate::tasks::{Failure, Kind};
@@ -76,7 +77,7 @@ impl Zeroed {
 
 /// One procedure.
 struct Procedure<'a> {
-    device: &'a Instrument,
+    device: &'a Node,
     channel: Channel,
     limits: Option<Limits>,
     decimals: usize,
@@ -109,8 +110,8 @@ pub fn autozero(
         Kind::Interrupted => failure.knowing(node, "nothing was changed"),
         _ => failure,
     };
-    let device = instruments(master, &[node], overrides).map_err(|error| unchanged(error.into()))?;
-    let device = device.into_iter().next().unwrap_or_else(|| Instrument::new(node));
+    let device = survey_nodes(master, &[node], overrides).map_err(|error| unchanged(error.into()))?;
+    let device = device.into_iter().next().unwrap_or_else(|| Node::new(node));
     let procedure = Procedure::prepare(master, &device, options).map_err(unchanged)?;
     let mut notes = procedure.check(options)?;
     if options.dry_run {
@@ -132,14 +133,14 @@ pub fn autozero(
 
 impl<'a> Procedure<'a> {
     /// Reads everything that has to be known before.
-    fn prepare(master: &mut Master<'_>, device: &'a Instrument, options: &Options) -> Result<Procedure<'a>, Failure> {
+    fn prepare(master: &mut Master<'_>, device: &'a Node, options: &Options) -> Result<Procedure<'a>, Failure> {
         let channel = channel::find(master, device, options.channel)?;
         let unit = channel.signal.unit;
         let limits = Limits::new(options.limit, channel.range, unit);
         if let (Limit::Value(_, Some(named)), None) = (options.limit, limits) {
             let present = unit.map_or_else(|| "in no known unit".to_owned(), |unit| format!("in {unit}"));
             let message = format!("{} is {present}, and a limit in {named} does not convert", channel.signal.name);
-            return Err(Failure::of_node(Kind::Usage, device.node, message));
+            return Err(Failure::of_node(Kind::Usage, device.id, message));
         }
         let offsets = channel::offsets(master, device, &channel)?;
         let group = group(master, device, &channel, options.store)?;
@@ -150,7 +151,7 @@ impl<'a> Procedure<'a> {
 
     /// What speaks against it: a failure, or with `force` notes.
     fn check(&self, options: &Options) -> Result<Vec<String>, Failure> {
-        let (node, channel) = (self.device.node, &self.channel);
+        let (node, channel) = (self.device.id, &self.channel);
         if self.before.booted {
             let message = "it restarted while it was measured: nothing was changed";
             return Err(Failure::of_node(Kind::Unexpected, node, message));
@@ -183,7 +184,7 @@ impl<'a> Procedure<'a> {
     /// Writes the signature once, and measures again.
     fn write(&self, master: &mut Master<'_>, count: u32) -> Result<Written, Failure> {
         let (device, channel) = (self.device, &self.channel);
-        let node = device.node;
+        let node = device.id;
         let sent = format!("the signature went to {} once and is not repeated", channel.object);
         let unsure = |failure: Failure| failure.knowing(node, &sent).knowing(node, self.was()).hint(self.look());
         let result = sign(master, device, channel.object, &channel.signature, Duration::ZERO);
@@ -248,7 +249,7 @@ impl<'a> Procedure<'a> {
 
     /// That the reading is zero now.
     fn prove(&self, written: &Written) -> Result<(), Failure> {
-        let node = self.device.node;
+        let node = self.device.id;
         let fail = |message: String| {
             Err(Failure::of_node(Kind::Unexpected, node, message).hint(self.undo(&written.offsets, false)))
         };
@@ -282,7 +283,7 @@ impl<'a> Procedure<'a> {
         written: &Written,
         report: &mut Zeroed,
     ) -> Result<(), Failure> {
-        let node = self.device.node;
+        let node = self.device.id;
         let Some(plan) = plan else {
             let group = self.group.as_str();
             report.notes.push(format!("not stored, gone with the power: cangauge store {node} --group {group}"));
@@ -342,7 +343,7 @@ impl<'a> Procedure<'a> {
 
     /// How to see what became of it.
     fn look(&self) -> String {
-        let (node, signal) = (self.device.node, &self.channel.signal.name);
+        let (node, signal) = (self.device.id, &self.channel.signal.name);
         match self.offsets.first() {
             Some(offset) => format!("see what became of it: cangauge sdo read {node} {}", offset.object),
             None => format!("see what became of it: cangauge read {node} {signal}"),
@@ -351,7 +352,7 @@ impl<'a> Procedure<'a> {
 
     /// The line that takes it back.
     fn undo(&self, now: &[Offset], stored: bool) -> String {
-        let node = self.device.node;
+        let node = self.device.id;
         let written = |object| {
             let entry = self.device.model.as_ref().and_then(|model| model.dictionary.get(object));
             entry.is_none_or(|entry| entry.access.is_writable())
@@ -376,7 +377,7 @@ impl<'a> Procedure<'a> {
 }
 
 /// The group of settings that keeps the offset: the application's where the device has that by itself.
-fn group(master: &mut Master<'_>, device: &Instrument, channel: &Channel, stores: bool) -> Result<Group, Failure> {
+fn group(master: &mut Master<'_>, device: &Node, channel: &Channel, stores: bool) -> Result<Group, Failure> {
     let described = device.model.iter().flat_map(|model| &model.description.objects);
     let entry = described
         .filter(|entry| entry.stored.is_some())

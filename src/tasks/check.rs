@@ -7,9 +7,9 @@ use crate::measure::expression::Expression;
 use crate::measure::expression::bind::Offers;
 use crate::measure::expression::judge::Jury;
 use crate::measure::expression::verdict::{Ruling, Silence, Verdict};
-use crate::measure::instrument::Instrument;
 use crate::measure::sample::{Sample, Source};
-use crate::measure::survey::Overrides;
+use crate::node::Node;
+use crate::node::Overrides;
 use crate::tasks::log::{self, Mode, Note, Observer, Outcome, log};
 use crate::tasks::read::{Target, requests, sample, surveyed, targets};
 use crate::tasks::{Failure, Kind};
@@ -99,7 +99,7 @@ fn read_once(master: &mut Master<'_>, plan: &Plan) -> Result<Report, Failure> {
         }
     }
     let mut jury = Jury::new(&plan.expressions);
-    jury.bind(&plan.nodes, &Offers::of_instruments(&instruments), plan.excuse, &silent)?;
+    jury.bind(&plan.nodes, &Offers::of_instruments(instruments.iter().map(Node::layout)), plan.excuse, &silent)?;
     let all = wanted_targets(&instruments, &jury)?;
     let sources: Vec<Source> = all.iter().map(|target| target.source.clone()).collect();
     let mut answers = master.transfer(all.iter().flat_map(requests).collect(), &mut |_| {})?.into_iter();
@@ -125,10 +125,10 @@ fn read_once(master: &mut Master<'_>, plan: &Plan) -> Result<Report, Failure> {
 }
 
 /// What is read of every instrument, numbered through.
-fn wanted_targets(instruments: &[Instrument], jury: &Jury) -> Result<Vec<Target>, Failure> {
+fn wanted_targets(instruments: &[Node], jury: &Jury) -> Result<Vec<Target>, Failure> {
     let (mut all, mut number) = (Vec::new(), 0);
     for instrument in instruments {
-        let wanted = jury.wanted_of(instrument.node);
+        let wanted = jury.wanted_of(instrument.id);
         // Nothing wanted would be everything.
         if !wanted.is_empty() {
             all.extend(targets(instrument, &wanted, &mut number)?);
@@ -247,8 +247,8 @@ impl<'a> Expecting<'a> {
 }
 
 impl Observer for Expecting<'_> {
-    fn begin(&mut self, instruments: &[Instrument]) -> Result<(), Failure> {
-        self.jury.bind(&self.nodes, &Offers::of_instruments(instruments), self.excuse, &[])?;
+    fn begin(&mut self, instruments: &[Node]) -> Result<(), Failure> {
+        self.jury.bind(&self.nodes, &Offers::of_instruments(instruments.iter().map(Node::layout)), self.excuse, &[])?;
         self.is_bound = true;
         self.observer.begin(instruments)
     }

@@ -7,7 +7,7 @@ use crate::canopen::value::DataType;
 use crate::device::description::{Access, ObjectEntry};
 use crate::device::standard;
 use crate::master::{Error, Master, Request, SdoError, SdoFailure};
-use crate::measure::instrument::Instrument;
+use crate::node::Node;
 use crate::tasks::nmt;
 use crate::tasks::store::Group;
 use crate::tasks::{Failure, Kind};
@@ -49,13 +49,13 @@ impl Held {
 }
 
 /// The marked entries of a device's description; none where it does not say what 1010h keeps.
-fn marked(device: &Instrument) -> Option<&[ObjectEntry]> {
+fn marked(device: &Node) -> Option<&[ObjectEntry]> {
     let entries = &device.model.as_ref()?.description.objects;
     entries.iter().any(|entry| entry.stored.is_some()).then_some(entries)
 }
 
 /// The objects that a store or a restore of these groups reaches, so far as they can be read and hold a value.
-pub(super) fn objects(device: &Instrument, groups: &[Group]) -> Vec<ObjectId> {
+pub(super) fn objects(device: &Node, groups: &[Group]) -> Vec<ObjectId> {
     let reached = |stored: &str| groups.iter().any(|group| group.reaches(stored));
     if let Some(entries) = marked(device) {
         return entries
@@ -85,8 +85,8 @@ pub(super) fn objects(device: &Instrument, groups: &[Group]) -> Vec<ObjectId> {
 ///
 /// # Errors
 /// Silence, and what stops everything.
-pub(super) fn hold(master: &mut Master<'_>, device: &Instrument, objects: &[ObjectId]) -> Result<Vec<Held>, Failure> {
-    let requests = objects.iter().map(|&object| Request::read(device.node, object)).collect();
+pub(super) fn hold(master: &mut Master<'_>, device: &Node, objects: &[ObjectId]) -> Result<Vec<Held>, Failure> {
+    let requests = objects.iter().map(|&object| Request::read(device.id, object)).collect();
     let answers = master.transfer(requests, &mut |_| {})?;
     let mut held = Vec::new();
     for (&object, answer) in objects.iter().zip(answers) {
@@ -110,7 +110,7 @@ pub(super) fn hold(master: &mut Master<'_>, device: &Instrument, objects: &[Obje
 ///
 /// # Errors
 /// Silence, and what stops everything.
-pub(super) fn not_kept(master: &mut Master<'_>, device: &Instrument) -> Result<Vec<String>, Failure> {
+pub(super) fn not_kept(master: &mut Master<'_>, device: &Node) -> Result<Vec<String>, Failure> {
     let Some(entries) = marked(device) else { return Ok(Vec::new()) };
     let objects: Vec<ObjectId> = entries
         .iter()
@@ -125,12 +125,12 @@ pub(super) fn not_kept(master: &mut Master<'_>, device: &Instrument) -> Result<V
 }
 
 /// What an object holds as delivered, by the description.
-pub(super) fn default(device: &Instrument, object: ObjectId) -> Option<Vec<u8>> {
-    device.model.as_ref()?.dictionary.get(object)?.default_bytes(device.node)
+pub(super) fn default(device: &Node, object: ObjectId) -> Option<Vec<u8>> {
+    device.model.as_ref()?.dictionary.get(object)?.default_bytes(device.id)
 }
 
 /// Whether the default of an object is printed, or only likely, or depends on the piece.
-pub(super) fn default_is_sure(device: &Instrument, object: ObjectId) -> bool {
+pub(super) fn default_is_sure(device: &Node, object: ObjectId) -> bool {
     let Some(entries) = marked(device) else { return false };
     let is_it = |entry: &&ObjectEntry| entry.objects().into_iter().flatten().any(|other| other == object);
     entries.iter().find(is_it).is_some_and(|entry| entry.doubt.is_empty())

@@ -23,10 +23,11 @@ use crate::canopen::nmt::NmtState;
 use crate::master::{Error, Master};
 use crate::measure::decode::Wanted;
 use crate::measure::expression::judge::Jury;
-use crate::measure::instrument::Instrument;
 use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
-use crate::measure::survey::{Overrides, instruments};
+use crate::node::Node;
+use crate::node::Overrides;
+use crate::node::survey::survey_nodes;
 use crate::tasks::Failure;
 use checks::{check_wanted, refuse_second_sync, sync_share};
 pub use events::Events;
@@ -118,7 +119,7 @@ pub trait Observer {
     ///
     /// # Errors
     /// Why nothing is to be recorded.
-    fn begin(&mut self, _instruments: &[Instrument]) -> Result<(), Failure> {
+    fn begin(&mut self, _instruments: &[Node]) -> Result<(), Failure> {
         Ok(())
     }
 
@@ -204,7 +205,7 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
         return record_passively(master, plan, observer);
     }
     master.listen_to(&plan.nodes)?;
-    let instruments = instruments(master, &plan.nodes, &plan.overrides)?;
+    let instruments = survey_nodes(master, &plan.nodes, &plan.overrides)?;
     observer.begin(&instruments)?;
     check_wanted(&instruments, plan)?;
     let mut recording = Recording::new(instruments, plan, master.bus());
@@ -213,7 +214,9 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
             let poll = Poll::new(&recording.instruments, &plan.wanted, &mut recording.decoder, period)?;
             recording.poll = Some(poll);
         }
-        _ => recording.instruments.iter().for_each(|instrument| recording.decoder.add(instrument, &plan.wanted)),
+        _ => {
+            recording.instruments.iter().for_each(|instrument| recording.decoder.add(instrument.layout(), &plan.wanted))
+        }
     }
     recording.expect_sources();
     recording.excuse(plan);

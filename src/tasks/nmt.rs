@@ -19,7 +19,7 @@ use crate::canopen::nmt::{Life, NmtCommand, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::master::{Error, Happening, Master, Request, SdoFailure};
-use crate::measure::survey::read_all;
+use crate::node::read::read_values;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -128,7 +128,7 @@ fn means(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId, M
     let mut found: BTreeMap<NodeId, Means> = BTreeMap::new();
     // The heartbeat first: a node that is silent here is not asked twice more.
     let items: Vec<_> = nodes.iter().map(|&node| (node, objects[0].0, objects[0].1)).collect();
-    for (&node, value) in nodes.iter().zip(read_all(master, &items)?) {
+    for (&node, value) in nodes.iter().zip(read_values(master, &items)?) {
         let mut means = Means { answers_sdo: true, ..Means::default() };
         match value {
             Ok(value) => means.heartbeat = value.as_u64().filter(|&time| time > 0).map(Duration::from_millis),
@@ -141,7 +141,7 @@ fn means(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId, M
         .iter()
         .flat_map(|&node| objects[1..].iter().map(move |&(object, kind)| (node, object, kind)))
         .collect();
-    let values = read_all(master, &items)?;
+    let values = read_values(master, &items)?;
     for (node, values) in answering.iter().zip(values.chunks(2)) {
         let zero = |at: usize| values[at].as_ref().is_ok_and(|value| value.as_u64() == Some(0));
         if let Some(means) = found.get_mut(node) {

@@ -6,9 +6,11 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::unit::Unit;
 use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
 use crate::measure::decode::{Reading, Wanted, source};
-use crate::measure::instrument::{Instrument, Signal};
+use crate::measure::layout::Signal;
 use crate::measure::sample::{Sample, Source};
-use crate::measure::survey::{Overrides, instruments};
+use crate::node::Node;
+use crate::node::Overrides;
+use crate::node::survey::survey_nodes;
 use crate::tasks::{Failure, Kind};
 
 /// One thing to be read of a node: how, and what it is.
@@ -30,12 +32,12 @@ pub struct Target {
 ///
 /// # Errors
 /// A signal that the device does not have, with the ones it has.
-pub fn targets(instrument: &Instrument, wanted: &[Wanted], number: &mut usize) -> Result<Vec<Target>, Failure> {
+pub fn targets(instrument: &Node, wanted: &[Wanted], number: &mut usize) -> Result<Vec<Target>, Failure> {
     let all: Vec<Wanted> = instrument.signals.iter().map(|signal| Wanted::Signal(signal.name.clone())).collect();
     let wanted = if wanted.is_empty() { &all } else { wanted };
     if wanted.is_empty() {
-        return Err(Failure::of_node(Kind::Unexpected, instrument.node, "it has no measured value of CiA 404")
-            .hint(format!("read an object as it is: cangauge sdo read {} 0x1000", instrument.node)));
+        return Err(Failure::of_node(Kind::Unexpected, instrument.id, "it has no measured value of CiA 404")
+            .hint(format!("read an object as it is: cangauge sdo read {} 0x1000", instrument.id)));
     }
     let mut take = || {
         *number += 1;
@@ -49,7 +51,7 @@ pub fn targets(instrument: &Instrument, wanted: &[Wanted], number: &mut usize) -
                     let signal = find(instrument, name)?;
                     let (object, data_type) = signal.value;
                     Target {
-                        source: source(instrument.node, name, Some(signal)),
+                        source: source(instrument.id, name, Some(signal)),
                         unit: signal.unit,
                         object,
                         status: signal.status,
@@ -58,7 +60,7 @@ pub fn targets(instrument: &Instrument, wanted: &[Wanted], number: &mut usize) -
                 }
                 Wanted::Status(name) => {
                     let object = find(instrument, name)?.status.ok_or_else(|| {
-                        Failure::of_node(Kind::Usage, instrument.node, format!("{name} has no status object"))
+                        Failure::of_node(Kind::Usage, instrument.id, format!("{name} has no status object"))
                     })?;
                     plain(instrument, object, &format!("{name}.status"), take())
                 }
@@ -68,14 +70,14 @@ pub fn targets(instrument: &Instrument, wanted: &[Wanted], number: &mut usize) -
         .collect()
 }
 
-fn plain(instrument: &Instrument, object: ObjectId, name: &str, number: usize) -> Target {
+fn plain(instrument: &Node, object: ObjectId, name: &str, number: usize) -> Target {
     let entry = instrument.model.as_ref().and_then(|model| model.dictionary.get(object));
     let data_type = entry.map(|entry| entry.data_type).unwrap_or_else(|| match object.index {
         0x6150 => DataType::Unsigned(1),
-        _ => instrument.data_type(object, 32),
+        _ => instrument.mapped_type(object, 32),
     });
     Target {
-        source: source(instrument.node, name, None),
+        source: source(instrument.id, name, None),
         unit: None,
         object,
         status: None,
@@ -83,11 +85,11 @@ fn plain(instrument: &Instrument, object: ObjectId, name: &str, number: usize) -
     }
 }
 
-pub(super) fn find<'a>(instrument: &'a Instrument, name: &str) -> Result<&'a Signal, Failure> {
+pub(super) fn find<'a>(instrument: &'a Node, name: &str) -> Result<&'a Signal, Failure> {
     instrument.signals.iter().find(|signal| signal.name == name).ok_or_else(|| {
         let names: Vec<&str> = instrument.signals.iter().map(|signal| signal.name.as_str()).collect();
         let message = format!("it has no signal \"{name}\"");
-        let failure = Failure::of_node(Kind::Usage, instrument.node, message);
+        let failure = Failure::of_node(Kind::Usage, instrument.id, message);
         if names.is_empty() { failure } else { failure.hint(format!("it has: {}", names.join(", "))) }
     })
 }
@@ -172,8 +174,8 @@ pub(super) fn surveyed(
     master: &mut Master<'_>,
     nodes: &[NodeId],
     overrides: &Overrides,
-) -> Result<Vec<Result<Instrument, Failure>>, Error> {
-    match instruments(master, nodes, overrides) {
+) -> Result<Vec<Result<Node, Failure>>, Error> {
+    match survey_nodes(master, nodes, overrides) {
         Ok(all) => return Ok(all.into_iter().map(Ok).collect()),
         Err(Error::Sdo(error)) if nodes.len() == 1 => return Ok(vec![Err(error.into())]),
         Err(Error::Sdo(_)) => {}

@@ -2,7 +2,7 @@
 
 use crate::canopen::object::ObjectId;
 use crate::master::{Master, SdoFailure};
-use crate::measure::instrument::Instrument;
+use crate::node::Node;
 use crate::tasks::kept::{self, Held};
 use crate::tasks::signature::{STORING, may_have_acted, sign};
 use crate::tasks::store::{Done, Group, Verified, answers, check_capability};
@@ -17,8 +17,8 @@ const RESTORE: u16 = 0x1011;
 /// # Errors
 /// A device that does not restore on command, refusals, silence, settings that are not as delivered after the
 /// reset, and what stops everything. Each says what was done by then, so far as it is known.
-pub fn restore(master: &mut Master<'_>, device: &Instrument, group: Group, reset: bool) -> Result<Done, Failure> {
-    let node = device.node;
+pub fn restore(master: &mut Master<'_>, device: &Node, group: Group, reset: bool) -> Result<Done, Failure> {
+    let node = device.id;
     check_capability(master, device, RESTORE, group)?;
     let objects = kept::objects(device, &[group]);
     let (before, state) = match reset {
@@ -58,8 +58,8 @@ pub fn restore(master: &mut Master<'_>, device: &Instrument, group: Group, reset
 }
 
 /// Sends "load" once.
-fn load(master: &mut Master<'_>, device: &Instrument, group: Group) -> Result<(), Failure> {
-    let node = device.node;
+fn load(master: &mut Master<'_>, device: &Node, group: Group) -> Result<(), Failure> {
+    let node = device.id;
     let object = ObjectId::new(RESTORE, group.sub());
     let unknown = format!(
         "\"load\" went to {object} once and is not repeated; whether its next reset brings the defaults is not known"
@@ -88,7 +88,7 @@ struct Compared {
 }
 
 /// That everything is as delivered, so far as the manual prints it.
-fn compare(device: &Instrument, before: &[Held], after: &[Held]) -> Result<Compared, Failure> {
+fn compare(device: &Node, before: &[Held], after: &[Held]) -> Result<Compared, Failure> {
     let (mut agree, mut wrong, mut doubtful) = (0, Vec::new(), Vec::new());
     for held in after {
         match kept::default(device, held.object) {
@@ -105,5 +105,5 @@ fn compare(device: &Instrument, before: &[Held], after: &[Held]) -> Result<Compa
         return Ok(Compared { agree, doubtful });
     }
     let message = format!("restored and reset, but not as delivered: {}", wrong.join(", "));
-    Err(Failure::of_node(Kind::Unexpected, device.node, message))
+    Err(Failure::of_node(Kind::Unexpected, device.id, message))
 }

@@ -6,8 +6,9 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::{Life, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::master::{Error, Happening, Master, Request, SdoFailure, Ticket};
-use crate::measure::instrument::Instrument;
-use crate::measure::survey::{Overrides, recognised};
+use crate::node::Node;
+use crate::node::Overrides;
+use crate::node::survey::identify;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -19,7 +20,7 @@ pub struct Found {
     /// Its state, where a heartbeat told it.
     pub state: Option<NmtState>,
     /// What it says of itself, as far as it was asked, and its description.
-    pub instrument: Instrument,
+    pub instrument: Node,
     /// Why its identity could not be read.
     pub failure: Option<crate::tasks::Failure>,
 }
@@ -117,13 +118,13 @@ fn describe(
     let present: BTreeSet<NodeId> = seen.answered.iter().chain(seen.states.keys()).copied().collect();
     let mut found = Vec::new();
     let answering: Vec<NodeId> = seen.answered.iter().copied().filter(|node| wanted.contains(node)).collect();
-    let mut instruments: BTreeMap<NodeId, Result<Instrument, crate::tasks::Failure>> = BTreeMap::new();
-    match recognised(master, &answering, overrides) {
-        Ok(all) => instruments.extend(all.into_iter().map(|instrument| (instrument.node, Ok(instrument)))),
+    let mut instruments: BTreeMap<NodeId, Result<Node, crate::tasks::Failure>> = BTreeMap::new();
+    match identify(master, &answering, overrides) {
+        Ok(all) => instruments.extend(all.into_iter().map(|instrument| (instrument.id, Ok(instrument)))),
         Err(Error::Sdo(_)) => {
             // One of them falls silent in the middle: each for itself, so that the others are described.
             for &node in &answering {
-                let alone = match recognised(master, &[node], overrides) {
+                let alone = match identify(master, &[node], overrides) {
                     Ok(mut all) => all.pop().ok_or_else(|| unreadable(node)),
                     Err(Error::Sdo(error)) => Err(error.into()),
                     Err(error) => return Err(error),
@@ -136,8 +137,8 @@ fn describe(
     for node in present.into_iter().filter(|node| wanted.contains(node)) {
         let (instrument, failure) = match instruments.remove(&node) {
             Some(Ok(instrument)) => (instrument, None),
-            Some(Err(failure)) => (Instrument::new(node), Some(failure)),
-            None => (Instrument::new(node), None),
+            Some(Err(failure)) => (Node::new(node), Some(failure)),
+            None => (Node::new(node), None),
         };
         found.push(Found { node, state: seen.states.get(&node).copied().flatten(), instrument, failure });
     }
@@ -174,7 +175,7 @@ pub fn listen(master: &mut Master<'_>, nodes: &[NodeId], length: Duration) -> Re
         .map(|node| Found {
             node,
             state: seen.states.get(&node).copied().flatten(),
-            instrument: Instrument::new(node),
+            instrument: Node::new(node),
             failure: None,
         })
         .collect())

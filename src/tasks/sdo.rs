@@ -11,7 +11,8 @@ use crate::device::nearest::distance;
 use crate::device::standard;
 use crate::master::transfer::{BlockMode, Moved, read_object};
 use crate::master::{Error, Master, Request, SdoError, SdoFailure};
-use crate::measure::survey::{Overrides, recognised};
+use crate::node::Overrides;
+use crate::node::survey::identify;
 use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
 
@@ -81,7 +82,7 @@ impl Knowledge {
         if let Some(model) = &self.model {
             return Ok(model.clone());
         }
-        let found = recognised(master, &[self.node], &self.overrides)?;
+        let found = identify(master, &[self.node], &self.overrides)?;
         let model = found.into_iter().next().and_then(|instrument| instrument.model);
         self.model = Some(model.clone());
         Ok(model)

@@ -4,14 +4,14 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, DownloadSize};
 use crate::device::description::SizeIndication;
 use crate::master::{Error, Master, Operation, Request, SdoError, SdoFailure};
-use crate::measure::instrument::Instrument;
+use crate::node::Node;
 use std::time::Duration;
 
 /// The shortest time that a device gets to store or restore: writing an EEPROM outlasts an ordinary answer.
 pub(super) const STORING: Duration = Duration::from_secs(3);
 
 /// The forms in which a device may want its four bytes, the likelier first: with the size, or without.
-fn sizes(device: &Instrument) -> [DownloadSize; 2] {
+fn sizes(device: &Node) -> [DownloadSize; 2] {
     let omits = device.model.as_ref().is_some_and(|model| model.description.sdo.size == SizeIndication::Omitted);
     if omits {
         [DownloadSize::Omitted, DownloadSize::Indicated]
@@ -27,14 +27,14 @@ fn sizes(device: &Instrument) -> [DownloadSize; 2] {
 /// What stops everything; the device's refusal or silence is in the result.
 pub(super) fn sign(
     master: &mut Master<'_>,
-    device: &Instrument,
+    device: &Node,
     object: ObjectId,
     signature: &[u8],
     wait: Duration,
 ) -> Result<Result<(), SdoError>, Error> {
     let wait = wait.max(master.timing().timeout);
     let mut request = |size| {
-        let request = Request::write(device.node, object, signature.to_vec(), size).once().within(wait);
+        let request = Request::write(device.id, object, signature.to_vec(), size).once().within(wait);
         master.transfer_one(request)
     };
     let [likely, other] = sizes(device);

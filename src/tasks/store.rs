@@ -6,8 +6,10 @@ use crate::canopen::sdo::AbortCode;
 use crate::canopen::value::DataType;
 use crate::device::quirk::Quirk;
 use crate::master::{Master, SdoError, SdoFailure};
-use crate::measure::instrument::Instrument;
-use crate::measure::survey::{Overrides, read_all, recognised};
+use crate::node::Node;
+use crate::node::Overrides;
+use crate::node::read::read_values;
+use crate::node::survey::identify;
 use crate::tasks::kept::{self, Held};
 use crate::tasks::signature::{STORING, may_have_acted, sign};
 use crate::tasks::{Failure, Kind};
@@ -89,8 +91,8 @@ impl Done {
 ///
 /// # Errors
 /// Silence, and what stops everything.
-pub fn device(master: &mut Master<'_>, node: NodeId, overrides: &Overrides) -> Result<Instrument, Failure> {
-    Ok(recognised(master, &[node], overrides)?.pop().unwrap_or_else(|| Instrument::new(node)))
+pub fn device(master: &mut Master<'_>, node: NodeId, overrides: &Overrides) -> Result<Node, Failure> {
+    Ok(identify(master, &[node], overrides)?.pop().unwrap_or_else(|| Node::new(node)))
 }
 
 /// What would be stored, and what is to be said of it. Nothing has been changed yet.
@@ -105,7 +107,7 @@ pub struct Plan {
 ///
 /// # Errors
 /// A device that does not store this group on command, its silence, and what stops everything.
-pub fn plan(master: &mut Master<'_>, device: &Instrument, group: Group) -> Result<Plan, Failure> {
+pub fn plan(master: &mut Master<'_>, device: &Node, group: Group) -> Result<Plan, Failure> {
     let resets_cob_ids =
         device.model.as_ref().is_some_and(|model| model.description.quirks.contains(&Quirk::SaveAllResetsCobIds));
     let custom = if resets_cob_ids && group == Group::All { custom_cob_ids(master, device)? } else { Vec::new() };
@@ -145,7 +147,7 @@ pub fn plan(master: &mut Master<'_>, device: &Instrument, group: Group) -> Resul
 /// # Errors
 /// Refusals, silence, settings that the device did not keep, and what stops everything. Each says what was stored
 /// by then, so far as it is known.
-pub fn store(master: &mut Master<'_>, device: &Instrument, group: Group, verify: bool) -> Result<Done, Failure> {
+pub fn store(master: &mut Master<'_>, device: &Node, group: Group, verify: bool) -> Result<Done, Failure> {
     let plan = plan(master, device, group)?;
     carry_out(master, device, plan, verify)
 }
@@ -154,8 +156,8 @@ pub fn store(master: &mut Master<'_>, device: &Instrument, group: Group, verify:
 ///
 /// # Errors
 /// As [`store`].
-pub fn carry_out(master: &mut Master<'_>, device: &Instrument, plan: Plan, verify: bool) -> Result<Done, Failure> {
-    let node = device.node;
+pub fn carry_out(master: &mut Master<'_>, device: &Node, plan: Plan, verify: bool) -> Result<Done, Failure> {
+    let node = device.id;
     let before = if verify {
         let objects = kept::objects(device, &plan.groups);
         Some((kept::hold(master, device, &objects)?, kept::state(master, node)?))
@@ -192,13 +194,13 @@ const STORE: u16 = 0x1010;
 /// stores by itself (CiA 301, 7.5.2.13).
 pub(super) fn check_capability(
     master: &mut Master<'_>,
-    device: &Instrument,
+    device: &Node,
     index: u16,
     group: Group,
 ) -> Result<(), Failure> {
     let (verb, undone) =
         if index == STORE { ("store", "nothing was stored") } else { ("restore", "nothing was restored") };
-    let node = device.node;
+    let node = device.id;
     let object = ObjectId::new(index, group.sub());
     let refused = |message: String| Failure {
         object: Some(object),
@@ -236,15 +238,15 @@ pub(super) fn check_capability(
 }
 
 /// The identifiers that differ from those as delivered, with what they are. One that cannot be read counts.
-fn custom_cob_ids(master: &mut Master<'_>, device: &Instrument) -> Result<Vec<String>, Failure> {
+fn custom_cob_ids(master: &mut Master<'_>, device: &Node) -> Result<Vec<String>, Failure> {
     let is_cob_id = |object: ObjectId| {
         object == ObjectId::new(0x1014, 0) || (0x1800..0x1a00).contains(&object.index) && object.sub == 1
     };
     let entries = device.model.iter().flat_map(|model| model.dictionary.iter());
     let objects: Vec<ObjectId> = entries.map(|entry| entry.object).filter(|&object| is_cob_id(object)).collect();
-    let items: Vec<_> = objects.iter().map(|&object| (device.node, object, DataType::Unsigned(4))).collect();
+    let items: Vec<_> = objects.iter().map(|&object| (device.id, object, DataType::Unsigned(4))).collect();
     let mut custom = Vec::new();
-    for (object, value) in objects.into_iter().zip(read_all(master, &items)?) {
+    for (object, value) in objects.into_iter().zip(read_values(master, &items)?) {
         let found = match value {
             Ok(value) => value.as_u64(),
             Err(SdoError { failure: SdoFailure::Refused(_), .. }) => None,
@@ -261,8 +263,8 @@ fn custom_cob_ids(master: &mut Master<'_>, device: &Instrument) -> Result<Vec<St
 }
 
 /// Sends "save" once.
-fn save(master: &mut Master<'_>, device: &Instrument, group: Group) -> Result<(), Failure> {
-    let node = device.node;
+fn save(master: &mut Master<'_>, device: &Node, group: Group) -> Result<(), Failure> {
+    let node = device.id;
     let object = ObjectId::new(STORE, group.sub());
     let unknown = format!("\"save\" went to {object} once and is not repeated; whether it was stored is not known");
     let result = sign(master, device, object, b"save", STORING);
@@ -287,8 +289,8 @@ fn save(master: &mut Master<'_>, device: &Instrument, group: Group) -> Result<()
 }
 
 /// Whether a device that did not answer a signature answers at all.
-pub(super) fn answers(master: &mut Master<'_>, device: &Instrument) -> Result<&'static str, Failure> {
-    let answer = master.read(device.node, ObjectId::new(0x1000, 0), DataType::Unsigned(4))?;
+pub(super) fn answers(master: &mut Master<'_>, device: &Node) -> Result<&'static str, Failure> {
+    let answer = master.read(device.id, ObjectId::new(0x1000, 0), DataType::Unsigned(4))?;
     Ok(match answer {
         Err(SdoError { failure: SdoFailure::NoAnswer { .. }, .. }) => "it does not answer any more",
         Ok(_) | Err(_) => "it answers other requests",
@@ -296,7 +298,7 @@ pub(super) fn answers(master: &mut Master<'_>, device: &Instrument) -> Result<&'
 }
 
 /// That everything is as it was before the reset.
-fn compare(master: &mut Master<'_>, device: &Instrument, before: &[Held]) -> Result<(), Failure> {
+fn compare(master: &mut Master<'_>, device: &Node, before: &[Held]) -> Result<(), Failure> {
     let objects: Vec<ObjectId> = before.iter().map(|held| held.object).collect();
     let after = kept::hold(master, device, &objects)?;
     let differs = |held: &&Held| !after.contains(held);
@@ -313,5 +315,5 @@ fn compare(master: &mut Master<'_>, device: &Instrument, before: &[Held]) -> Res
         return Ok(());
     }
     let message = format!("not everything was kept over the reset: {}", lost.join(", "));
-    Err(Failure::of_node(Kind::Unexpected, device.node, message))
+    Err(Failure::of_node(Kind::Unexpected, device.id, message))
 }

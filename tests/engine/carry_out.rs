@@ -16,7 +16,7 @@ use cangauge::master::{Master, Timing};
 use cangauge::measure::expression::Expression;
 use cangauge::measure::expression::verdict::Verdict;
 use cangauge::measure::sample::{Sample, Source};
-use cangauge::measure::survey::Overrides;
+use cangauge::node::Overrides;
 use cangauge::tasks::log::{Mode, Note, Observer, Plan, log};
 use cangauge::tasks::lss::{self, Job, LssAddress, LssRange, Rate};
 use cangauge::tasks::nmt::Seen;

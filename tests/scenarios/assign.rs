@@ -9,7 +9,7 @@ mod targets;
 use cangauge::bus::memory::MemoryBus;
 use cangauge::canopen::id::NodeId;
 use cangauge::master::{Master, Timing};
-use cangauge::measure::survey::Overrides;
+use cangauge::node::Overrides;
 use cangauge::sim::{Bench, Device};
 use cangauge::tasks::lss::{Job, Note, Rate, Report, Via, assign};
 use cangauge::tasks::{Failure, Kind};

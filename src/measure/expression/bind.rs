@@ -8,7 +8,7 @@ use crate::canopen::id::NodeId;
 use crate::device::nearest::distance;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
-use crate::measure::instrument::Instrument;
+use crate::measure::layout::Layout;
 use crate::measure::sample::Source;
 
 /// A signal that there is.
@@ -32,11 +32,11 @@ pub struct Offers {
 
 impl Offers {
     /// Everything that these devices have.
-    pub fn of_instruments<'a>(instruments: impl IntoIterator<Item = &'a Instrument>) -> Offers {
+    pub fn of_instruments<'a>(instruments: impl IntoIterator<Item = Layout<'a>>) -> Offers {
         let mut offers = Offers::default();
         for instrument in instruments {
             offers.open.push(instrument.node);
-            for signal in &instrument.signals {
+            for signal in instrument.signals {
                 let offer = |name: String, unit| Offer { node: instrument.node, name, unit };
                 offers.signals.push(offer(signal.name.clone(), signal.unit));
                 if signal.status.is_some() {

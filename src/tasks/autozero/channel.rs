@@ -6,8 +6,9 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::description::{Autozero, Range};
 use crate::device::unit::Unit;
 use crate::master::{Master, Request, SdoError, SdoFailure};
-use crate::measure::instrument::{Instrument, Signal};
+use crate::measure::layout::Signal;
 use crate::measure::sample::Number;
+use crate::node::Node;
 use crate::tasks::{Failure, Kind};
 
 /// A channel whose zero can be set.
@@ -42,8 +43,8 @@ pub(super) struct Offset {
 ///
 /// # Errors
 /// A device without autozero, or without one of this channel; several channels and none chosen; silence.
-pub(super) fn find(master: &mut Master<'_>, device: &Instrument, number: Option<u8>) -> Result<Channel, Failure> {
-    let usage = |message: String| Failure::of_node(Kind::Usage, device.node, message);
+pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -> Result<Channel, Failure> {
+    let usage = |message: String| Failure::of_node(Kind::Usage, device.id, message);
     let description = device.model.as_ref().map(|model| &model.description);
     let described = description.map_or(&[][..], |description| &description.autozero);
     let title = description.map_or("it", |description| &description.title);
@@ -72,8 +73,8 @@ pub(super) fn find(master: &mut Master<'_>, device: &Instrument, number: Option<
 }
 
 /// 6125h:n, where the device has it.
-fn by_the_standard(master: &mut Master<'_>, device: &Instrument, number: Option<u8>) -> Result<Channel, Failure> {
-    let node = device.node;
+fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -> Result<Channel, Failure> {
+    let node = device.id;
     let signal = match (number, device.signals.as_slice()) {
         (Some(number), _) => signal(device, number)?,
         (None, [only]) => only,
@@ -104,17 +105,17 @@ fn by_the_standard(master: &mut Master<'_>, device: &Instrument, number: Option<
     Ok(Channel { signal, object, signature, offsets, is_described: false, absolute: None, range })
 }
 
-fn signal(device: &Instrument, channel: u8) -> Result<&Signal, Failure> {
+fn signal(device: &Node, channel: u8) -> Result<&Signal, Failure> {
     device
         .signals
         .iter()
         .find(|signal| signal.channel == channel)
-        .ok_or_else(|| Failure::of_node(Kind::Usage, device.node, format!("it measures nothing on channel {channel}")))
+        .ok_or_else(|| Failure::of_node(Kind::Usage, device.id, format!("it measures nothing on channel {channel}")))
 }
 
-fn absolute(master: &mut Master<'_>, device: &Instrument, entry: &Autozero) -> Result<Option<bool>, Failure> {
+fn absolute(master: &mut Master<'_>, device: &Node, entry: &Autozero) -> Result<Option<bool>, Failure> {
     let Some(absolute) = &entry.absolute else { return Ok(None) };
-    match master.read(device.node, absolute.object, data_type(device, absolute.object, DataType::Unsigned(4)))? {
+    match master.read(device.id, absolute.object, data_type(device, absolute.object, DataType::Unsigned(4)))? {
         Ok(kind) => Ok(kind.as_u64().map(|kind| kind == u64::from(absolute.value))),
         Err(SdoError { failure: SdoFailure::Refused(_), .. }) => Ok(None),
         Err(error) => Err(error.into()),
@@ -122,7 +123,7 @@ fn absolute(master: &mut Master<'_>, device: &Instrument, entry: &Autozero) -> R
 }
 
 /// The type of an object: from the description, else `otherwise`.
-fn data_type(device: &Instrument, object: ObjectId, otherwise: DataType) -> DataType {
+fn data_type(device: &Node, object: ObjectId, otherwise: DataType) -> DataType {
     let described = device.model.as_ref().and_then(|model| model.dictionary.get(object));
     described.map_or(otherwise, |entry| entry.data_type)
 }
@@ -140,12 +141,12 @@ fn of_family(object: ObjectId) -> DataType {
 /// A number in the unit of the channel; `None` where the device refuses it.
 fn number(
     master: &mut Master<'_>,
-    device: &Instrument,
+    device: &Node,
     signal: &Signal,
     object: ObjectId,
 ) -> Result<Option<Offset>, Failure> {
     let data_type = data_type(device, object, of_family(object));
-    match master.read(device.node, object, data_type)? {
+    match master.read(device.id, object, data_type)? {
         Ok(value) => {
             let number = Number::from_value(&value, signal.digits.unwrap_or(0)).filter(|number| number.is_finite());
             Ok(number.map(|number| Offset { object, data_type, value, number }))
@@ -158,7 +159,7 @@ fn number(
 /// The width of the measuring range in the present unit: as built, else from span start to span end.
 fn range(
     master: &mut Master<'_>,
-    device: &Instrument,
+    device: &Node,
     signal: &Signal,
     built: Option<&Range>,
 ) -> Result<Option<f64>, Failure> {
@@ -166,7 +167,7 @@ fn range(
     if let (Some(range), Some(unit)) = (built, signal.unit) {
         let start = number(master, device, signal, range.start)?;
         let end = number(master, device, signal, range.end)?;
-        let code = master.read(device.node, range.unit, DataType::Unsigned(4))?.ok().and_then(|code| code.as_u64());
+        let code = master.read(device.id, range.unit, DataType::Unsigned(4))?.ok().and_then(|code| code.as_u64());
         let from = code.and_then(|code| u32::try_from(code).ok()).map(Unit);
         let ends = start.zip(end).zip(from).and_then(|((start, end), from)| {
             let convert = |end: Offset| from.convert(end.number.as_f64(), unit);
@@ -193,7 +194,7 @@ fn range(
 ///
 /// # Errors
 /// Silence, and what stops everything.
-pub(super) fn offsets(master: &mut Master<'_>, device: &Instrument, channel: &Channel) -> Result<Vec<Offset>, Failure> {
+pub(super) fn offsets(master: &mut Master<'_>, device: &Node, channel: &Channel) -> Result<Vec<Offset>, Failure> {
     let mut found = Vec::new();
     for &object in &channel.offsets {
         found.extend(number(master, device, &channel.signal, object)?);

@@ -5,9 +5,9 @@ use crate::canopen::id::NodeId;
 use crate::canopen::nmt::Life;
 use crate::master::{Error, Happening, Master};
 use crate::measure::decode::Wanted;
-use crate::measure::instrument::Instrument;
 use crate::measure::sample::Status;
 use crate::measure::statistics::Statistics;
+use crate::node::Node;
 use crate::tasks::Failure;
 use crate::tasks::read::{Target, requests, sample, targets};
 use std::time::Duration;
@@ -73,11 +73,11 @@ impl Samples {
 ///
 /// # Errors
 /// Refusals, silence, and what stops everything.
-pub(super) fn take(master: &mut Master<'_>, device: &Instrument, signal: &str, count: u32) -> Result<Samples, Failure> {
+pub(super) fn take(master: &mut Master<'_>, device: &Node, signal: &str, count: u32) -> Result<Samples, Failure> {
     let mut samples = Samples::default();
     for target in targets(device, &[Wanted::Signal(signal.to_owned())], &mut 0)? {
         for _ in 0..count {
-            samples.wait(master, device.node)?;
+            samples.wait(master, device.id)?;
             samples.read(master, &target)?;
         }
     }

@@ -1,9 +1,10 @@
 //! What has changed of an instrument, in words.
 
-use crate::measure::instrument::{Instrument, Signal, Tpdo};
+use crate::measure::layout::{Signal, Tpdo};
+use crate::node::Node;
 
 /// What is different now, as far as measurements go; empty where nothing is.
-pub(super) fn changes(before: &Instrument, now: &Instrument) -> Vec<String> {
+pub(super) fn changes(before: &Node, now: &Node) -> Vec<String> {
     let mut changes = Vec::new();
     let (old, new) = (&before.identity, &now.identity);
     if (old.vendor, old.product, old.serial) != (new.vendor, new.product, new.serial) {
@@ -32,7 +33,7 @@ pub(super) fn changes(before: &Instrument, now: &Instrument) -> Vec<String> {
     changes
 }
 
-fn tpdo_now(tpdo: &Tpdo, was: Option<&Tpdo>, now: &Instrument) -> String {
+fn tpdo_now(tpdo: &Tpdo, was: Option<&Tpdo>, now: &Node) -> String {
     let number = tpdo.number;
     if !tpdo.cob_id.is_valid() {
         return format!("{number} is switched off");

@@ -7,16 +7,16 @@ use crate::canopen::nmt::booted;
 use crate::canopen::pdo::Transmission;
 use crate::master::{Error, Happening, Master};
 use crate::measure::decode::Wanted;
-use crate::measure::instrument::Instrument;
+use crate::node::Node;
 use crate::tasks::{Failure, Kind};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// Everything asked for must be in a TPDO, or nothing will ever come of it.
-pub(super) fn check_wanted(instruments: &[Instrument], plan: &Plan) -> Result<(), Failure> {
+pub(super) fn check_wanted(instruments: &[Node], plan: &Plan) -> Result<(), Failure> {
     let polled = matches!(plan.mode, Mode::Poll(_));
     for item in &plan.wanted {
-        let carried = |instrument: &Instrument| {
+        let carried = |instrument: &Node| {
             let entries = || {
                 let valid = instrument.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
                 valid.flat_map(|tpdo| &tpdo.mapping)
@@ -68,7 +68,7 @@ pub(super) fn check_wanted(instruments: &[Instrument], plan: &Plan) -> Result<()
 /// Two SYNC producers would double every synchronous TPDO. Nodes that restart meanwhile go to `restarted`.
 pub(super) fn refuse_second_sync(
     master: &mut Master<'_>,
-    instruments: &[Instrument],
+    instruments: &[Node],
     period: Duration,
     restarted: &mut BTreeSet<NodeId>,
 ) -> Result<(), Failure> {
@@ -98,7 +98,7 @@ pub(super) fn refuse_second_sync(
 
 /// The share of the bus that SYNC at this interval takes with the TPDOs that it brings about, each at its
 /// longest; `None` where the bit rate is not known.
-pub(super) fn sync_share(master: &Master<'_>, instruments: &[Instrument], period: Duration) -> Option<f64> {
+pub(super) fn sync_share(master: &Master<'_>, instruments: &[Node], period: Duration) -> Option<f64> {
     let bit_rate = master.bus().bit_rate()?;
     let tpdos = instruments.iter().flat_map(|instrument| &instrument.tpdos).filter(|tpdo| tpdo.cob_id.is_valid());
     let answers = tpdos.filter_map(|tpdo| match tpdo.transmission? {

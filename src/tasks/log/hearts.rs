@@ -3,7 +3,7 @@
 use crate::bus::Mono;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtState};
-use crate::measure::instrument::Instrument;
+use crate::node::Node;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -38,11 +38,11 @@ pub(super) struct Hearts {
 
 impl Hearts {
     /// Expects the heartbeat of an instrument from now on, or none where it has none.
-    pub(super) fn expect(&mut self, instrument: &Instrument, now: Mono) {
-        self.hearts.remove(&instrument.node);
+    pub(super) fn expect(&mut self, instrument: &Node, now: Mono) {
+        self.hearts.remove(&instrument.id);
         if let Some(milliseconds) = instrument.heartbeat_ms.filter(|&milliseconds| milliseconds > 0) {
             let period = Duration::from_millis(u64::from(milliseconds));
-            self.hearts.insert(instrument.node, Heart { period, last: now, state: None, lost: false });
+            self.hearts.insert(instrument.id, Heart { period, last: now, state: None, lost: false });
         }
     }
 
@@ -86,7 +86,7 @@ mod tests {
     fn lost_after_two_periods_and_back() {
         let at = |milliseconds| Mono::at(Duration::from_millis(milliseconds));
         let node = NodeId::new(5).expect("a node-ID");
-        let mut instrument = Instrument::new(node);
+        let mut instrument = Node::new(node);
         let mut hearts = Hearts::default();
         hearts.expect(&instrument, at(0));
         assert_eq!(hearts.lost(at(1_000_000)), None, "it has none");

@@ -11,8 +11,9 @@ use crate::canopen::value::DataType;
 use crate::device::catalog::{Model, recognise};
 use crate::device::unit::Unit;
 use crate::measure::decode::{Decoder, Wanted};
-use crate::measure::instrument::{Identity, Instrument, PROCESS_VALUES, Signal, Tpdo};
-use crate::measure::survey::Overrides;
+use crate::measure::layout::{PROCESS_VALUES, Signal, Tpdo};
+use crate::node::Overrides;
+use crate::node::{Identity, Node};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -156,12 +157,12 @@ impl Learner {
     fn plan(&mut self, node: NodeId, decoder: &mut Decoder) {
         let mut instrument = self.instrument(node);
         // An integer without its digits is a number that is wrong by a power of ten.
-        let has_digits = |instrument: &Instrument, tpdo: &Tpdo| {
+        let has_digits = |instrument: &Node, tpdo: &Tpdo| {
             tpdo.mapping.iter().all(|entry| {
                 let signal = instrument.signals.iter().find(|signal| signal.is_value(entry.object));
                 signal.is_none_or(|signal| {
                     let digits = ObjectId::new(0x6132, signal.channel);
-                    let is_integer = matches!(instrument.data_type(entry.object, entry.bits), DataType::Integer(_));
+                    let is_integer = matches!(instrument.mapped_type(entry.object, entry.bits), DataType::Integer(_));
                     !is_integer || signal.digits.is_some() || self.refused.contains(&(node, digits))
                 })
             })
@@ -170,15 +171,15 @@ impl Learner {
         tpdos.retain(|tpdo| has_digits(&instrument, tpdo));
         instrument.tpdos = tpdos;
         if !instrument.tpdos.is_empty() {
-            decoder.renew(&instrument, &self.wanted);
+            decoder.renew(instrument.layout(), &self.wanted);
             self.planned = decoder.can_ids().collect();
             self.not_understood.remove(&node);
         }
     }
 
     /// The node as far as it is known: only TPDOs whose identifier and whole mapping are.
-    fn instrument(&self, node: NodeId) -> Instrument {
-        let mut instrument = Instrument::new(node);
+    fn instrument(&self, node: NodeId) -> Node {
+        let mut instrument = Node::new(node);
         instrument.identity = Identity {
             device_type: self.number(node, ObjectId::new(0x1000, 0)),
             vendor: self.number(node, ObjectId::new(0x1018, 1)),
@@ -205,8 +206,8 @@ impl Learner {
         Some(Tpdo { number, cob_id, transmission, event_timer_ms: None, mapping: mapping? })
     }
 
-    fn signals(&self, instrument: &Instrument) -> Vec<Signal> {
-        let node = instrument.node;
+    fn signals(&self, instrument: &Node) -> Vec<Signal> {
+        let node = instrument.id;
         let told = |channel| {
             let unit = self.number(node, ObjectId::new(0x6131, channel)).map(Unit);
             (unit, self.byte(node, ObjectId::new(0x6132, channel)))
@@ -218,7 +219,7 @@ impl Learner {
                 Signal {
                     name: entry.name.clone(),
                     channel: entry.channel,
-                    value: (entry.value, instrument.data_type(entry.value, 32)),
+                    value: (entry.value, instrument.mapped_type(entry.value, 32)),
                     also: entry.also.clone(),
                     status: entry.status,
                     marker: entry.marker,
@@ -237,7 +238,7 @@ impl Learner {
                 Signal {
                     name: format!("ch{channel}"),
                     channel,
-                    value: (entry.object, instrument.data_type(entry.object, entry.bits)),
+                    value: (entry.object, instrument.mapped_type(entry.object, entry.bits)),
                     also: Vec::new(),
                     status: Some(ObjectId::new(0x6150, channel)),
                     marker: false,

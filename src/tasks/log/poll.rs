@@ -5,8 +5,8 @@ use crate::bus::Mono;
 use crate::canopen::id::NodeId;
 use crate::master::{Answer, Master, SdoError, Ticket};
 use crate::measure::decode::{Decoder, Wanted};
-use crate::measure::instrument::Instrument;
 use crate::measure::sample::Sample;
+use crate::node::Node;
 use crate::tasks::Failure;
 use crate::tasks::read::{Target, requests, sample, targets};
 use std::collections::BTreeMap;
@@ -40,7 +40,7 @@ struct Parts {
 
 impl Poll {
     pub(super) fn new(
-        instruments: &[Instrument],
+        instruments: &[Node],
         wanted: &[Wanted],
         decoder: &mut Decoder,
         period: Duration,
@@ -64,12 +64,7 @@ impl Poll {
     ///
     /// # Errors
     /// Why nothing can be read of it.
-    pub(super) fn renew(
-        &mut self,
-        instrument: &Instrument,
-        wanted: &[Wanted],
-        decoder: &mut Decoder,
-    ) -> Result<(), Failure> {
+    pub(super) fn renew(&mut self, instrument: &Node, wanted: &[Wanted], decoder: &mut Decoder) -> Result<(), Failure> {
         let mut number = 0;
         // Of several nodes each gives what it has; that somebody has it was checked before.
         let has = |item: &&Wanted| match item {
@@ -84,7 +79,7 @@ impl Poll {
             target.reading.source = decoder.add_source(target.source.clone());
             // The places of what was read of the node before are free by now: a node has one request at a time.
             let is_free = |&at: &usize| {
-                !self.live[at] && self.answers[at].under_way == 0 && self.targets[at].source.node == instrument.node
+                !self.live[at] && self.answers[at].under_way == 0 && self.targets[at].source.node == instrument.id
             };
             match (0..self.targets.len()).find(is_free) {
                 Some(at) => (self.targets[at], self.live[at], self.failing[at]) = (target, true, false),

@@ -17,14 +17,14 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::id::{CanId, NodeId};
 use crate::master::{Answer, Error, Happening, Master, SdoError, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
-use crate::measure::instrument::Instrument;
 use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
+use crate::node::Node;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 
 pub(super) struct Recording {
-    pub(super) instruments: Vec<Instrument>,
+    pub(super) instruments: Vec<Node>,
     pub(super) decoder: Decoder,
     pub(super) poll: Option<Poll>,
     pub(super) states: States,
@@ -60,7 +60,7 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    pub(super) fn new(instruments: Vec<Instrument>, plan: &Plan, bus: &dyn Bus) -> Recording {
+    pub(super) fn new(instruments: Vec<Node>, plan: &Plan, bus: &dyn Bus) -> Recording {
         let mut recording = Recording {
             decoder: Decoder::default(),
             poll: None,
@@ -136,7 +136,7 @@ impl Recording {
     pub(super) fn filters(&self) -> Filters {
         let mut ids: Vec<CanId> = self.decoder.can_ids().collect();
         for instrument in &self.instruments {
-            let node = instrument.node;
+            let node = instrument.id;
             ids.extend([instrument.emergency, instrument.sync, CanId::heartbeat(node)]);
             ids.extend([CanId::sdo_response(node), CanId::sdo_request(node)]);
         }

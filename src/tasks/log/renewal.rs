@@ -8,8 +8,9 @@ use crate::bus::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::master::{Answer, Error, Master, SdoError, Ticket};
-use crate::measure::instrument::Instrument;
-use crate::measure::survey::{Again, Overrides};
+use crate::node::Node;
+use crate::node::Overrides;
+use crate::node::survey::BackgroundSurvey;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -40,7 +41,7 @@ pub(super) enum Doubt {
 struct Doubted {
     /// When to read it.
     due: Mono,
-    again: Option<Again>,
+    again: Option<BackgroundSurvey>,
     was_away: bool,
     /// Since when rows have been made of what it sends although it is doubted.
     unheld_since: Option<Mono>,
@@ -50,7 +51,7 @@ struct Doubted {
 
 /// A node that has been read again.
 pub(super) struct Renewed {
-    pub(super) instrument: Instrument,
+    pub(super) instrument: Node,
     /// Whether it was away, and may have to be started.
     pub(super) was_away: bool,
     /// Since when rows have been made by what it was before, if they have.
@@ -116,7 +117,7 @@ impl Renewals {
     pub(super) fn start_due(&mut self, now: Mono, master: &mut Master<'_>) {
         for (&node, doubted) in &mut self.doubted {
             if doubted.again.is_none() && doubted.due <= now {
-                doubted.again = Some(Again::begin(node, &self.overrides, master));
+                doubted.again = Some(BackgroundSurvey::begin(node, &self.overrides, master));
             }
         }
     }

@@ -3,11 +3,12 @@
 use super::recording::Recording;
 use super::{Mode, PATIENCE, Plan};
 use crate::bus::time::spoken;
-use crate::measure::instrument::{Instrument, Tpdo};
+use crate::measure::layout::Tpdo;
+use crate::node::Node;
 use crate::tasks::{Failure, Kind};
 
 /// Why a recording has not one row.
-pub(super) fn why_nothing(instruments: &[Instrument], plan: &Plan, recording: &Recording) -> Failure {
+pub(super) fn why_nothing(instruments: &[Node], plan: &Plan, recording: &Recording) -> Failure {
     let waited = plan.duration.unwrap_or(PATIENCE).min(PATIENCE);
     let within = spoken(waited);
     if let Some(node) = recording.learner.as_ref().and_then(|learner| learner.not_understood.first()) {
@@ -25,16 +26,16 @@ pub(super) fn why_nothing(instruments: &[Instrument], plan: &Plan, recording: &R
             _ => "who only listens starts nobody: leave --passive out, or: cangauge nmt start all".to_owned(),
         });
     };
-    let (why, hint) = match recording.decoder.wrong_lengths(first.node) {
+    let (why, hint) = match recording.decoder.wrong_lengths(first.id) {
         0 => why_silent(first, plan.mode),
         _ => ("its TPDOs have not the length of their mapping".to_owned(), None),
     };
     let message = format!("no measurements within {within}: {why}");
     let failure = match instruments {
-        [only] => Failure::of_node(Kind::NoAnswer, only.node, message),
+        [only] => Failure::of_node(Kind::NoAnswer, only.id, message),
         _ => Failure::new(
             Kind::NoAnswer,
-            format!("no measurements from any node within {within}; node {}: {why}", first.node),
+            format!("no measurements from any node within {within}; node {}: {why}", first.id),
         ),
     };
     match hint {
@@ -44,8 +45,8 @@ pub(super) fn why_nothing(instruments: &[Instrument], plan: &Plan, recording: &R
 }
 
 /// Why a node that is set up as it is sends nothing, and what helps.
-pub(super) fn why_silent(instrument: &Instrument, mode: Mode) -> (String, Option<String>) {
-    let node = instrument.node;
+pub(super) fn why_silent(instrument: &Node, mode: Mode) -> (String, Option<String>) {
+    let node = instrument.id;
     if matches!(mode, Mode::Poll(_)) {
         return ("it does not answer".to_owned(), None);
     }

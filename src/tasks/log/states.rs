@@ -5,7 +5,7 @@ use crate::bus::BusError;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtCommand, NmtState, booted};
 use crate::master::{Error, Happening, Master};
-use crate::measure::instrument::Instrument;
+use crate::node::Node;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -23,7 +23,7 @@ impl States {
     pub(super) fn start(
         &mut self,
         master: &mut Master<'_>,
-        instruments: &[Instrument],
+        instruments: &[Node],
         plan: &Plan,
         restarted: &mut BTreeSet<NodeId>,
     ) -> Result<(), Error> {
@@ -32,10 +32,10 @@ impl States {
         }
         let known = heartbeats(master, instruments, restarted)?;
         for instrument in instruments {
-            let before = known.get(&instrument.node).copied();
+            let before = known.get(&instrument.id).copied();
             if before != Some(NmtState::Operational) {
-                self.started.insert(instrument.node, before);
-                master.send(NmtCommand::Start.frame(Some(instrument.node)));
+                self.started.insert(instrument.id, before);
+                master.send(NmtCommand::Start.frame(Some(instrument.id)));
             }
         }
         Ok(())
@@ -86,15 +86,15 @@ impl States {
 /// The states that heartbeats tell, waited for as long as the slowest of them needs.
 fn heartbeats(
     master: &mut Master<'_>,
-    instruments: &[Instrument],
+    instruments: &[Node],
     restarted: &mut BTreeSet<NodeId>,
 ) -> Result<BTreeMap<NodeId, NmtState>, Error> {
-    let period = |instrument: &Instrument| {
+    let period = |instrument: &Node| {
         let period = Duration::from_millis(u64::from(instrument.heartbeat_ms?));
         (!period.is_zero() && period <= SLOWEST_HEARTBEAT).then_some(period)
     };
     let expected: BTreeMap<NodeId, Duration> =
-        instruments.iter().filter_map(|instrument| Some((instrument.node, period(instrument)?))).collect();
+        instruments.iter().filter_map(|instrument| Some((instrument.id, period(instrument)?))).collect();
     let mut known = BTreeMap::new();
     let Some(longest) = expected.values().max() else { return Ok(known) };
     let until = master.now() + *longest * 3 / 2;

@@ -16,7 +16,7 @@ use crate::canopen::lss::LssAddress;
 use crate::device::assign::{AssignEntry, AssignWay, RateSource, RateTable};
 use crate::device::catalog::Model;
 use crate::master::{Lss, LssError, Master};
-use crate::measure::survey::Overrides;
+use crate::node::Overrides;
 use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
 use std::time::Duration;

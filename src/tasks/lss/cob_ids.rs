@@ -7,7 +7,7 @@ use crate::canopen::pdo::{CobId, TpdoNumber};
 use crate::canopen::value::DataType;
 use crate::device::catalog::Model;
 use crate::master::{Error, Master};
-use crate::measure::survey::read_all;
+use crate::node::read::read_values;
 use std::fmt;
 
 const EMERGENCY: ObjectId = ObjectId::new(0x1014, 0);
@@ -61,7 +61,7 @@ pub(super) fn cob_ids(
     let objects = tpdos.iter().map(|&(number, function)| (number.communication(1), function));
     let objects: Vec<(ObjectId, u32)> = std::iter::once((EMERGENCY, 0x80)).chain(objects).collect();
     let items: Vec<_> = objects.iter().map(|&(object, _)| (node, object, DataType::Unsigned(4))).collect();
-    let values = read_all(master, &items)?;
+    let values = read_values(master, &items)?;
     let mut found = CobIds { tpdos: Vec::new(), stale: Vec::new() };
     for (&(object, function), value) in objects.iter().zip(values) {
         let Some(number) = value.ok().and_then(|value| value.as_u64()).and_then(|word| u32::try_from(word).ok()) else {

@@ -9,7 +9,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::lss::{LssAddress, Mode};
 use crate::device::catalog::Model;
 use crate::master::{Lss, LssError, Master};
-use crate::measure::survey::Overrides;
+use crate::node::Overrides;
 use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
 

@@ -10,7 +10,8 @@ use crate::canopen::lss::LssAddress;
 use crate::device::assign::AssignWay;
 use crate::device::catalog::{self, Model};
 use crate::master::Master;
-use crate::measure::survey::{Overrides, recognised};
+use crate::node::Overrides;
+use crate::node::survey::identify;
 use crate::tasks::scan::{Found, scan};
 use crate::tasks::{Failure, Kind};
 use std::fmt;
@@ -103,7 +104,7 @@ impl Knowledge<'_> {
         let by_identity = subject.address.and_then(|address| catalog::by_identity(address.vendor, address.product));
         match subject.node.filter(|_| subject.alone) {
             Some(node) => {
-                let found = recognised(master, &[node], self.overrides)?.pop();
+                let found = identify(master, &[node], self.overrides)?.pop();
                 Ok(found.and_then(|instrument| instrument.model).or(by_identity))
             }
             None => Ok(by_identity),

@@ -6,7 +6,7 @@ use crate::canopen::nmt::Life;
 use crate::canopen::sdo::DownloadSize;
 use crate::canopen::value::DataType;
 use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
-use crate::measure::survey::read_all;
+use crate::node::read::read_values;
 use std::time::Duration;
 
 /// The heartbeat that is set for a moment.
@@ -31,7 +31,7 @@ pub struct Probe {
 pub fn probe(master: &mut Master<'_>, node: NodeId) -> Result<Probe, Error> {
     let unknown = Report { node, state: None, by: By::None, present: true };
     let failed = |trouble: String| Ok(Probe { report: unknown, trouble: Some(trouble) });
-    let before = match read_all(master, &[(node, HEARTBEAT, DataType::Unsigned(2))])?.pop() {
+    let before = match read_values(master, &[(node, HEARTBEAT, DataType::Unsigned(2))])?.pop() {
         Some(Ok(value)) => value.as_u64().and_then(|time| u16::try_from(time).ok()).unwrap_or(0),
         Some(Err(error)) => return failed(error.to_string()),
         None => return failed("nothing was read".to_owned()),

@@ -4,7 +4,8 @@ use crate::canopen::id::NodeId;
 use crate::canopen::value::DataType;
 use crate::device::description::Startup;
 use crate::master::{BlockMode, Master};
-use crate::measure::survey::{Overrides, recognised};
+use crate::node::Overrides;
+use crate::node::survey::identify;
 use crate::tasks::sdo::{Knowledge, Options, SizeMode, write};
 use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
@@ -42,7 +43,7 @@ pub fn startup(
     overrides: &Overrides,
     set: Option<Starts>,
 ) -> Result<StartupReport, Failure> {
-    let model = recognised(master, &[node], overrides)?.pop().and_then(|instrument| instrument.model);
+    let model = identify(master, &[node], overrides)?.pop().and_then(|instrument| instrument.model);
     let entry = model.as_ref().and_then(|model| model.description.startup.clone()).ok_or_else(|| {
         let message = "no source at hand says which object of this device decides who starts it";
         Failure::of_node(Kind::Unexpected, node, message)

@@ -6,7 +6,7 @@ use crate::canopen::nmt::{Life, NmtState};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::master::{Error, Happening, Master};
-use crate::measure::survey::read_all;
+use crate::node::read::read_values;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -64,7 +64,7 @@ pub fn watch(
     let mut pulses: BTreeMap<NodeId, Pulse> = nodes.iter().map(|&node| (node, Pulse::default())).collect();
     if ask {
         let items: Vec<_> = nodes.iter().map(|&node| (node, ObjectId::new(0x1017, 0), DataType::Unsigned(2))).collect();
-        for (node, value) in nodes.iter().zip(read_all(master, &items)?) {
+        for (node, value) in nodes.iter().zip(read_values(master, &items)?) {
             let period = value.ok().and_then(|value| value.as_u64()).filter(|&time| time > 0);
             if let Some(pulse) = pulses.get_mut(node) {
                 pulse.period = period.map(Duration::from_millis);

@@ -7,7 +7,7 @@ use super::settings::Settings;
 use crate::canopen::sdo::AbortCode;
 use crate::device::description::Remap;
 use crate::master::{Error, SdoError, SdoFailure};
-use crate::measure::instrument::Instrument;
+use crate::node::Node;
 use crate::tasks::Failure;
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ const DEAF: u32 = 5;
 /// A change under way.
 pub(super) struct Change<'a, 'm, 'bus> {
     pub(super) device: Device<'m, 'bus>,
-    pub(super) instrument: &'a Instrument,
+    pub(super) instrument: &'a Node,
     pub(super) old: Settings,
     pub(super) wanted: Settings,
     pub(super) remap: Remap,

@@ -7,8 +7,8 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, TpdoNumber};
 use crate::canopen::value::DataType;
 use crate::master::{Error, Happening};
-use crate::measure::instrument::Instrument;
-use crate::measure::survey::read_all;
+use crate::node::Node;
+use crate::node::read::read_values;
 use crate::tasks::scan::scan;
 use crate::tasks::{Failure, Kind};
 use std::time::Duration;
@@ -41,7 +41,7 @@ const WORDS: [(u16, u8, &str); 14] = [
 ///
 /// # Errors
 /// What has it.
-pub(super) fn free_of_own(instrument: &Instrument, number: TpdoNumber, id: CanId) -> Result<(), Failure> {
+pub(super) fn free_of_own(instrument: &Node, number: TpdoNumber, id: CanId) -> Result<(), Failure> {
     let mut taken = vec![
         (instrument.sync, "SYNC".to_owned()),
         (CanId::SYNC, "SYNC".to_owned()),
@@ -51,7 +51,7 @@ pub(super) fn free_of_own(instrument: &Instrument, number: TpdoNumber, id: CanId
     let others = instrument.tpdos.iter().filter(|tpdo| tpdo.number != number && tpdo.cob_id.is_valid());
     taken.extend(others.map(|tpdo| (tpdo.cob_id.can_id(), format!("its {}", tpdo.number))));
     match taken.into_iter().find(|(other, _)| *other == id) {
-        Some((_, what)) => Err(occupied(instrument.node, id, &what)),
+        Some((_, what)) => Err(occupied(instrument.id, id, &what)),
         None => Ok(()),
     }
 }
@@ -74,7 +74,7 @@ pub(super) fn free_of_others(device: &mut Device<'_, '_>, id: CanId) -> Result<(
         WORDS.map(|(index, sub, what)| (what, (other, ObjectId::new(index, sub), DataType::Unsigned(4))))
     };
     let (names, items): (Vec<_>, Vec<_>) = others.iter().flat_map(words).unzip();
-    let values = read_all(master, &items)?;
+    let values = read_values(master, &items)?;
     master.listen(&Filters::Only(vec![id]))?;
     let taken = names.iter().zip(&items).zip(&values).find(|((_, (_, object, _)), value)| {
         let word = value.as_ref().ok().and_then(|value| value.as_u64()).and_then(|word| u32::try_from(word).ok());

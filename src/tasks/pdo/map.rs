@@ -11,8 +11,9 @@ use crate::canopen::pdo::TpdoNumber;
 use crate::device::catalog::Model;
 use crate::device::description::Access;
 use crate::master::Master;
-use crate::measure::instrument::Instrument;
-use crate::measure::survey::{Overrides, instruments};
+use crate::node::Node;
+use crate::node::Overrides;
+use crate::node::survey::survey_nodes;
 use crate::tasks::store::{self, Done, Group};
 use crate::tasks::{Failure, Kind};
 
@@ -41,7 +42,7 @@ pub fn map(master: &mut Master<'_>, wish: &Wish, keep: bool, overrides: &Overrid
     wish.check()?;
     let node = wish.node;
     master.listen_to(&[node])?;
-    let found = instruments(master, &[node], overrides)?.pop();
+    let found = survey_nodes(master, &[node], overrides)?.pop();
     let instrument = found.ok_or_else(|| Failure::of_node(Kind::NoAnswer, node, "it is not there"))?;
     let model = instrument.model.as_deref();
     let storing = if keep { Some(storing(master, &instrument, wish.number)?) } else { None };
@@ -84,11 +85,11 @@ pub fn map(master: &mut Master<'_>, wish: &Wish, keep: bool, overrides: &Overrid
 
 /// What has to be stored to keep the settings of a TPDO. The communication settings alone where they are a group
 /// of their own: a store of everything puts custom COB-IDs back on some devices.
-fn storing(master: &mut Master<'_>, instrument: &Instrument, number: TpdoNumber) -> Result<store::Plan, Failure> {
+fn storing(master: &mut Master<'_>, instrument: &Node, number: TpdoNumber) -> Result<store::Plan, Failure> {
     let model = instrument.model.as_deref();
     if model.is_some_and(|model| !keeps(model, number)) {
         let message = format!("it does not keep the settings of {number} when it stores: nothing was changed");
-        let failure = Failure::of_node(Kind::CheckFailed, instrument.node, message);
+        let failure = Failure::of_node(Kind::CheckFailed, instrument.id, message);
         return Err(failure.hint("leave --store out, and set it after every power on"));
     }
     match store::plan(master, instrument, Group::Communication) {
@@ -110,17 +111,12 @@ fn keeps(model: &Model, number: TpdoNumber) -> bool {
 }
 
 /// What can be known to be wrong before anything is written.
-fn check(
-    device: &mut Device<'_, '_>,
-    instrument: &Instrument,
-    old: &Settings,
-    wanted: &Settings,
-) -> Result<(), Failure> {
+fn check(device: &mut Device<'_, '_>, instrument: &Node, old: &Settings, wanted: &Settings) -> Result<(), Failure> {
     let number = old.number;
     if old.mapping != wanted.mapping && is_fixed(instrument, number) {
         let entries: Vec<String> = old.mapping.iter().map(|&entry| mend::entry_text(entry)).collect();
         let message = format!("the mapping of {number} is fixed ({}): nothing was changed", entries.join(" "));
-        return Err(Failure::of_node(Kind::Refused, instrument.node, message));
+        return Err(Failure::of_node(Kind::Refused, instrument.id, message));
     }
     let (before, after) = (old.cob_id, wanted.cob_id);
     let moves = before.can_id() != after.can_id();
@@ -134,7 +130,7 @@ fn check(
 }
 
 /// Whether the description says that the mapping cannot be written. An EDS file is not believed that much.
-fn is_fixed(instrument: &Instrument, number: TpdoNumber) -> bool {
+fn is_fixed(instrument: &Node, number: TpdoNumber) -> bool {
     let described = instrument.model.as_ref().filter(|model| !model.description.objects.is_empty());
     described.is_some_and(|model| {
         let access = |sub| model.dictionary.get(number.mapping(sub)).map(|entry| entry.access);

@@ -7,8 +7,9 @@ use crate::canopen::id::NodeId;
 use crate::canopen::pdo::{MappingEntry, TpdoNumber};
 use crate::device::unit::Unit;
 use crate::master::Master;
-use crate::measure::instrument::Instrument;
-use crate::measure::survey::{Overrides, instruments};
+use crate::node::Node;
+use crate::node::Overrides;
+use crate::node::survey::survey_nodes;
 use crate::tasks::{Failure, Kind};
 use std::time::Duration;
 
@@ -36,9 +37,9 @@ pub struct Shown {
 
 impl Shown {
     /// The settings with what is known of the device.
-    pub(super) fn new(instrument: &Instrument, settings: Settings) -> Shown {
+    pub(super) fn new(instrument: &Node, settings: Settings) -> Shown {
         let carried = settings.mapping.iter().map(|&entry| carried(instrument, entry)).collect();
-        Shown { node: instrument.node, settings, carried }
+        Shown { node: instrument.id, settings, carried }
     }
 
     /// The inhibit time; `None` where the device has none.
@@ -47,7 +48,7 @@ impl Shown {
     }
 }
 
-fn carried(instrument: &Instrument, entry: MappingEntry) -> Carried {
+fn carried(instrument: &Node, entry: MappingEntry) -> Carried {
     if let Some(signal) = instrument.signals.iter().find(|signal| signal.is_value(entry.object)) {
         return Carried { entry, signal: Some(signal.name.clone()), unit: signal.unit };
     }
@@ -56,7 +57,7 @@ fn carried(instrument: &Instrument, entry: MappingEntry) -> Carried {
 }
 
 /// Whether 180xh:3 is worth a question: a description that lists the objects lists all of them.
-pub(super) fn may_inhibit(instrument: &Instrument, number: TpdoNumber) -> bool {
+pub(super) fn may_inhibit(instrument: &Node, number: TpdoNumber) -> bool {
     let described = instrument.model.as_ref().filter(|model| !model.description.objects.is_empty());
     described.is_none_or(|model| model.dictionary.get(number.communication(3)).is_some())
 }
@@ -72,7 +73,7 @@ pub fn show(
     overrides: &Overrides,
 ) -> Result<Vec<Shown>, Failure> {
     master.listen_to(&[node])?;
-    let found = instruments(master, &[node], overrides)?.pop();
+    let found = survey_nodes(master, &[node], overrides)?.pop();
     let instrument = found.ok_or_else(|| Failure::of_node(Kind::NoAnswer, node, "it is not there"))?;
     let there: Vec<TpdoNumber> = instrument.tpdos.iter().map(|tpdo| tpdo.number).collect();
     let wanted = match number {
@@ -91,7 +92,7 @@ pub fn show(
 }
 
 /// Why a TPDO could not be read.
-pub(super) fn unread(instrument: &Instrument, trouble: Trouble) -> Failure {
+pub(super) fn unread(instrument: &Node, trouble: Trouble) -> Failure {
     match trouble {
         Trouble::Refused(error) => {
             let numbers: Vec<String> = instrument.tpdos.iter().map(|tpdo| tpdo.number.get().to_string()).collect();
@@ -99,10 +100,10 @@ pub(super) fn unread(instrument: &Instrument, trouble: Trouble) -> Failure {
         }
         Trouble::Lost(error) => error.into(),
         Trouble::Stopped(error) => error.into(),
-        Trouble::Restarted => Failure::of_node(Kind::Unexpected, instrument.node, "it restarted in the middle"),
+        Trouble::Restarted => Failure::of_node(Kind::Unexpected, instrument.id, "it restarted in the middle"),
         Trouble::NotKept(object, reads, wrote) => {
             let message = format!("{object} reads {reads} instead of {wrote}");
-            Failure::of_node(Kind::Unexpected, instrument.node, message)
+            Failure::of_node(Kind::Unexpected, instrument.id, message)
         }
     }
 }

@@ -7,7 +7,8 @@ use crate::canopen::pdo::TpdoNumber;
 use crate::master::{Error, Happening, Master};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::sample::{Sample, Source};
-use crate::measure::survey::{Overrides, instruments};
+use crate::node::Overrides;
+use crate::node::survey::survey_nodes;
 use crate::tasks::{Failure, Kind};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -61,11 +62,11 @@ pub fn watch(
     tell: &mut dyn FnMut(&Line<'_>) -> ControlFlow<()>,
 ) -> Result<(), Failure> {
     master.listen_to(nodes)?;
-    let instruments = instruments(master, nodes, overrides)?;
+    let instruments = survey_nodes(master, nodes, overrides)?;
     let mut decoder = Decoder::default();
     let mut numbers: BTreeMap<CanId, TpdoNumber> = BTreeMap::new();
     for instrument in &instruments {
-        decoder.add(instrument, &[]);
+        decoder.add(instrument.layout(), &[]);
         let valid = instrument.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
         numbers.extend(valid.map(|tpdo| (tpdo.cob_id.can_id(), tpdo.number)));
     }

@@ -8,7 +8,8 @@ use crate::canopen::pdo::{MappingEntry, TpdoNumber};
 use crate::canopen::value::DataType;
 use crate::device::standard;
 use crate::master::Request;
-use crate::measure::instrument::{Instrument, PROCESS_VALUES, Signal};
+use crate::measure::layout::{PROCESS_VALUES, Signal};
+use crate::node::Node;
 use crate::tasks::sdo::nearest;
 use crate::tasks::{Failure, Kind};
 
@@ -81,7 +82,7 @@ impl Wish {
     pub(super) fn mapping(
         &self,
         device: &mut Device<'_, '_>,
-        instrument: &Instrument,
+        instrument: &Node,
     ) -> Result<(Option<Vec<MappingEntry>>, Vec<String>), Failure> {
         let (mut entries, mut remarks) = (Vec::new(), Vec::new());
         for item in &self.items {
@@ -113,7 +114,7 @@ impl Wish {
         &self,
         old: &Settings,
         mapping: Option<Vec<MappingEntry>>,
-        instrument: &Instrument,
+        instrument: &Node,
     ) -> Result<Settings, Failure> {
         let mut wanted = old.clone();
         if mapping.is_some() || self.cob_id.is_some() {
@@ -160,7 +161,7 @@ fn check_length(node: NodeId, bits: u32) -> Result<(), Failure> {
 }
 
 /// The object of a signal, its status, or a name of the dictionary.
-fn named(instrument: &Instrument, name: &str) -> Result<ObjectId, Failure> {
+fn named(instrument: &Node, name: &str) -> Result<ObjectId, Failure> {
     let signals = &instrument.signals;
     let of = |name: &str| signals.iter().find(|signal| signal.name == name);
     if let Some(signal) = of(name) {
@@ -169,7 +170,7 @@ fn named(instrument: &Instrument, name: &str) -> Result<ObjectId, Failure> {
     if let Some(signal) = name.strip_suffix(".status").and_then(of) {
         return signal.status.ok_or_else(|| {
             let message = format!("no object tells the status of {}", signal.name);
-            Failure::of_node(Kind::Usage, instrument.node, message)
+            Failure::of_node(Kind::Usage, instrument.id, message)
         });
     }
     let dictionary = instrument.model.as_ref().map(|model| &model.dictionary);
@@ -190,13 +191,13 @@ fn named(instrument: &Instrument, name: &str) -> Result<ObjectId, Failure> {
         [] => near,
         names => format!("nearest: {}", names.join(", ")),
     };
-    let failure = Failure::of_node(Kind::Usage, instrument.node, format!("it has no object or signal \"{name}\""));
+    let failure = Failure::of_node(Kind::Usage, instrument.id, format!("it has no object or signal \"{name}\""));
     Err(if hint.is_empty() { failure } else { failure.hint(hint) })
 }
 
 /// The object that carries a signal in a PDO: the one that it is read from, unless the dictionary knows that
 /// this one cannot be mapped and another of the same quantity can.
-fn value_object(instrument: &Instrument, signal: &Signal) -> ObjectId {
+fn value_object(instrument: &Node, signal: &Signal) -> ObjectId {
     let value = signal.value.0;
     let Some(model) = &instrument.model else { return value };
     let mappable = |object: &ObjectId| model.dictionary.get(*object).is_some_and(|entry| entry.pdo);
@@ -209,7 +210,7 @@ fn value_object(instrument: &Instrument, signal: &Signal) -> ObjectId {
 }
 
 /// The bits of an object, where its description or the standard tells its type.
-fn width(instrument: &Instrument, object: ObjectId) -> Option<u8> {
+fn width(instrument: &Node, object: ObjectId) -> Option<u8> {
     let model = instrument.model.as_ref();
     let described = model.and_then(|model| {
         let entry = model.dictionary.get(object)?;

@@ -7,8 +7,9 @@ use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::master::Master;
-use crate::measure::instrument::{Instrument, Signal};
+use crate::measure::layout::Signal;
 use crate::measure::sample::Sample;
+use crate::node::Node;
 use crate::tasks::Failure;
 use crate::tasks::nmt;
 use crate::tasks::read::{requests, sample, targets};
@@ -19,7 +20,7 @@ use std::time::Duration;
 #[derive(Clone, Debug)]
 pub struct Info {
     /// Identity, signals and TPDOs.
-    pub instrument: Instrument,
+    pub instrument: Node,
     /// 1009h.
     pub hardware: Option<String>,
     /// 100Ah.
@@ -256,7 +257,7 @@ fn state(
 ) -> Result<Option<NmtState>, Failure> {
     let period = values.get(&HEARTBEAT).and_then(Value::as_u64).map(Duration::from_millis);
     match period.filter(|period| !period.is_zero() && *period <= PATIENCE) {
-        Some(period) => Ok(nmt::by_heartbeat(master, device.instrument.node, period)?),
+        Some(period) => Ok(nmt::by_heartbeat(master, device.instrument.id, period)?),
         None => Ok(None),
     }
 }

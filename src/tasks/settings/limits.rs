@@ -5,7 +5,7 @@ use super::{Device, Quantity, encode_quantity};
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::Transmission;
 use crate::master::Master;
-use crate::measure::instrument::Signal;
+use crate::measure::layout::Signal;
 use crate::tasks::{Failure, Kind};
 
 /// One of the four.

@@ -5,7 +5,7 @@ use super::{Device, Quantity};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::master::Master;
-use crate::measure::instrument::Signal;
+use crate::measure::layout::Signal;
 use crate::tasks::{Failure, Kind};
 
 /// The lowest and highest value of a signal.

@@ -19,9 +19,12 @@ use crate::device::standard;
 use crate::device::unit::Unit;
 use crate::master::{BlockMode, Master, Request, SdoError, SdoFailure};
 use crate::measure::decode::is_smallest;
-use crate::measure::instrument::{Instrument, PROCESS_VALUES, Signal};
+use crate::measure::layout::{PROCESS_VALUES, Signal};
 use crate::measure::sample::Number;
-use crate::measure::survey::{Overrides, instruments, read_all};
+use crate::node::Node;
+use crate::node::Overrides;
+use crate::node::read::read_values;
+use crate::node::survey::survey_nodes;
 use crate::tasks::sdo::{Knowledge, Options, SizeMode, write};
 use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
@@ -30,7 +33,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct Device {
     /// What it is and how it is set up.
-    pub instrument: Instrument,
+    pub instrument: Node,
     knowledge: Knowledge,
 }
 
@@ -50,8 +53,8 @@ impl Device {
     /// Silence, breaches of the protocol, and what stops everything.
     pub fn open(master: &mut Master<'_>, node: NodeId, overrides: &Overrides) -> Result<Device, Failure> {
         master.listen_to(&[node])?;
-        let instrument = instruments(master, &[node], overrides)?.pop();
-        let instrument = instrument.unwrap_or_else(|| Instrument::new(node));
+        let instrument = survey_nodes(master, &[node], overrides)?.pop();
+        let instrument = instrument.unwrap_or_else(|| Node::new(node));
         let model = instrument.model.as_ref().map(|model| (node, Arc::clone(model)));
         let knowledge = Knowledge::new(node, &model.into_iter().collect());
         Ok(Device { instrument, knowledge })
@@ -59,7 +62,7 @@ impl Device {
 
     /// Its node-ID.
     pub fn node(&self) -> NodeId {
-        self.instrument.node
+        self.instrument.id
     }
 
     /// Its description, where one was recognised or given.
@@ -146,7 +149,7 @@ impl Device {
             Err(SdoError { failure: SdoFailure::Refused(_) | SdoFailure::Fit(_), .. }) => Ok(None),
             Err(error) => Err(Failure::from(error)),
         };
-        read_all(master, &items)?.into_iter().map(told).collect()
+        read_values(master, &items)?.into_iter().map(told).collect()
     }
 
     /// Reads an object that the device must have.

@@ -6,7 +6,7 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::device::sensor;
 use crate::device::unit::Unit;
-use crate::measure::instrument::Signal;
+use crate::measure::layout::Signal;
 use std::collections::BTreeMap;
 
 /// Names of the objects that make the date of the last calibration.

@@ -6,7 +6,7 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::device::unit::Unit;
 use crate::master::Master;
-use crate::measure::instrument::Signal;
+use crate::measure::layout::Signal;
 use crate::measure::sample::Number;
 use crate::tasks::{Failure, Kind};
 

@@ -7,7 +7,7 @@ use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::CanId;
 use cangauge::master::{Master, Timing};
-use cangauge::measure::survey::Overrides;
+use cangauge::node::Overrides;
 use cangauge::output::{info, info_json, json};
 use cangauge::tasks::scan::scan;
 use cangauge::tasks::settings::Device;

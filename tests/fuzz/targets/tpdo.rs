@@ -9,7 +9,8 @@ use cangauge::canopen::pdo::{CobId, MappingEntry, TpdoNumber};
 use cangauge::canopen::value::DataType;
 use cangauge::device::unit::Unit;
 use cangauge::measure::decode::{Decoded, Decoder};
-use cangauge::measure::instrument::{Instrument, Signal, Tpdo};
+use cangauge::measure::layout::{Signal, Tpdo};
+use cangauge::node::{Node};
 use cangauge_fuzz::{Bytes, node};
 use libfuzzer_sys::fuzz_target;
 use std::time::Duration;
@@ -19,7 +20,7 @@ const TPDO: u32 = 0x185;
 fuzz_target!(|data: &[u8]| {
     let mut bytes = Bytes(data);
     let head = bytes.byte();
-    let mut instrument = Instrument::new(node());
+    let mut instrument = Node::new(node());
     instrument.signals.push(Signal {
         name: "pressure".into(),
         channel: 1,

@@ -7,7 +7,7 @@ use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
 use cangauge::device::assign::spoken_rate;
 use cangauge::master::{Master, Timing};
-use cangauge::measure::survey::Overrides;
+use cangauge::node::Overrides;
 use cangauge::sim::{Device, State};
 use cangauge::tasks::Kind;
 use cangauge::tasks::lss::{Confirmed, Job, Rate, Target, Via, assign, store};

@@ -8,7 +8,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtState};
 use crate::device::quirk::Quirk;
 use crate::master::{Answer, Error, Master, SdoError, Ticket};
-use crate::measure::instrument::Instrument;
+use crate::node::Node;
 use crate::tasks::log::changes::changes;
 use crate::tasks::log::hearts::Beat;
 use crate::tasks::log::renewal::{Doubt, Renewed, writes_setup};
@@ -17,8 +17,8 @@ use std::collections::BTreeSet;
 
 impl Recording {
     /// Learns what an instrument says of its services.
-    pub(super) fn know(&mut self, instrument: &Instrument) {
-        let node = instrument.node;
+    pub(super) fn know(&mut self, instrument: &Node) {
+        let node = instrument.id;
         self.emergencies_of.retain(|_, of| *of != node);
         self.emergencies_of.insert(instrument.emergency, node);
         self.meanings.retain(|(of, _), _| *of != node);
@@ -106,7 +106,7 @@ impl Recording {
 
     /// No row is made of what this node sends until it has been read again. Who only listens cannot.
     fn doubt(&mut self, node: NodeId, why: Doubt, now: Mono, master: &mut Master<'_>) {
-        let is_recorded = self.learner.is_none() && self.instruments.iter().any(|known| known.node == node);
+        let is_recorded = self.learner.is_none() && self.instruments.iter().any(|known| known.id == node);
         if !is_recorded || !self.renewals.doubt(node, why, now, master) {
             return;
         }
@@ -120,7 +120,7 @@ impl Recording {
     }
 
     fn doubt_all(&mut self, why: Doubt, now: Mono, master: &mut Master<'_>) {
-        let nodes: Vec<NodeId> = self.instruments.iter().map(|instrument| instrument.node).collect();
+        let nodes: Vec<NodeId> = self.instruments.iter().map(|instrument| instrument.id).collect();
         nodes.into_iter().for_each(|node| self.doubt(node, why, now, master));
     }
 
@@ -187,8 +187,8 @@ impl Recording {
         observer: &mut dyn Observer,
     ) -> Result<(), Error> {
         let Renewed { instrument, was_away, unheld_since } = renewed;
-        let (node, at) = (instrument.node, master.bus().now());
-        let Some(place) = self.instruments.iter().position(|known| known.node == node) else { return Ok(()) };
+        let (node, at) = (instrument.id, master.bus().now());
+        let Some(place) = self.instruments.iter().position(|known| known.id == node) else { return Ok(()) };
         let changes = changes(&self.instruments[place], &instrument);
         match &mut self.poll {
             Some(poll) => {
@@ -196,7 +196,7 @@ impl Recording {
                     observer.note(&Note::Unreadable(node, failure.message), at);
                 }
             }
-            None => self.decoder.renew(&instrument, &plan.wanted),
+            None => self.decoder.renew(instrument.layout(), &plan.wanted),
         }
         self.expect_sources();
         self.know(&instrument);

@@ -31,7 +31,7 @@ impl Recording {
         }
         let nothing = (self.rows == 0).then(|| why_nothing(&self.instruments, plan, &self));
         for &node in lost.iter().filter(|_| self.rows > 0) {
-            if let Some(instrument) = self.instruments.iter().find(|instrument| instrument.node == node)
+            if let Some(instrument) = self.instruments.iter().find(|instrument| instrument.id == node)
                 && self.pulses[&node].last.is_none()
             {
                 let (why, _) = why_silent(instrument, plan.mode);

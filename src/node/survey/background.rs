@@ -1,11 +1,11 @@
 //! Reads one instrument anew while everything else goes on.
 
-use super::{Ask, Overrides, instruments};
+use super::{Ask, Overrides, survey_nodes};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::device::quirk::Quirk;
 use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure, Ticket};
-use crate::measure::instrument::Instrument;
+use crate::node::Node;
 use std::collections::BTreeMap;
 
 /// A survey of one node that never waits.
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 /// The survey itself is written as if it waited for every answer. It is carried out as often as it stands
 /// still: with the answers that have come so far it runs until it asks for something new, which is requested,
 /// and when that has come it runs from the start again. It takes some eight steps.
-pub struct Again {
+pub struct BackgroundSurvey {
     node: NodeId,
     overrides: Overrides,
     answers: BTreeMap<ObjectId, Result<Answer, SdoError>>,
@@ -57,12 +57,12 @@ impl Ask for Known<'_, '_> {
     }
 }
 
-impl Again {
+impl BackgroundSurvey {
     /// Begins to read `node` anew.
-    pub fn begin(node: NodeId, overrides: &Overrides, master: &mut Master<'_>) -> Again {
+    pub fn begin(node: NodeId, overrides: &Overrides, master: &mut Master<'_>) -> BackgroundSurvey {
         let own = overrides.iter().filter(|(other, _)| **other == node);
         let overrides = own.map(|(&node, model)| (node, model.clone())).collect();
-        let mut again = Again { node, overrides, answers: BTreeMap::new(), under_way: BTreeMap::new() };
+        let mut again = BackgroundSurvey { node, overrides, answers: BTreeMap::new(), under_way: BTreeMap::new() };
         // Nothing is known, and so it asks.
         let _ = again.go_on(master);
         again
@@ -74,7 +74,7 @@ impl Again {
         ticket: Ticket,
         result: &Result<Answer, SdoError>,
         master: &mut Master<'_>,
-    ) -> Option<Result<Instrument, Error>> {
+    ) -> Option<Result<Node, Error>> {
         let object = self.under_way.remove(&ticket)?;
         // Who is silent to one question is not asked the others.
         if let Err(error) = result
@@ -97,9 +97,9 @@ impl Again {
         master.forget(self.under_way.into_keys());
     }
 
-    fn go_on(&mut self, master: &mut Master<'_>) -> Option<Result<Instrument, Error>> {
+    fn go_on(&mut self, master: &mut Master<'_>) -> Option<Result<Node, Error>> {
         let mut known = Known { answers: &self.answers, master };
-        match instruments(&mut known, &[self.node], &self.overrides) {
+        match survey_nodes(&mut known, &[self.node], &self.overrides) {
             Ok(mut read) => read.pop().map(Ok),
             Err(Stop::Failed(error)) => Some(Err(error)),
             Err(Stop::Wanted(objects)) => {

@@ -1,11 +1,12 @@
 //! Reads what is needed to understand a device's measurements: identity, TPDOs, units, digits.
 //!
 //! Many nodes are read side by side, in the same steps. What they are read with is an [`Ask`]: the master, which
-//! waits for the answers, or an [`Again`], which does not.
+//! waits for the answers, or a [`BackgroundSurvey`], which does not.
 
-mod again;
+mod background;
 
-use super::instrument::{Identity, Instrument, PROCESS_VALUES, Signal, Tpdo};
+use super::read::{Item, read_known};
+use super::{Identity, Node};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
@@ -15,7 +16,8 @@ use crate::device::description::SignalEntry;
 use crate::device::quirk::Quirk;
 use crate::device::unit::Unit;
 use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
-pub use again::Again;
+use crate::measure::layout::{PROCESS_VALUES, Signal, Tpdo};
+pub use background::BackgroundSurvey;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -28,9 +30,6 @@ const TPDOS_TRIED: u16 = 8;
 
 /// The description to use for a node, where the user named one.
 pub type Overrides = BTreeMap<NodeId, Arc<Model>>;
-
-/// Something to be read from a node.
-pub type Item = (NodeId, ObjectId, DataType);
 
 /// What a survey reads with.
 pub trait Ask {
@@ -58,37 +57,6 @@ impl Ask for Master<'_> {
     fn set_quirks(&mut self, node: NodeId, quirks: &[Quirk]) {
         Master::set_quirks(self, node, quirks);
     }
-}
-
-/// Reads many values side by side.
-///
-/// # Errors
-/// What stops everything. What one device refuses is in its result.
-pub fn read_all<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Result<Value, SdoError>>, A::Stop> {
-    let objects: Vec<(NodeId, ObjectId)> = items.iter().map(|&(node, object, _)| (node, object)).collect();
-    let answers = master.ask(&objects)?;
-    let values = answers.into_iter().zip(items).map(|(answer, &(node, object, data_type))| {
-        answer.and_then(|answer| answer.value(node, object, Some(data_type))).map(|(value, _)| value)
-    });
-    Ok(values.collect())
-}
-
-/// Like [`read_all`], with `None` for what a device refuses.
-///
-/// # Errors
-/// Silence and breaches of the protocol too: a device that stops answering in the middle is not read
-/// half.
-fn read_known<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Option<Value>>, A::Stop> {
-    read_all(master, items)?
-        .into_iter()
-        .map(|result| match result {
-            Ok(value) => Ok(Some(value)),
-            Err(error) => match error.failure {
-                SdoFailure::Refused(_) | SdoFailure::Fit(_) => Ok(None),
-                _ => Err(Error::Sdo(error).into()),
-            },
-        })
-        .collect()
 }
 
 fn number(value: Option<&Value>) -> Option<u64> {
@@ -132,12 +100,8 @@ pub fn identities<A: Ask>(master: &mut A, nodes: &[NodeId]) -> Result<Vec<Identi
 ///
 /// # Errors
 /// A node that does not answer, and what stops everything.
-pub fn instruments<A: Ask>(
-    master: &mut A,
-    nodes: &[NodeId],
-    overrides: &Overrides,
-) -> Result<Vec<Instrument>, A::Stop> {
-    let mut instruments = recognised(master, nodes, overrides)?;
+pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Node>, A::Stop> {
+    let mut instruments = identify(master, nodes, overrides)?;
     read_services(master, &mut instruments)?;
     read_tpdos(master, &mut instruments)?;
     find_signals(master, &mut instruments)?;
@@ -149,7 +113,7 @@ pub fn instruments<A: Ask>(
 ///
 /// # Errors
 /// A node that does not answer, and what stops everything.
-pub fn recognised<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Instrument>, A::Stop> {
+pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Node>, A::Stop> {
     // A device whose reads need a quirk can only be read once the user has named its description.
     for (node, model) in overrides {
         master.set_quirks(*node, &model.description.quirks);
@@ -172,23 +136,23 @@ pub fn recognised<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Override
             Err(error) => return Err(Error::Sdo(error).into()),
         }
     }
-    let mut instruments: Vec<Instrument> = nodes.iter().map(|&node| Instrument::new(node)).collect();
+    let mut instruments: Vec<Node> = nodes.iter().map(|&node| Node::new(node)).collect();
     for ((instrument, identity), traits) in instruments.iter_mut().zip(identities).zip(&traits) {
-        let given = overrides.get(&instrument.node).cloned();
+        let given = overrides.get(&instrument.id).cloned();
         instrument.model = given.or_else(|| recognise(traits));
         instrument.identity = identity;
         if let Some(model) = &instrument.model {
-            master.set_quirks(instrument.node, &model.description.quirks);
+            master.set_quirks(instrument.id, &model.description.quirks);
         }
     }
     Ok(instruments)
 }
 
-fn read_services<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Result<(), A::Stop> {
+fn read_services<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
     let objects = [(ObjectId::new(0x1017, 0), U16), (ObjectId::new(0x1014, 0), U32), (ObjectId::new(0x1005, 0), U32)];
     let items: Vec<Item> = instruments
         .iter()
-        .flat_map(|instrument| objects.map(|(object, data_type)| (instrument.node, object, data_type)))
+        .flat_map(|instrument| objects.map(|(object, data_type)| (instrument.id, object, data_type)))
         .collect();
     let values = read_known(master, &items)?;
     for (instrument, values) in instruments.iter_mut().zip(values.chunks(objects.len())) {
@@ -203,8 +167,8 @@ fn read_services<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Resu
     Ok(())
 }
 
-fn read_tpdos<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Result<(), A::Stop> {
-    let numbers = |instrument: &Instrument| -> Vec<TpdoNumber> {
+fn read_tpdos<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
+    let numbers = |instrument: &Node| -> Vec<TpdoNumber> {
         let described = |number: &TpdoNumber| match &instrument.model {
             Some(model) => model.dictionary.has_index(number.communication(0).index),
             None => number.get() <= TPDOS_TRIED,
@@ -216,7 +180,7 @@ fn read_tpdos<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Result<
         .enumerate()
         .flat_map(|(at, instrument)| numbers(instrument).into_iter().map(move |number| (at, number)))
         .collect();
-    let node = |at: usize, instruments: &[Instrument]| instruments[at].node;
+    let node = |at: usize, instruments: &[Node]| instruments[at].id;
     let items: Vec<Item> =
         wanted.iter().map(|&(at, number)| (node(at, instruments), number.communication(1), U32)).collect();
     let cob_ids = read_known(master, &items)?;
@@ -262,7 +226,7 @@ fn read_tpdos<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Result<
 }
 
 /// The signals of a description, or those that the objects of CiA 404 tell.
-fn find_signals<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Result<(), A::Stop> {
+fn find_signals<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
     let mut unknown = Vec::new();
     for (at, instrument) in instruments.iter_mut().enumerate() {
         match instrument.model.clone().filter(|model| !model.description.signals.is_empty()) {
@@ -275,7 +239,7 @@ fn find_signals<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Resul
     }
     let items: Vec<Item> = unknown
         .iter()
-        .flat_map(|&at| PROCESS_VALUES.map(|(index, _)| (instruments[at].node, ObjectId::new(index, 0), U8)))
+        .flat_map(|&at| PROCESS_VALUES.map(|(index, _)| (instruments[at].id, ObjectId::new(index, 0), U8)))
         .collect();
     let counts = read_known(master, &items)?;
     for (&at, counts) in unknown.iter().zip(counts.chunks(PROCESS_VALUES.len())) {
@@ -303,7 +267,7 @@ fn find_signals<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Resul
                 channel,
                 value: (
                     ObjectId::new(index, channel),
-                    instrument.data_type(ObjectId::new(index, channel), bits(data_type)),
+                    instrument.mapped_type(ObjectId::new(index, channel), bits(data_type)),
                 ),
                 also: Vec::new(),
                 status: Some(ObjectId::new(0x6150, channel)),
@@ -320,7 +284,7 @@ fn bits(data_type: DataType) -> u8 {
     data_type.width().and_then(|width| u8::try_from(8 * width).ok()).unwrap_or(32)
 }
 
-fn described(instrument: &Instrument, entry: &SignalEntry) -> Signal {
+fn described(instrument: &Node, entry: &SignalEntry) -> Signal {
     let model = instrument.model.as_ref();
     let known = model.and_then(|model| model.dictionary.get(entry.value)).map(|entry| entry.data_type);
     Signal {
@@ -335,14 +299,14 @@ fn described(instrument: &Instrument, entry: &SignalEntry) -> Signal {
     }
 }
 
-fn read_units<A: Ask>(master: &mut A, instruments: &mut [Instrument]) -> Result<(), A::Stop> {
+fn read_units<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
     let items: Vec<Item> = instruments
         .iter()
         .flat_map(|instrument| {
             instrument.signals.iter().flat_map(|signal| {
                 [
-                    (instrument.node, ObjectId::new(0x6131, signal.channel), U32),
-                    (instrument.node, ObjectId::new(0x6132, signal.channel), U8),
+                    (instrument.id, ObjectId::new(0x6131, signal.channel), U32),
+                    (instrument.id, ObjectId::new(0x6132, signal.channel), U8),
                 ]
             })
         })

@@ -1,0 +1,98 @@
+//! What is known of one node.
+
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
+use crate::device::catalog::{Model, Traits};
+use crate::measure::layout::{Layout, Signal, Tpdo};
+use std::sync::Arc;
+
+/// The identity that a node reports. A field is `None` if the node refused to answer or was not asked.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Identity {
+    /// The device type (1000h).
+    pub device_type: Option<u32>,
+    /// The vendor-ID (1018h:1).
+    pub vendor: Option<u32>,
+    /// The product code (1018h:2).
+    pub product: Option<u32>,
+    /// The revision number (1018h:3).
+    pub revision: Option<u32>,
+    /// The serial number (1018h:4).
+    pub serial: Option<u32>,
+    /// The device name (1008h).
+    pub name: Option<String>,
+}
+
+impl Identity {
+    /// The number of the device profile, the low word of 1000h.
+    pub fn profile(&self) -> Option<u32> {
+        self.device_type.map(|device_type| device_type & 0xffff)
+    }
+
+    /// The facts by which a device description is recognised.
+    pub fn traits(&self) -> Traits {
+        Traits {
+            device_type: self.device_type,
+            vendor_id: self.vendor,
+            product_code: self.product,
+            device_name: self.name.clone(),
+            ..Traits::default()
+        }
+    }
+}
+
+/// A node: its identity, its device description, its signals and its TPDOs.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// The node-ID.
+    pub id: NodeId,
+    /// The identity that the node reports.
+    pub identity: Identity,
+    /// The device description, if the node was recognised or the user named one.
+    pub model: Option<Arc<Model>>,
+    /// The signals.
+    pub signals: Vec<Signal>,
+    /// The TPDOs.
+    pub tpdos: Vec<Tpdo>,
+    /// The producer heartbeat time (1017h) in milliseconds: 0 if the node sends no heartbeat, `None` if unknown.
+    pub heartbeat_ms: Option<u16>,
+    /// The CAN-ID of its emergencies (1014h, else 080h + node-ID).
+    pub emergency: CanId,
+    /// The CAN-ID of the SYNC that it receives (1005h, else 080h).
+    pub sync: CanId,
+}
+
+impl Node {
+    /// A node of which only the node-ID is known.
+    pub fn new(id: NodeId) -> Node {
+        Node {
+            id,
+            identity: Identity::default(),
+            model: None,
+            signals: Vec::new(),
+            tpdos: Vec::new(),
+            heartbeat_ms: None,
+            emergency: CanId::emergency(id),
+            sync: CanId::SYNC,
+        }
+    }
+
+    /// The part that decoding needs.
+    pub fn layout(&self) -> Layout<'_> {
+        Layout { node: self.id, model: self.model.as_deref(), signals: &self.signals, tpdos: &self.tpdos }
+    }
+
+    /// The type of a mapped object: see [`Layout::mapped_type`].
+    pub fn mapped_type(&self, object: ObjectId, bits: u8) -> DataType {
+        self.layout().mapped_type(object, bits)
+    }
+
+    /// The signals that the valid TPDOs carry.
+    pub fn mapped_signals(&self) -> impl Iterator<Item = &Signal> {
+        self.signals.iter().filter(|signal| {
+            let mut entries = self.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).flat_map(|tpdo| &tpdo.mapping);
+            entries.any(|entry| signal.is_value(entry.object))
+        })
+    }
+}
