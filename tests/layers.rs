@@ -479,13 +479,14 @@ fn the_map_is_the_plan() {
         [
             "bus: canopen",
             "canopen: ",
-            "cli: bus canopen device master measure output sim tasks",
+            "cli: bus canopen device master measure node output sim tasks",
             "device: canopen",
             "master: bus canopen device",
-            "measure: bus canopen device master",
-            "output: bus canopen device measure tasks",
+            "measure: bus canopen device",
+            "node: bus canopen device master measure",
+            "output: bus canopen device measure node tasks",
             "sim: bus canopen device",
-            "tasks: bus canopen device master measure",
+            "tasks: bus canopen device master measure node",
         ]
     );
 }
