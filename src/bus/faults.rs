@@ -1,6 +1,6 @@
 //! A wrapper around any bus that goes wrong on purpose, for tests.
 
-use super::{Bus, BusError, Event, Fault, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource};
+use super::{BitRateControl, Bus, BusError, Event, Fault, Mono, Received, delegate_bus};
 use crate::canopen::frame::Frame;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
@@ -150,7 +150,7 @@ impl<B: Bus> Faulty<B> {
         received.frame = self.altered(number, received.frame);
         if let Some(&by) = self.plan.delay.get(&number) {
             received.at.mono = received.at.mono + by;
-            received.at.wall = super::Wall::at(received.at.wall.since_epoch() + by);
+            received.at.wall = received.at.wall + by;
         }
         if self.plan.duplicate.contains(&number) {
             self.hold(received);
@@ -159,54 +159,12 @@ impl<B: Bus> Faulty<B> {
     }
 }
 
+impl<B: Bus> BitRateControl for Faulty<B> {
+    delegate_bus!(self, self.bus => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
+}
+
 impl<B: Bus> Bus for Faulty<B> {
-    fn name(&self) -> &str {
-        self.bus.name()
-    }
-
-    fn bit_rate(&self) -> Option<u32> {
-        self.bus.bit_rate()
-    }
-
-    fn timestamps(&self) -> TimestampSource {
-        self.bus.timestamps()
-    }
-
-    fn is_live(&self) -> bool {
-        self.bus.is_live()
-    }
-
-    fn waits(&self) -> bool {
-        self.bus.waits()
-    }
-
-    fn receive_buffer(&self) -> Option<ReceiveBuffer> {
-        self.bus.receive_buffer()
-    }
-
-    fn late_drops(&mut self) -> u32 {
-        self.bus.late_drops()
-    }
-
-    fn can_set_bit_rate(&self) -> Result<(), BusError> {
-        self.bus.can_set_bit_rate()
-    }
-
-    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
-        self.bus.set_bit_rate(bit_rate, mode)
-    }
-
-    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
-        self.bus.put_back_bit_rate()
-    }
-
-    fn now(&self) -> Stamp {
-        self.bus.now()
-    }
-
-    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.bus.listen(filters)
-    }
+    delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let number = self.sends;
@@ -255,10 +213,6 @@ impl<B: Bus> Bus for Faulty<B> {
                 event => return Ok(event),
             }
         }
-    }
-
-    fn finish(&mut self) -> Result<(), BusError> {
-        self.bus.finish()
     }
 }
 

@@ -6,7 +6,10 @@ use std::ffi::c_int;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// The longest sleep: an [`Instant`] cannot hold every sum.
+const A_CENTURY: Duration = Duration::from_secs(100 * 365 * 24 * 3600);
 
 /// The user's wish to stop, as a bus takes it in.
 ///
@@ -41,6 +44,12 @@ impl Interrupts {
             }
             None => false,
         }
+    }
+
+    /// Sleeps for `length`, or returns `true` at once when a signal arrives. Any length is allowed.
+    pub fn wait_for(&mut self, length: Duration) -> bool {
+        let now = Instant::now();
+        self.wait_until(now.checked_add(length).unwrap_or(now + A_CENTURY))
     }
 }
 
@@ -109,7 +118,7 @@ impl Interrupts {
 
     /// Sleeps until `deadline`, or returns `true` soon after a signal arrives.
     pub fn wait_until(&mut self, deadline: Instant) -> bool {
-        const SLICE: std::time::Duration = std::time::Duration::from_millis(20);
+        const SLICE: Duration = Duration::from_millis(20);
         loop {
             if self.take() {
                 return true;
@@ -141,7 +150,6 @@ impl Drop for Interrupts {
 mod tests {
     use super::*;
     use signal_hook::consts::{SIGUSR1, SIGUSR2};
-    use std::time::Duration;
 
     #[test]
     fn each_signal_is_reported_once() -> io::Result<()> {
@@ -168,7 +176,8 @@ mod tests {
             std::thread::sleep(Duration::from_millis(30));
             low_level::raise(SIGUSR2)
         });
-        assert!(interrupts.wait_until(start + Duration::from_secs(60)));
+        // The longest sleep does not overflow either.
+        assert!(interrupts.wait_for(Duration::MAX));
         assert!(start.elapsed() < Duration::from_secs(60));
         assert!(!interrupts.wait_until(Instant::now()));
         assert!(raiser.join().is_ok_and(|raised| raised.is_ok()));

@@ -2,6 +2,7 @@
 //! for it. The only place with sockets, clocks, signals and `unsafe`.
 
 pub mod claim;
+mod delegate;
 pub mod faults;
 pub mod interrupt;
 pub mod memory;
@@ -17,161 +18,125 @@ pub mod trace;
 
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
+pub use delegate::delegate_bus;
 use std::fmt;
 pub use time::{Mono, Stamp, Wall};
 
-/// A CAN bus: frames out, events in, time.
+/// Transport and time of a CAN bus: frames out, events in.
 ///
-/// Nothing here blocks for longer than asked, and no call but [`Bus::receive`] waits.
-pub trait Bus {
-    /// What people call it, and what stands in a trace: `can0`, `sim`.
+/// Only [`Bus::receive`] waits, and never beyond the deadline it is given.
+pub trait Bus: BitRateControl {
+    /// The name shown to people and written to traces: `can0`, `sim`.
     fn name(&self) -> &str;
-
-    /// The bit rate in bit/s, where the bus knows it.
-    fn bit_rate(&self) -> Option<u32>;
 
     /// Where the wall time of received frames comes from.
     fn timestamps(&self) -> TimestampSource;
 
-    /// Whether there is somebody on it now. A recording only receives, and it comes to an end.
+    /// Whether other participants may be on the bus now. `false` for a recording, which only receives and ends.
     fn is_live(&self) -> bool {
         true
     }
 
-    /// Whether it waits for who is slow: time passes only while somebody receives, as in a recording and on a
-    /// virtual clock.
+    /// Whether the bus waits for a slow program. On a recording and on a virtual clock, time passes only inside
+    /// [`Bus::receive`].
     fn waits(&self) -> bool {
         !self.is_live()
     }
 
-    /// The present moment.
+    /// The present moment on both time lines.
     fn now(&self) -> Stamp;
 
-    /// The present moment on the monotonic time line alone: on some machines each clock is a system call.
+    /// The present moment on the monotonic time line only. On some machines each clock is a system call.
     fn mono(&self) -> Mono {
         self.now().mono
     }
 
-    /// Tells which frames are wanted from now on; others may or may not be delivered.
-    /// A bus starts with every frame wanted.
+    /// Sets which frames [`Bus::receive`] returns from now on. A new bus returns all frames. A bus may also return
+    /// frames that do not match.
+    ///
+    /// # Errors
+    /// The operating system rejects the filters.
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError>;
 
-    /// Hands one frame to the bus. [`BusError::QueueFull`] means: not sent, try again shortly.
+    /// Hands one frame to the bus.
+    ///
+    /// # Errors
+    /// [`BusError::QueueFull`]: the frame was not sent; try again after a short time.
     fn send(&mut self, frame: &Frame) -> Result<(), BusError>;
 
-    /// The next thing that happens, at the latest [`Event::Timeout`] once `deadline` is reached.
-    /// With a deadline in the past it returns what is there already, without waiting.
+    /// Waits for the next event. Returns [`Event::Timeout`] when `deadline` is reached. With a deadline in the past
+    /// it returns an event that is already there, without waiting.
+    ///
+    /// # Errors
+    /// The bus failed. The caller may call again.
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError>;
 
-    /// How much is held back of what was received and not yet asked for; `None` where that has no bound, or
-    /// nobody knows it.
+    /// The size of the buffer for frames that were received and not read yet. `None` if it has no limit or the
+    /// limit is unknown.
     fn receive_buffer(&self) -> Option<ReceiveBuffer> {
         None
     }
 
-    /// How many frames the kernel had to drop that no [`Event::Dropped`] has told of: the event comes with the next
-    /// frame, and after these there was none. Each is told once.
+    /// The number of frames that the kernel dropped and that no [`Event::Dropped`] reported. That event comes with
+    /// the next frame, so drops after the last frame show only here. Each frame is counted once.
     fn late_drops(&mut self) -> u32 {
         0
     }
 
-    /// Whether [`Bus::set_bit_rate`] can be expected to work: asked before anything is changed that depends on it.
+    /// Writes buffered output (a trace) to its file. Call it after the last use of the bus, because `drop` cannot
+    /// report errors.
     ///
     /// # Errors
-    /// Why not: no privilege, or no such thing on this bus.
-    fn can_set_bit_rate(&self) -> Result<(), BusError> {
-        Err(BusError::Unsupported(format!("the bit rate of {} cannot be set from here", self.name())))
-    }
-
-    /// Takes this side of the bus to another bit rate in bit/s: the interface goes down and comes up at the new
-    /// one. Frames that wait to be sent, and received ones that nobody has asked for yet, are lost.
-    ///
-    /// # Errors
-    /// What the interface says; where it says no it is left as it was, as far as it can be put back.
-    fn set_bit_rate(&mut self, _bit_rate: u32, _mode: Mode) -> Result<(), BusError> {
-        self.can_set_bit_rate()
-    }
-
-    /// Puts the interface back as it was before the first [`Bus::set_bit_rate`]: bit rate, mode, switched off
-    /// where it was. Nothing where none was set.
-    ///
-    /// # Errors
-    /// What the interface says; it is then as the error tells.
-    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
-        Ok(())
-    }
-
-    /// Writes out what is still buffered (a trace). To be called when the work is done: dropping a
-    /// bus can report nothing.
+    /// The file cannot be written.
     fn finish(&mut self) -> Result<(), BusError> {
         Ok(())
     }
 }
 
-impl<B: Bus + ?Sized> Bus for Box<B> {
-    fn name(&self) -> &str {
-        (**self).name()
-    }
-
+/// The bit rate of the interface behind a [`Bus`]: read it, set it, restore it.
+///
+/// A transport without such control implements the trait with an empty block.
+pub trait BitRateControl {
+    /// The bit rate in bit/s, if it is known.
     fn bit_rate(&self) -> Option<u32> {
-        (**self).bit_rate()
+        None
     }
 
-    fn timestamps(&self) -> TimestampSource {
-        (**self).timestamps()
-    }
-
-    fn is_live(&self) -> bool {
-        (**self).is_live()
-    }
-
-    fn waits(&self) -> bool {
-        (**self).waits()
-    }
-
-    fn now(&self) -> Stamp {
-        (**self).now()
-    }
-
-    fn mono(&self) -> Mono {
-        (**self).mono()
-    }
-
-    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        (**self).listen(filters)
-    }
-
-    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        (**self).send(frame)
-    }
-
-    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
-        (**self).receive(deadline)
-    }
-
-    fn receive_buffer(&self) -> Option<ReceiveBuffer> {
-        (**self).receive_buffer()
-    }
-
-    fn late_drops(&mut self) -> u32 {
-        (**self).late_drops()
-    }
-
+    /// Checks whether [`BitRateControl::set_bit_rate`] can work, before the caller changes anything that depends on
+    /// it.
+    ///
+    /// # Errors
+    /// [`BusError::Permission`]: no privilege. [`BusError::Unsupported`]: this bus has no such function.
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
-        (**self).can_set_bit_rate()
+        Err(BusError::Unsupported("the bit rate of this bus cannot be set from here".to_owned()))
     }
 
-    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
-        (**self).set_bit_rate(bit_rate, mode)
+    /// Sets the interface to another bit rate in bit/s: it goes down and comes up again. Frames that wait to be
+    /// sent and received frames that were not read yet are lost.
+    ///
+    /// # Errors
+    /// The interface rejects the bit rate. It is then restored as far as possible.
+    fn set_bit_rate(&mut self, _bit_rate: u32, _mode: Mode) -> Result<(), BusError> {
+        self.can_set_bit_rate()
     }
 
-    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
-        (**self).put_back_bit_rate()
+    /// Restores bit rate, mode and up/down state from before the first [`BitRateControl::set_bit_rate`]. Does
+    /// nothing if the bit rate was not set.
+    ///
+    /// # Errors
+    /// The interface cannot be restored; the error describes its state.
+    fn restore_bit_rate(&mut self) -> Result<(), BusError> {
+        Ok(())
     }
+}
 
-    fn finish(&mut self) -> Result<(), BusError> {
-        (**self).finish()
-    }
+impl<B: Bus + ?Sized> Bus for Box<B> {
+    delegate_bus!(self, (**self) => name timestamps is_live waits now mono listen send receive receive_buffer
+        late_drops finish);
+}
+
+impl<B: BitRateControl + ?Sized> BitRateControl for Box<B> {
+    delegate_bus!(self, (**self) => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
 }
 
 /// Room for what was received and not yet asked for. A frame takes some 800 bytes of it on Linux.

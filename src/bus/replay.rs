@@ -2,7 +2,7 @@
 //!
 //! Time is that of the log and passes as fast as the program takes it: nothing waits.
 
-use super::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp, TimestampSource, Wall};
+use super::{BitRateControl, Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp, TimestampSource, Wall};
 use crate::canopen::frame::Frame;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -76,8 +76,7 @@ impl Replay {
     }
 
     fn stamp(&self, mono: Mono) -> Stamp {
-        let begin = self.begin.unwrap_or_default().since_epoch();
-        Stamp { mono, wall: Wall::at(begin + mono.since_start()) }
+        Stamp { mono, wall: self.begin.unwrap_or_default() + mono.since_start() }
     }
 
     fn wrong(&self, what: &str) -> BusError {
@@ -167,13 +166,11 @@ fn fault(classes: u32) -> Fault {
     named.iter().find(|(class, _)| classes & class != 0).map_or(Fault::Other, |(_, fault)| *fault)
 }
 
+impl BitRateControl for Replay {}
+
 impl Bus for Replay {
     fn name(&self) -> &str {
         if self.interface.is_empty() { &self.file } else { &self.interface }
-    }
-
-    fn bit_rate(&self) -> Option<u32> {
-        None
     }
 
     fn timestamps(&self) -> TimestampSource {

@@ -1,7 +1,7 @@
 //! A bus for the tests of the wrappers: it delivers what it was told, at the time it was told, on a
 //! clock that jumps.
 
-use super::{Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall};
+use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall};
 use crate::canopen::frame::Frame;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -31,16 +31,14 @@ impl Script {
 }
 
 fn stamp(mono: Mono) -> Stamp {
-    Stamp { mono, wall: Wall::at(OPENED + mono.since_start()) }
+    Stamp { mono, wall: Wall::at(OPENED) + mono.since_start() }
 }
+
+impl BitRateControl for Script {}
 
 impl Bus for Script {
     fn name(&self) -> &str {
         "script"
-    }
-
-    fn bit_rate(&self) -> Option<u32> {
-        None
     }
 
     fn timestamps(&self) -> TimestampSource {

@@ -29,6 +29,7 @@ impl Mono {
     }
 }
 
+/// Saturates at the last moment that the type can hold.
 impl Add<Duration> for Mono {
     type Output = Mono;
 
@@ -37,10 +38,10 @@ impl Add<Duration> for Mono {
     }
 }
 
+/// Saturates at [`Mono::START`].
 impl Sub<Duration> for Mono {
     type Output = Mono;
 
-    /// Never before the opening of the bus.
     fn sub(self, by: Duration) -> Mono {
         Mono(self.0.saturating_sub(by))
     }
@@ -51,6 +52,9 @@ impl Sub<Duration> for Mono {
 pub struct Wall(Duration);
 
 impl Wall {
+    /// The end of the year 9999, the last moment that RFC 3339 can write.
+    pub const LAST: Wall = Wall(Duration::new(253_402_300_799, 999_999_999));
+
     /// The moment `since_epoch` after 1970-01-01 00:00 UTC.
     pub const fn at(since_epoch: Duration) -> Wall {
         Wall(since_epoch)
@@ -66,9 +70,18 @@ impl Wall {
         self.0
     }
 
-    /// The same moment for the standard library.
+    /// The same moment for the standard library; at most [`Wall::LAST`].
     pub fn system_time(self) -> SystemTime {
-        SystemTime::UNIX_EPOCH + self.0
+        SystemTime::UNIX_EPOCH + self.0.min(Wall::LAST.0)
+    }
+}
+
+/// Saturates at the last moment that the type can hold.
+impl Add<Duration> for Wall {
+    type Output = Wall;
+
+    fn add(self, by: Duration) -> Wall {
+        Wall(self.0.saturating_add(by))
     }
 }
 
@@ -98,6 +111,22 @@ pub fn spoken(length: Duration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sums_of_moments_saturate() {
+        let last = Mono::at(Duration::MAX);
+        assert_eq!(last + Duration::from_nanos(1), last);
+        assert_eq!(Mono::at(Duration::from_secs(1)) + Duration::MAX, last);
+        assert_eq!(Mono::at(Duration::from_secs(1)) - Duration::MAX, Mono::START);
+        assert_eq!((Mono::START.since(last), last.since(Mono::START)), (Duration::ZERO, Duration::MAX));
+        assert_eq!(Wall::now() + Duration::MAX, Wall::at(Duration::MAX));
+    }
+
+    #[test]
+    fn a_wall_time_beyond_the_year_9999_is_capped_for_the_standard_library() {
+        assert_eq!(Wall::at(Duration::MAX).system_time(), Wall::LAST.system_time());
+        assert_eq!(humantime::format_rfc3339_millis(Wall::LAST.system_time()).to_string(), "9999-12-31T23:59:59.999Z");
+    }
 
     #[test]
     fn lengths_in_words() {

@@ -1,6 +1,6 @@
 //! A wrapper around any bus that writes every frame sent and received, as `candump -L` does.
 
-use super::{Bus, BusError, Event, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource, Wall};
+use super::{BitRateControl, Bus, BusError, Event, Mono, Received, Stamp, Wall, delegate_bus};
 use crate::canopen::frame::Frame;
 use std::io::{self, BufWriter, Write};
 use std::time::Duration;
@@ -65,57 +65,15 @@ pub fn write_line(out: &mut dyn Write, wall: Wall, bus: &str, frame: &Frame) -> 
     writeln!(out, "({:010}.{:06}) {bus} {frame}", at.as_secs(), at.subsec_micros())
 }
 
+impl<B: Bus> BitRateControl for Traced<B> {
+    delegate_bus!(self, self.bus => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
+}
+
 impl<B: Bus> Bus for Traced<B> {
+    delegate_bus!(self, self.bus => timestamps is_live waits now mono listen receive_buffer late_drops);
+
     fn name(&self) -> &str {
         &self.name
-    }
-
-    fn bit_rate(&self) -> Option<u32> {
-        self.bus.bit_rate()
-    }
-
-    fn timestamps(&self) -> TimestampSource {
-        self.bus.timestamps()
-    }
-
-    fn is_live(&self) -> bool {
-        self.bus.is_live()
-    }
-
-    fn waits(&self) -> bool {
-        self.bus.waits()
-    }
-
-    fn receive_buffer(&self) -> Option<ReceiveBuffer> {
-        self.bus.receive_buffer()
-    }
-
-    fn late_drops(&mut self) -> u32 {
-        self.bus.late_drops()
-    }
-
-    fn can_set_bit_rate(&self) -> Result<(), BusError> {
-        self.bus.can_set_bit_rate()
-    }
-
-    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
-        self.bus.set_bit_rate(bit_rate, mode)
-    }
-
-    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
-        self.bus.put_back_bit_rate()
-    }
-
-    fn now(&self) -> Stamp {
-        self.bus.now()
-    }
-
-    fn mono(&self) -> Mono {
-        self.bus.mono()
-    }
-
-    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.bus.listen(filters)
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {

@@ -97,7 +97,7 @@ pub fn detect(
 ) -> Result<Detection, Failure> {
     bus.can_set_bit_rate().map_err(|error| refused(error, bus.name()))?;
     let result = bus.listen(&Filters::All).map_err(Error::from).and_then(|()| try_all(bus, ask, each, tell));
-    let put_back = bus.put_back_bit_rate();
+    let put_back = bus.restore_bit_rate();
     let result = result.map_err(|error| match error {
         Error::Bus(error) => refused(error, bus.name()),
         error => error.into(),

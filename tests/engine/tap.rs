@@ -1,6 +1,6 @@
 //! The program's own end of the bus: keeps what goes through, and ends what would never end.
 
-use cangauge::bus::{Bus, BusError, Event, Fault, Filters, Mode, Mono, Stamp, TimestampSource};
+use cangauge::bus::{BitRateControl, Bus, BusError, Event, Fault, Mode, Mono};
 use cangauge::canopen::frame::Frame;
 
 /// So often nothing may be waited for without any time passing.
@@ -70,40 +70,22 @@ impl<B: Bus> Tap<B> {
     }
 }
 
-impl<B: Bus> Bus for Tap<B> {
-    fn name(&self) -> &str {
-        self.bus.name()
-    }
-
-    fn bit_rate(&self) -> Option<u32> {
-        self.bus.bit_rate()
-    }
-
-    fn timestamps(&self) -> TimestampSource {
-        self.bus.timestamps()
-    }
-
-    fn can_set_bit_rate(&self) -> Result<(), BusError> {
-        self.bus.can_set_bit_rate()
-    }
+impl<B: Bus> BitRateControl for Tap<B> {
+    cangauge::bus::delegate_bus!(self, self.bus => bit_rate can_set_bit_rate);
 
     fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
         self.live()?;
         self.bus.set_bit_rate(bit_rate, mode)
     }
 
-    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+    fn restore_bit_rate(&mut self) -> Result<(), BusError> {
         self.live()?;
-        self.bus.put_back_bit_rate()
+        self.bus.restore_bit_rate()
     }
+}
 
-    fn now(&self) -> Stamp {
-        self.bus.now()
-    }
-
-    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        self.bus.listen(filters)
-    }
+impl<B: Bus> Bus for Tap<B> {
+    cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         self.is_dead |= self.kill == Some(self.taken);

@@ -1,7 +1,7 @@
 //! Devices and the program at different bit rates: who is heard, what errors come, and the way back.
 
 use cangauge::bus::memory::MemoryBus;
-use cangauge::bus::{Bus, Event, Fault, Mode};
+use cangauge::bus::{BitRateControl, Bus, Event, Fault, Mode};
 use cangauge::sim::{Bench, Device};
 use std::path::Path;
 use std::time::Duration;

@@ -2,7 +2,7 @@
 
 use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::bus::time::Mono;
-use cangauge::bus::{Bus, Event, Mode};
+use cangauge::bus::{BitRateControl, Bus, Event, Mode};
 use cangauge::sim::Bench;
 use cangauge::tasks::detect::{By, Detection, How, RATES, detect};
 use cangauge::tasks::{Failure, Kind};

@@ -318,8 +318,12 @@ impl Shaky {
     }
 }
 
+impl cangauge::bus::BitRateControl for Shaky {
+    cangauge::bus::delegate_bus!(self, self.inner => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
+}
+
 impl Bus for Shaky {
-    crate::as_the_bus_inside!(inner);
+    cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive_buffer finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         if self.up { self.inner.send(frame) } else { Err(BusError::Down(self.name().to_owned())) }

@@ -1,31 +1,5 @@
 //! Commands and recordings under bad conditions, on the virtual clock.
 
-/// What a bus around another one has no other say in than that one, in the field named: all but the frames.
-macro_rules! as_the_bus_inside {
-    ($bus:ident) => {
-        fn name(&self) -> &str {
-            self.$bus.name()
-        }
-
-        fn bit_rate(&self) -> Option<u32> {
-            self.$bus.bit_rate()
-        }
-
-        fn timestamps(&self) -> cangauge::bus::TimestampSource {
-            self.$bus.timestamps()
-        }
-
-        fn now(&self) -> cangauge::bus::Stamp {
-            self.$bus.now()
-        }
-
-        fn listen(&mut self, filters: &cangauge::bus::Filters) -> Result<(), cangauge::bus::BusError> {
-            self.$bus.listen(filters)
-        }
-    };
-}
-use as_the_bus_inside;
-
 mod answers;
 mod assign;
 mod bit_rates;

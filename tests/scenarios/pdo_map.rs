@@ -78,8 +78,12 @@ impl Meddler {
     }
 }
 
+impl cangauge::bus::BitRateControl for Meddler {
+    cangauge::bus::delegate_bus!(self, self.bus => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
+}
+
 impl Bus for Meddler {
-    crate::as_the_bus_inside!(bus);
+    cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let number = self.sent.len();

@@ -89,8 +89,12 @@ impl Unlucky {
     }
 }
 
+impl cangauge::bus::BitRateControl for Unlucky {
+    cangauge::bus::delegate_bus!(self, self.inner => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
+}
+
 impl Bus for Unlucky {
-    crate::as_the_bus_inside!(inner);
+    cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let number = self.sent.len();

@@ -50,8 +50,12 @@ impl Stalled {
     }
 }
 
+impl cangauge::bus::BitRateControl for Stalled {
+    cangauge::bus::delegate_bus!(self, self.inner => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
+}
+
 impl Bus for Stalled {
-    crate::as_the_bus_inside!(inner);
+    cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         if frame.to_string() == "080#" {

@@ -4,7 +4,7 @@
 use crate::program::{cangauge, command, setting, shown, without_the_right};
 use crate::{assert_nothing_more, frame, next, next_frame, run};
 use cangauge::bus::socketcan::SocketCan;
-use cangauge::bus::{Bus, BusError, Mode};
+use cangauge::bus::{BitRateControl, Bus, BusError, Mode};
 use serde_json::{Value, json};
 use std::process::Stdio;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -123,9 +123,9 @@ fn an_open_bus_goes_to_another_rate_and_back() {
     other.send(&frame("184#04")).unwrap();
     assert_eq!(next_frame(&mut bus), "184#04");
 
-    bus.put_back_bit_rate().unwrap();
+    bus.restore_bit_rate().unwrap();
     assert_eq!((setting("can0"), bus.bit_rate()), (before.clone(), Some(125_000)));
-    bus.put_back_bit_rate().unwrap();
+    bus.restore_bit_rate().unwrap();
     other.send(&frame("185#05")).unwrap();
     assert_eq!(next_frame(&mut bus), "185#05");
     assert_eq!(setting("can0"), before);
@@ -167,7 +167,7 @@ fn bits_put_together_by_hand_come_back_as_they_were() {
         let mut bus = SocketCan::open_even_down("can0").unwrap();
         bus.set_bit_rate(1_000_000, Mode::ListenOnly).unwrap();
         assert_eq!(rate_of("can0"), 1_000_000);
-        bus.put_back_bit_rate().unwrap();
+        bus.restore_bit_rate().unwrap();
         assert_eq!(setting("can0"), before);
     }
 }

@@ -3,7 +3,7 @@
 use crate::{Can, ahead, assert_nothing_more, frame, next, next_frame};
 use cangauge::bus::socketcan::{Interface, interfaces};
 use cangauge::bus::trace::Traced;
-use cangauge::bus::{Bus, Event, Fault, Filters, Received, TimestampSource};
+use cangauge::bus::{BitRateControl, Bus, Event, Fault, Filters, Received, TimestampSource};
 use cangauge::canopen::id::CanId;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};

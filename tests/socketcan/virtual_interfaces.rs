@@ -2,7 +2,7 @@
 
 use crate::program::{cangauge, shown, without_the_right};
 use crate::{Can, run};
-use cangauge::bus::{Bus, BusError, Mode};
+use cangauge::bus::{BitRateControl, BusError, Mode};
 use serde_json::json;
 
 #[test]
@@ -66,6 +66,6 @@ fn what_is_no_can_interface_is_not_touched() {
     let mut bus = can.open();
     assert!(matches!(bus.can_set_bit_rate(), Err(BusError::Unsupported(_))));
     assert!(matches!(bus.set_bit_rate(250_000, Mode::Normal), Err(BusError::Unsupported(_))));
-    assert!(bus.put_back_bit_rate().is_ok());
+    assert!(bus.restore_bit_rate().is_ok());
     crate::assert_nothing_more(&mut bus);
 }

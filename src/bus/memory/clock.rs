@@ -27,7 +27,7 @@ pub trait Sleeper: Send {
 /// Ctrl-C and SIGTERM.
 impl Sleeper for Interrupts {
     fn sleep(&mut self, length: Duration) -> bool {
-        if length.is_zero() { self.take() } else { self.wait_until(Instant::now() + length) }
+        if length.is_zero() { self.take() } else { self.wait_for(length) }
     }
 }
 
@@ -73,6 +73,6 @@ impl TimeLine {
             TimeLine::Real { epoch, .. } => *epoch,
             TimeLine::Virtual => VIRTUAL_EPOCH,
         };
-        Wall::at(epoch.since_epoch() + mono.since_start())
+        epoch + mono.since_start()
     }
 }

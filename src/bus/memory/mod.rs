@@ -7,7 +7,7 @@ mod station;
 mod wire;
 
 use super::time::{Mono, Stamp};
-use super::{Bus, BusError, Event, Filters, Mode, TimestampSource};
+use super::{BitRateControl, Bus, BusError, Event, Filters, Mode, TimestampSource};
 use crate::canopen::frame::Frame;
 use crate::canopen::wire_length::{INTERMISSION, bit_time};
 use clock::TimeLine;
@@ -212,32 +212,9 @@ impl MemoryBus {
     }
 }
 
-impl Bus for MemoryBus {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
+impl BitRateControl for MemoryBus {
     fn bit_rate(&self) -> Option<u32> {
         Some(self.bit_rate)
-    }
-
-    fn timestamps(&self) -> TimestampSource {
-        TimestampSource::Simulated
-    }
-
-    fn waits(&self) -> bool {
-        self.time_line.host_now().is_none()
-    }
-
-    fn now(&self) -> Stamp {
-        self.stamp(self.time_line.host_now().unwrap_or(self.now).max(self.now))
-    }
-
-    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        // What was complete before now was received under the old filters.
-        self.catch_up();
-        self.filters = filters.clone();
-        Ok(())
     }
 
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
@@ -264,10 +241,35 @@ impl Bus for MemoryBus {
         Ok(())
     }
 
-    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+    fn restore_bit_rate(&mut self) -> Result<(), BusError> {
         let Some((bit_rate, mode)) = self.before else { return Ok(()) };
         self.set_bit_rate(bit_rate, mode)?;
         self.before = None;
+        Ok(())
+    }
+}
+
+impl Bus for MemoryBus {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        TimestampSource::Simulated
+    }
+
+    fn waits(&self) -> bool {
+        self.time_line.host_now().is_none()
+    }
+
+    fn now(&self) -> Stamp {
+        self.stamp(self.time_line.host_now().unwrap_or(self.now).max(self.now))
+    }
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        // What was complete before now was received under the old filters.
+        self.catch_up();
+        self.filters = filters.clone();
         Ok(())
     }
 

@@ -15,7 +15,10 @@ mod setup;
 mod socket;
 
 use super::interrupt::Interrupts;
-use super::{Bus, BusError, Event, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource, Wall, poll};
+use super::{
+    BitRateControl, Bus, BusError, Event, Filters, Mode, Mono, ReceiveBuffer, Received, Stamp, TimestampSource, Wall,
+    poll,
+};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 use clocks::Clocks;
@@ -313,16 +316,35 @@ impl SocketCan {
     }
 }
 
-impl Bus for SocketCan {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
+impl BitRateControl for SocketCan {
     fn bit_rate(&self) -> Option<u32> {
         if self.bit_rate.get().is_none() {
             self.bit_rate.set(Some(netlink::get(&self.name).ok().and_then(|link| link.bit_rate())));
         }
         self.bit_rate.get().flatten()
+    }
+
+    fn can_set_bit_rate(&self) -> Result<(), BusError> {
+        setup::can_set_bit_rate(&self.name)
+    }
+
+    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
+        let now = setup::link(&self.name)?;
+        self.before.get_or_insert_with(|| now.clone());
+        self.reset(|name, while_down| setup::retime(name, &now, bit_rate, mode, while_down)).map(|_| ())
+    }
+
+    fn restore_bit_rate(&mut self) -> Result<(), BusError> {
+        match self.before.take() {
+            Some(before) => self.reset(|name, while_down| setup::put_back(name, &before, while_down)),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Bus for SocketCan {
+    fn name(&self) -> &str {
+        &self.name
     }
 
     fn timestamps(&self) -> TimestampSource {
@@ -357,23 +379,6 @@ impl Bus for SocketCan {
         let more = lost.wrapping_sub(self.lost);
         self.lost = lost;
         more
-    }
-
-    fn can_set_bit_rate(&self) -> Result<(), BusError> {
-        setup::can_set_bit_rate(&self.name)
-    }
-
-    fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
-        let now = setup::link(&self.name)?;
-        self.before.get_or_insert_with(|| now.clone());
-        self.reset(|name, while_down| setup::retime(name, &now, bit_rate, mode, while_down)).map(|_| ())
-    }
-
-    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
-        match self.before.take() {
-            Some(before) => self.reset(|name, while_down| setup::put_back(name, &before, while_down)),
-            None => Ok(()),
-        }
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {

@@ -1,6 +1,6 @@
 use super::*;
 use crate::bus::time::Mono;
-use crate::bus::{Bus, Event};
+use crate::bus::{BitRateControl, Bus, Event};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use std::time::Duration;

@@ -1,7 +1,7 @@
 //! On a wire that knows bit rates: at another one nothing but errors is heard.
 
 use super::*;
-use crate::bus::{Mono, Received, Stamp, TimestampSource, Wall};
+use crate::bus::{BitRateControl, Mono, Received, Stamp, TimestampSource, Wall};
 use crate::canopen::frame::Frame;
 use std::collections::VecDeque;
 
@@ -59,25 +59,9 @@ impl Wire {
     }
 }
 
-impl Bus for Wire {
-    fn name(&self) -> &str {
-        "can9"
-    }
-
+impl BitRateControl for Wire {
     fn bit_rate(&self) -> Option<u32> {
         Some(self.set.map_or(500_000, |(rate, _)| rate))
-    }
-
-    fn timestamps(&self) -> TimestampSource {
-        TimestampSource::Simulated
-    }
-
-    fn now(&self) -> Stamp {
-        self.stamp()
-    }
-
-    fn listen(&mut self, _: &Filters) -> Result<(), BusError> {
-        Ok(())
     }
 
     fn can_set_bit_rate(&self) -> Result<(), BusError> {
@@ -97,9 +81,27 @@ impl Bus for Wire {
         Ok(())
     }
 
-    fn put_back_bit_rate(&mut self) -> Result<(), BusError> {
+    fn restore_bit_rate(&mut self) -> Result<(), BusError> {
         self.set = None;
         self.log.push("back".into());
+        Ok(())
+    }
+}
+
+impl Bus for Wire {
+    fn name(&self) -> &str {
+        "can9"
+    }
+
+    fn timestamps(&self) -> TimestampSource {
+        TimestampSource::Simulated
+    }
+
+    fn now(&self) -> Stamp {
+        self.stamp()
+    }
+
+    fn listen(&mut self, _: &Filters) -> Result<(), BusError> {
         Ok(())
     }
 

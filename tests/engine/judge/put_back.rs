@@ -1,7 +1,7 @@
 //! Nothing stays switched that was switched on the way.
 
 use super::*;
-use cangauge::bus::Bus;
+use cangauge::bus::BitRateControl;
 use cangauge::bus::memory::BIT_RATE;
 
 /// What was switched on the way is put back.

@@ -2,7 +2,7 @@
 
 use super::{Wanted, all_held, bus, id, run};
 use cangauge::bus::memory::{Outbox, Station};
-use cangauge::bus::{Bus, Mono};
+use cangauge::bus::{BitRateControl, Bus, Mono};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::CanId;
 use cangauge::tasks::Kind;

@@ -1,7 +1,7 @@
 //! Device and host to a new bit rate together, and back.
 
 use super::{Done, Wanted, all_held, bus, run};
-use cangauge::bus::Bus;
+use cangauge::bus::BitRateControl;
 use cangauge::bus::memory::MemoryBus;
 use cangauge::sim::Device;
 use cangauge::tasks::Kind;

@@ -236,8 +236,12 @@ struct Odd {
     stale: Option<Frame>,
 }
 
+impl cangauge::bus::BitRateControl for Odd {
+    cangauge::bus::delegate_bus!(self, self.bus => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
+}
+
 impl Bus for Odd {
-    crate::as_the_bus_inside!(bus);
+    cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         self.bus.send(frame)

@@ -1,7 +1,7 @@
 //! Bit rates: who understands whom, and what those see who do not.
 
 use super::*;
-use crate::bus::{Fault, Mode};
+use crate::bus::{BitRateControl, Fault, Mode};
 
 fn seconds(seconds: u64) -> Mono {
     Mono::at(Duration::from_secs(seconds))
