@@ -13,7 +13,7 @@ use crate::measure::expression::judge::Jury;
 use crate::measure::expression::verdict::Verdict;
 use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
-use crate::output::events::words;
+use crate::output::events::{remark_text, words};
 use crate::output::limits::Limits;
 use crate::output::{junit, verdict};
 use crate::tasks::check::{Plan, Report, all_met, check};
@@ -90,7 +90,7 @@ impl Check {
             result => result?,
         };
         let console = global.console();
-        report.remarks.iter().for_each(|remark| console.note(remark));
+        report.remarks.iter().for_each(|remark| console.note(&remark_text(remark)));
         if let Some(file) = file {
             self.write_junit(file, &report)?;
         }

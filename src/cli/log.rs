@@ -20,7 +20,7 @@ use crate::output::progress::Progress;
 use crate::output::rows::FileFormat;
 use crate::output::summary::{self, Written};
 use crate::tasks::check::{Expecting, all_met};
-use crate::tasks::log::{Mode, Outcome, Plan, log};
+use crate::tasks::log::{Mode, Plan, RecordingReport, log};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
 use files::{Files, Opened};
@@ -211,7 +211,7 @@ impl Log {
         if failures.is_empty() { Ok(()) } else { Err(Several(failures).into()) }
     }
 
-    fn lost(&self, outcome: &Outcome) -> Option<Failure> {
+    fn lost(&self, outcome: &RecordingReport) -> Option<Failure> {
         let names: Vec<String> = outcome.lost.iter().map(|node| node.to_string()).collect();
         let kind = if self.all_lost(outcome) { Kind::NoAnswer } else { Kind::Partial };
         let word = if names.len() == 1 { "node" } else { "nodes" };
@@ -219,14 +219,14 @@ impl Log {
         outcome.lost.first().map(|first| Failure { node: Some(*first), ..Failure::new(kind, message) })
     }
 
-    fn all_lost(&self, outcome: &Outcome) -> bool {
+    fn all_lost(&self, outcome: &RecordingReport) -> bool {
         outcome.statistics.iter().all(|(source, _)| outcome.lost.contains(&source.node))
     }
 }
 
 /// What came of it.
 struct Recorded {
-    outcome: Outcome,
+    outcome: RecordingReport,
     verdicts: Vec<Verdict>,
     written: Written,
 }

@@ -1,12 +1,13 @@
 //! The events of a recording: as text for people, and as CSV.
 
+mod text;
+
 use super::rows::{Dialect, LineWriter, TimeForm, Times, push_number, push_seconds, push_text, push_texts};
-use crate::bus::time::spoken;
-use crate::bus::{Fault, ReceiveBuffer, Stamp};
+use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
-use crate::tasks::log::Note;
 use std::io;
 use std::time::Duration;
+pub use text::{remark_text, words};
 
 /// The columns.
 pub const COLUMNS: [&str; 5] = ["time", "elapsed_s", "node", "event", "text"];
@@ -40,85 +41,6 @@ impl Words {
     pub fn of_all(event: &'static str, weight: Weight, text: String) -> Words {
         Words { event: Some(event), node: None, text, weight }
     }
-}
-
-/// The text of a recording's event.
-pub fn words(note: &Note) -> Words {
-    use Weight::{Detail, Note as Remark, Warning};
-    let of_node = |node: NodeId, event, weight, text| Words { event: Some(event), node: Some(node), text, weight };
-    match note {
-        Note::Remark(text) => Words::of_all("remark", Warning, text.clone()),
-        Note::Emergency(node, emergency, meaning) => {
-            let text = if emergency.code == 0 {
-                "emergency over (0000h)".to_owned()
-            } else {
-                let register = emergency.register.map(|register| format!(", {register}")).unwrap_or_default();
-                format!("emergency {:04X}h, {meaning}{register}", emergency.code)
-            };
-            of_node(*node, "emcy", Warning, format!("node {node}: {text}"))
-        }
-        Note::Share(period, share) => Words {
-            event: None,
-            node: None,
-            text: format!(
-                "SYNC every {} and the answers take about {:.1} % of the bus",
-                spoken(*period),
-                share * 100.0
-            ),
-            weight: Remark,
-        },
-        Note::Restarted(node) => of_node(*node, "reboot", Warning, format!("node {node} restarted")),
-        Note::ReadAgain(node, changes) if changes.is_empty() => {
-            of_node(*node, "read-again", Remark, format!("node {node} was read again: it is set up as before"))
-        }
-        Note::ReadAgain(node, changes) => {
-            let changes = changes.join("; ");
-            let text = format!("node {node} has changed, and is recorded as it is now: {changes}");
-            of_node(*node, "changed", Warning, text)
-        }
-        Note::Unreadable(node, why) => {
-            let text = format!("{why}: what node {node} sends is not recorded until it can be read again");
-            of_node(*node, "unreadable", Warning, text)
-        }
-        Note::HeartbeatLost(node, since) => {
-            let text = format!("node {node}: heartbeat lost, none for {}", spoken(*since));
-            of_node(*node, "heartbeat-lost", Warning, text)
-        }
-        Note::HeartbeatBack(node) => {
-            of_node(*node, "heartbeat-back", Remark, format!("node {node}: heartbeat is back"))
-        }
-        Note::State(node, state) => of_node(*node, "state", Warning, format!("node {node} is {state} now")),
-        Note::Gap(node, length) => of_node(*node, "gap", Detail, format!("node {node}: a gap of {}", spoken(*length))),
-        Note::Silent(node, since) => {
-            of_node(*node, "lost", Warning, format!("node {node}: silent for {}", spoken(*since)))
-        }
-        Note::Back(node) => of_node(*node, "back", Remark, format!("node {node} is back")),
-        Note::WrongLength(node) => {
-            let text = "a TPDO has not the length of its mapping: no row is made of it";
-            of_node(*node, "length", Warning, format!("node {node}: {text}"))
-        }
-        Note::Fault(fault) => {
-            let weight = match fault {
-                Fault::BusOff | Fault::ControllerOverflow => Warning,
-                Fault::Restarted => Remark,
-                _ => Detail,
-            };
-            Words::of_all("fault", weight, fault.to_string())
-        }
-        Note::Buffer(buffer) => Words { event: None, node: None, text: buffer_text(*buffer), weight: Detail },
-        Note::Dropped(count) => Words::of_all("dropped", Warning, format!("the kernel dropped {count} frames")),
-        Note::Link(true) => Words::of_all("link-up", Remark, "the interface is up again".to_owned()),
-        Note::Link(false) => Words::of_all("link-down", Warning, "the interface went down; waiting for it".to_owned()),
-    }
-}
-
-fn buffer_text(buffer: ReceiveBuffer) -> String {
-    let ReceiveBuffer { bytes, wanted } = buffer;
-    if buffer.is_small() {
-        let more = format!("sudo sysctl net.core.rmem_max={}", wanted / 2);
-        return format!("the receive buffer has {bytes} bytes; the kernel allows no more until: {more}");
-    }
-    format!("the receive buffer has {bytes} bytes")
 }
 
 /// Writes events as CSV.

@@ -1,11 +1,12 @@
 //! The summary at the end of a recording: lines for people, one JSON object for programs.
 
+use super::events::remark_text;
 use super::text::{grouped, significant};
 use crate::bus::time::spoken;
 use crate::measure::histogram::Histogram;
 use crate::measure::sample::Source;
 use crate::measure::statistics::{Jitter, Statistics};
-use crate::tasks::log::{Outcome, Syncs};
+use crate::tasks::log::{RecordingReport, SyncStatistics};
 use serde::Serialize;
 use std::io::{self, Write};
 use std::time::Duration;
@@ -24,7 +25,7 @@ pub struct Written {
 }
 
 /// The summary in lines.
-pub fn lines(outcome: &Outcome, written: Written) -> Vec<String> {
+pub fn lines(outcome: &RecordingReport, written: Written) -> Vec<String> {
     let mut head = format!(
         "{} rows in {}, {} timestamps, {} frames dropped, {} gaps",
         grouped(written.rows),
@@ -67,11 +68,11 @@ pub fn lines(outcome: &Outcome, written: Written) -> Vec<String> {
             grouped(written.left_out)
         ));
     }
-    lines.extend(outcome.remarks.iter().cloned());
+    lines.extend(outcome.remarks.iter().map(remark_text));
     lines
 }
 
-fn syncs(syncs: &Syncs) -> Option<String> {
+fn syncs(syncs: &SyncStatistics) -> Option<String> {
     let delays = &syncs.delays;
     let quantile = |share| delays.quantile(share).map(spoken);
     let (p50, p99) = (quantile(0.5)?, quantile(0.99)?);
@@ -127,7 +128,7 @@ impl Spread {
 }
 
 /// The summary as one JSON object.
-pub fn json(out: &mut dyn Write, outcome: &Outcome, written: Written) -> io::Result<()> {
+pub fn json(out: &mut dyn Write, outcome: &RecordingReport, written: Written) -> io::Result<()> {
     #[derive(Serialize)]
     struct Signal<'a> {
         node: u8,
@@ -170,7 +171,7 @@ pub fn json(out: &mut dyn Write, outcome: &Outcome, written: Written) -> io::Res
         bus_offs: u64,
         receive_buffer_bytes: Option<usize>,
         lost_nodes: Vec<u8>,
-        remarks: &'a [String],
+        remarks: Vec<String>,
         signals: Vec<Signal<'a>>,
     }
     let signals = outcome.statistics.iter().map(|(source, statistics)| Signal {
@@ -219,7 +220,7 @@ pub fn json(out: &mut dyn Write, outcome: &Outcome, written: Written) -> io::Res
         bus_offs: events.bus_offs,
         receive_buffer_bytes: outcome.receive_buffer.map(|buffer| buffer.bytes),
         lost_nodes: outcome.lost.iter().map(|node| node.get()).collect(),
-        remarks: &outcome.remarks,
+        remarks: outcome.remarks.iter().map(remark_text).collect(),
         signals: signals.collect(),
     };
     super::json::line(out, &summary)

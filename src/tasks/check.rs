@@ -10,7 +10,7 @@ use crate::measure::expression::verdict::{Ruling, Silence, Verdict};
 use crate::measure::sample::{Sample, Source};
 use crate::node::Node;
 use crate::node::Overrides;
-use crate::tasks::log::{self, Mode, Note, Observer, Outcome, log};
+use crate::tasks::log::{self, Mode, Note, Observer, RecordingReport, Remark, log};
 use crate::tasks::read::{Target, requests, sample, surveyed, targets};
 use crate::tasks::{Failure, Kind};
 use std::collections::BTreeSet;
@@ -44,7 +44,7 @@ pub struct Report {
     /// Why values did not come.
     pub failures: Vec<Failure>,
     /// What else there is to say.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<Remark>,
 }
 
 impl Report {
@@ -228,7 +228,7 @@ impl<'a> Expecting<'a> {
     ///
     /// # Errors
     /// An expression that turned out not to fit the devices.
-    pub fn verdicts(mut self, outcome: &Outcome) -> Result<Vec<Verdict>, Failure> {
+    pub fn verdicts(mut self, outcome: &RecordingReport) -> Result<Vec<Verdict>, Failure> {
         if let Some(failure) = self.failure {
             return Err(failure);
         }

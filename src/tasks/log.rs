@@ -1,18 +1,19 @@
-//! Records measurements: TPDOs as they are sent, on SYNC, or values polled by SDO.
+//! Records measurements: TPDOs as the nodes send them, TPDOs on SYNC, or values polled by SDO.
 //!
-//! What is recorded goes to an [`Observer`]; nothing is printed or written here. What the recording
-//! switched on the way is put back at its end, on every way out.
+//! Samples and events go to an [`Observer`]; nothing is printed or written here. At its end, also after a failure, the
+//! recording returns the nodes that it started to their previous NMT states.
 
 mod changes;
 mod checks;
 mod events;
-mod hearts;
+mod heartbeats;
+mod interval;
 mod passive;
 mod poll;
 mod producer;
 mod recording;
-mod renewal;
-mod rhythm;
+mod remark;
+mod rereads;
 mod silence;
 mod states;
 
@@ -29,178 +30,180 @@ use crate::node::Node;
 use crate::node::Overrides;
 use crate::node::survey::survey_nodes;
 use crate::tasks::Failure;
+pub use changes::{Change, TpdoChange};
 use checks::{check_wanted, refuse_second_sync, sync_share};
-pub use events::Events;
-use passive::Learner;
+pub use events::EventCounts;
+use passive::SetupListener;
 use poll::Poll;
-pub use producer::Syncs;
+pub use producer::SyncStatistics;
 use recording::Recording;
+pub use remark::{Remark, SilenceReason};
+pub use silence::text as silence_text;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// What is to be recorded, and how.
+/// What to record, and how.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Of which nodes.
+    /// The nodes.
     pub nodes: Vec<NodeId>,
-    /// Which signals; none means all.
+    /// The signals; none means all.
     pub wanted: Vec<Wanted>,
-    /// How the values come.
+    /// Where the values come from.
     pub mode: Mode,
-    /// For how long.
+    /// End after this time.
     pub duration: Option<Duration>,
-    /// At most this many rows.
+    /// End after this many values.
     pub count: Option<u64>,
-    /// Whether NMT may be used.
+    /// Whether nodes may be started.
     pub nmt: bool,
-    /// The longest interval that is no gap; three usual ones where nothing is said.
+    /// Longer intervals are gaps; `None` for three usual intervals.
     pub max_gap: Option<Duration>,
-    /// Descriptions named by the user.
+    /// Descriptions chosen by the user.
     pub overrides: Overrides,
 }
 
-/// How the values come.
+/// Where the values come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// As the devices send them.
+    /// TPDOs as the nodes send them.
     AsSent,
-    /// With SYNC produced here, at this interval.
+    /// TPDOs on SYNC, which the program sends at this interval.
     Sync(Duration),
-    /// Read by SDO, at this interval.
+    /// SDO reads at this interval.
     Poll(Duration),
-    /// Sending nothing at all.
+    /// TPDOs as the nodes send them. The program sends nothing.
     Passive,
 }
 
-/// What happens on the way.
+/// An event during a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Note {
-    /// Something to say that concerns no node.
-    Remark(String),
-    /// A node sent an emergency message, which means this.
+    /// Something to know about the recording.
+    Remark(Remark),
+    /// A node sent an emergency message with this meaning.
     Emergency(NodeId, Emergency, String),
-    /// SYNC at this interval and what comes in answer take this share of the bus.
+    /// SYNC at this interval and the TPDOs that follow it take this share of the bus (0 to 1).
     Share(Duration, f64),
     /// A node restarted.
     Restarted(NodeId),
-    /// A node was read again, and this has changed; nothing where it is set up as before. From here on its
-    /// measurements are read by what it is now.
-    ReadAgain(NodeId, Vec<String>),
-    /// A node should be read again and could not; it is tried on. What it sends meanwhile is not recorded.
-    Unreadable(NodeId, String),
-    /// The heartbeat of a node has stopped for so long.
+    /// The setup of a node was read again, and has these changes. From now on its frames are decoded with them.
+    ReadAgain(NodeId, Vec<Change>),
+    /// The setup of a node could not be read again. The program tries further; until then the node's frames make no rows.
+    Unreadable(NodeId, Box<Failure>),
+    /// The heartbeat of a node stopped this long ago.
     HeartbeatLost(NodeId, Duration),
     /// The heartbeat of a node is back.
     HeartbeatBack(NodeId),
-    /// The heartbeat of a node tells that it is not operational any more.
+    /// By its heartbeat, a node is no longer operational.
     State(NodeId, NmtState),
-    /// Something of the node came after an interval longer than [`Plan::max_gap`].
+    /// A TPDO or polled value of the node came after this interval, longer than [`Plan::max_gap`].
     Gap(NodeId, Duration),
-    /// Nothing has come from the node for a while.
+    /// The node has sent no samples for this time.
     Silent(NodeId, Duration),
-    /// The node is back.
+    /// The node sends samples again.
     Back(NodeId),
-    /// A TPDO has not the length of its mapping.
+    /// A TPDO of the node has another length than its mapping.
     WrongLength(NodeId),
-    /// The controller reports trouble.
+    /// The controller reports a fault.
     Fault(Fault),
-    /// The kernel holds back so much of what is received.
+    /// The receive buffer of the kernel.
     Buffer(ReceiveBuffer),
-    /// The kernel dropped frames.
+    /// The kernel dropped this many frames.
     Dropped(u32),
-    /// The interface went down or came back.
+    /// The interface went down (`false`) or came back.
     Link(bool),
 }
 
-/// Takes what is recorded. Breaking ends the recording; the reason is the observer's own.
+/// Takes samples and events. `Break` ends the recording.
 pub trait Observer {
-    /// These nodes will be recorded; nothing has been switched yet. Who only listens knows of none.
+    /// The nodes to be recorded, before anything is changed. A passive recording does not call it.
     ///
     /// # Errors
-    /// Why nothing is to be recorded.
+    /// The recording must not start.
     fn begin(&mut self, _instruments: &[Node]) -> Result<(), Failure> {
         Ok(())
     }
 
-    /// What will be recorded, in the order of the sources' numbers; more may come later. Nothing has been
-    /// switched yet. Who only listens is not told.
+    /// The sources to be recorded, in the order of their numbers, before anything is changed. More may follow later. A
+    /// passive recording does not call it.
     ///
     /// # Errors
-    /// Why nothing is to be recorded.
+    /// The recording must not start.
     fn sources(&mut self, _sources: &[Source]) -> Result<(), Failure> {
         Ok(())
     }
 
-    /// The cycle `number` of SYNC or polling begins at `at`. Numbers may be left out.
+    /// A cycle of SYNC or polling starts. Numbers may be skipped.
     fn cycle(&mut self, _number: u64, _at: Stamp) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
-    /// Samples of requests that were begun in this cycle; it need not be the last one.
+    /// Samples that were requested in this cycle, which need not be the last one.
     fn polled(&mut self, _cycle: u64, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
         self.samples(samples, sources)
     }
 
-    /// Samples that came together, in the order of their bytes; at most as many as may be counted.
+    /// Samples that were received together, in the order of the mapping.
     fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()>;
 
-    /// Something happened.
+    /// An event.
     fn note(&mut self, note: &Note, at: Stamp);
 
-    /// How things stand with what is expected of the measurements, as often as time passes.
+    /// The present state of the checks, before each tick.
     fn standing(&mut self, _jury: &Jury, _at: Stamp) {}
 
-    /// Time passes: called at least ten times a second while nothing comes.
+    /// Time passes: called ten times a second.
     fn tick(&mut self, at: Stamp, rows: u64) -> ControlFlow<()>;
 }
 
-/// How a recording ended.
+/// The result of a recording.
 #[derive(Clone, Debug)]
-pub struct Outcome {
-    /// Rows recorded.
+pub struct RecordingReport {
+    /// Values recorded.
     pub rows: u64,
-    /// From the first row to the end.
+    /// Time between the first value and the end.
     pub length: Duration,
-    /// What each source gave.
+    /// The statistics of each source.
     pub statistics: Vec<(Source, Statistics)>,
-    /// Nodes that gave nothing, or nothing any more, at the end.
+    /// Nodes that sent no samples, or stopped before the end.
     pub lost: Vec<NodeId>,
-    /// Why nothing came, if nothing came.
+    /// Why there is not one value.
     pub nothing: Option<Failure>,
-    /// Frames that the kernel had to drop.
+    /// Frames dropped by the kernel.
     pub dropped: u64,
     /// Emergency messages.
     pub emergencies: u64,
     /// Intervals longer than [`Plan::max_gap`].
     pub gaps: u64,
-    /// Polls that could not be sent because the one before was not finished.
+    /// Polls that were not sent because the previous one was not finished.
     pub skipped: u64,
-    /// What else happened.
-    pub events: Events,
+    /// Other events.
+    pub events: EventCounts,
     /// SYNC messages sent.
-    pub syncs: Syncs,
-    /// How much of what was received the kernel could hold back, where that is known.
+    pub syncs: SyncStatistics,
+    /// The receive buffer of the kernel, if it is known.
     pub receive_buffer: Option<ReceiveBuffer>,
-    /// Where the time stamps come from.
+    /// The source of the time stamps.
     pub timestamps: TimestampSource,
-    /// What was switched and not put back, in words.
-    pub remarks: Vec<String>,
+    /// What else to know.
+    pub remarks: Vec<Remark>,
     /// Whether the user ended it.
     pub interrupted: bool,
 }
 
-/// When nothing comes for this long after the start, it is said why.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Without a sample, the recording ends after this time and reports why.
+const FIRST_SAMPLE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// How often time is told to the observer when nothing comes.
+/// The interval of [`Observer::tick`].
 const TICK: Duration = Duration::from_millis(100);
 
 /// Records.
 ///
 /// # Errors
-/// What stops it before the first row; from then on every end is an [`Outcome`].
-pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
+/// What stops it before the first value. Later every end is an [`RecordingReport`].
+pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) -> Result<RecordingReport, Failure> {
     if plan.mode == Mode::Passive {
         return record_passively(master, plan, observer);
     }
@@ -218,13 +221,13 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
             recording.instruments.iter().for_each(|instrument| recording.decoder.add(instrument.layout(), &plan.wanted))
         }
     }
-    recording.expect_sources();
-    recording.excuse(plan);
+    recording.update_sources();
+    recording.excuse_nodes_without_signals();
     observer.sources(recording.decoder.sources())?;
-    // Between the reading and the recording, too, nodes restart.
-    let mut restarted = BTreeSet::new();
-    recording.tell_contested(master.bus().now(), observer);
+    recording.report_shared_cob_ids(master.bus().now(), observer);
     master.listen(&recording.filters())?;
+    // Nodes may restart between their survey and the recording.
+    let mut restarted = BTreeSet::new();
     if let Mode::Sync(period) = plan.mode {
         refuse_second_sync(master, &recording.instruments, period, &mut restarted)?;
         if let Some(share) = sync_share(master, &recording.instruments, period) {
@@ -234,39 +237,44 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     let started = recording.states.start(master, &recording.instruments, plan, &mut restarted);
     let result = started.and_then(|()| {
         master.ride_out(true);
-        recording.doubt_restarted(&restarted, master, observer);
-        recording.run(master, plan, observer)
+        recording.restarted_before_start(&restarted, master, observer);
+        recording.run(master, observer)
     });
     master.ride_out(false);
     let restored = recording.states.restore(master);
-    recording.remarks.extend(recording.states.remarks());
+    recording.remarks.extend(recording.states.remark());
+    if let Err(error) = restored {
+        recording.remarks.push(Remark::StatesNotRestored(Box::new(error.into())));
+    }
+    finish(recording, result)
+}
+
+fn record_passively(
+    master: &mut Master<'_>,
+    plan: &Plan,
+    observer: &mut dyn Observer,
+) -> Result<RecordingReport, Failure> {
+    let mut recording = Recording::new(Vec::new(), plan, master.bus());
+    let mut listener = SetupListener::new(&plan.nodes, &plan.overrides, &plan.wanted);
+    listener.apply_overrides(&mut recording.decoder);
+    recording.listener = Some(listener);
+    recording.update_sources();
+    master.listen(&Filters::All)?;
+    let result = recording.run(master, observer);
+    finish(recording, result)
+}
+
+/// With at least one value, Ctrl-C is an end and not a failure.
+fn finish(mut recording: Recording<'_>, result: Result<(), Error>) -> Result<RecordingReport, Failure> {
     match result {
         Ok(()) => {}
-        Err(Error::Interrupted) if recording.rows > 0 => recording.interrupted = true,
+        Err(Error::Interrupted) if recording.rows() > 0 => recording.set_interrupted(),
         Err(error) => return Err(error.into()),
     }
-    if let Err(error) = restored {
-        recording.remarks.push(format!("the nodes' states were not put back: {error}"));
-    }
-    Ok(recording.outcome(plan))
+    Ok(recording.report())
 }
 
-fn record_passively(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
-    let mut recording = Recording::new(Vec::new(), plan, master.bus());
-    let mut learner = Learner::new(&plan.nodes, &plan.overrides, &plan.wanted);
-    learner.begin(&mut recording.decoder);
-    recording.learner = Some(learner);
-    recording.expect_sources();
-    master.listen(&Filters::All)?;
-    match recording.run(master, plan, observer) {
-        Ok(()) => {}
-        Err(Error::Interrupted) if recording.rows > 0 => recording.interrupted = true,
-        Err(error) => return Err(error.into()),
-    }
-    Ok(recording.outcome(plan))
-}
-
-/// `period` times `n`, to the nanosecond, for as many as there may be.
+/// `period` times `n`, to the nanosecond. Saturates.
 fn nth(period: Duration, n: u64) -> Duration {
     let nanoseconds = period.as_nanos().saturating_mul(u128::from(n));
     Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))

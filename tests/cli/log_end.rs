@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 #[test]
 fn mh4_is_silent_without_sync() {
     let bench = Bench::of("mh4@1");
-    let silent = "cangauge: node 1: no measurements within 5 s: TPDO1 waits for SYNC and nobody sends it\n\
+    let silent = "cangauge: node 1: no measurements within 5 s: TPDO1 waits for SYNC, and no node sends SYNC\n\
                   hint: add --sync 100ms, or read by SDO: --poll 100ms (node 1)\n";
     let done = bench.run("log 1 -o run.csv").exit(3);
     assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("", silent));
@@ -42,7 +42,7 @@ fn a_state_that_was_known_is_put_back() {
 fn a_state_that_nothing_told_is_not_guessed() {
     let done = Bench::of("mh4@5,mh4@6").run("log 5 --sync 10ms --count 10").exit(0);
     assert_eq!(done.frames_of("000"), ["0105"], "named nodes only");
-    let said = "node 5 was started; its state before is not known, so it stays operational\n";
+    let said = "node 5 was started; its previous state is unknown, so it stays operational\n";
     assert!(done.stderr.ends_with(said), "{}", done.stderr);
 }
 
@@ -70,7 +70,7 @@ fn a_node_that_gives_nothing_among_others() {
     let done = Bench::of("mh4@1,dps@127").run("log 1,127 --duration 2s").exit(7);
     assert!(done.stdout.lines().skip(1).all(|line| line.contains(",127,pressure,")), "{}", done.stdout);
     assert!(
-        done.stderr.contains("node 1: no measurements: TPDO1 waits for SYNC and nobody sends it"),
+        done.stderr.contains("node 1: no measurements: TPDO1 waits for SYNC, and no node sends SYNC"),
         "{}",
         done.stderr
     );
@@ -169,11 +169,7 @@ fn an_overload_is_told_as_it_comes() {
     let told = "warning: node 5: emergency F001h, user input overload";
     assert!(done.stderr.lines().any(|line| line.starts_with(told)), "{}", done.stderr);
     // (1 SYNC of at most 50 bits and 1 TPDO of at most 135) in 10 ms, of 250 kbit/s.
-    assert!(
-        done.stderr.starts_with("SYNC every 10 ms and the answers take about 7.4 % of the bus\n"),
-        "{}",
-        done.stderr
-    );
+    assert!(done.stderr.starts_with("SYNC every 10 ms with its TPDOs takes 7.4 % of the bus\n"), "{}", done.stderr);
     assert!(done.stderr.contains("node 5: emergency over (0000h)"), "{}", done.stderr);
     assert!(done.stderr.contains("  10 invalid"), "{}", done.stderr);
 }

@@ -11,9 +11,10 @@ use cangauge::canopen::nmt::NmtState;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::DownloadSize;
 use cangauge::device::catalog;
+use cangauge::device::unit::Unit;
 use cangauge::master::{Master, Request, Timing};
 use cangauge::sim::Bench;
-use cangauge::tasks::log::{Mode, Note, Outcome, Plan, log};
+use cangauge::tasks::log::{Change, Mode, Note, Plan, RecordingReport, Remark, TpdoChange, log};
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
 use std::path::Path;
@@ -62,7 +63,7 @@ impl Station for Other {
 /// What a recording gave, beside what the simulator says that it sent.
 struct Run {
     kept: Kept,
-    outcome: Outcome,
+    outcome: RecordingReport,
     /// The simulator's own lines from the first row to the last.
     sent: Vec<String>,
     /// The NMT commands on the bus, ours among them.
@@ -84,8 +85,8 @@ impl Run {
         self.kept.notes.contains(note)
     }
 
-    /// What has changed, by the notes.
-    fn changes(&self) -> Vec<&[String]> {
+    /// The reported changes of the node.
+    fn changes(&self) -> Vec<&[Change]> {
         let changes = self.kept.notes.iter().filter_map(|note| match note {
             Note::ReadAgain(_, changes) => Some(changes.as_slice()),
             _ => None,
@@ -179,7 +180,7 @@ fn a_node_that_restarts_is_started_again_and_nothing_else_changes() {
     let run = record(DPS, Mode::AsSent, &[(2000, "000#8105")], &nothing);
     assert_eq!(run.missing(), 0);
     assert!(run.has(&Note::Restarted(node(5))));
-    assert_eq!(run.changes(), [[""; 0]], "set up as before");
+    assert_eq!(run.changes(), [[] as [Change; 0]], "the setup is unchanged");
     assert_eq!(run.commands, ["000#0105", "000#8105", "000#0105"]);
     assert_eq!((run.outcome.events.restarts, run.outcome.events.changes), (1, 0));
     let after = run.kept.rows.iter().filter(|row| row.split(',').next().is_some_and(|time| time > "2500000")).count();
@@ -204,8 +205,8 @@ fn what_was_not_stored_is_gone_after_a_restart_and_no_row_is_read_by_it() {
             assert!((0.5..2.0).contains(&(value / first / factor)), "{row} after {}", run.kept.rows[0]);
         }
         assert_eq!(run.outcome.events.changes, 1);
-        let said = run.changes().concat().join("; ");
-        assert!(said.contains("pressure is in psi and not in bar"), "{said}");
+        let unit = Change::Unit("pressure".to_owned(), Some(Unit(0x004e_0000)), Some(Unit(0x00ab_0000)));
+        assert_eq!(run.changes(), [[unit]]);
         // Each unit has its own statistics.
         let units: Vec<_> = run.outcome.statistics.iter().map(|(source, _)| source.unit.to_string()).collect();
         assert_eq!(units, ["bar", "psi"]);
@@ -235,8 +236,9 @@ fn a_mapping_that_somebody_else_changes() {
     let missing = run.missing();
     assert!(missing > 0 && missing as u64 == run.outcome.events.not_recorded, "{missing}: {:?}", run.outcome.events);
     assert!(run.outcome.events.changes == 1 && run.outcome.events.wrong_lengths == 0, "{:?}", run.outcome.events);
-    let said = run.changes().concat().join("; ");
-    assert!(said.contains("TPDO1 carries 0x6150:1, pressure"), "{said}");
+    let mapping = TpdoChange::Mapping(vec!["0x6150:1".to_owned(), "pressure".to_owned()]);
+    let [[Change::Tpdo(_, parts)]] = run.changes()[..] else { panic!("{:?}", run.changes()) };
+    assert!(parts.contains(&mapping), "{parts:?}");
     let last = run.kept.rows.last().expect("rows");
     assert!(last.contains(",pressure,") && last.contains(",ok,"), "{last}");
     let time: u64 = last.split(',').next().and_then(|time| time.parse().ok()).expect("a time");
@@ -257,7 +259,7 @@ fn a_mapping_that_was_changed_behind_the_back_shows_in_its_length() {
     // A frame of the node that is shorter than its mapping: it is read again, once, and nothing has changed.
     let others = [(2000, "185#01"), (2200, "185#01"), (2400, "185#01")];
     let run = record(MH4, SYNC, &others, &nothing);
-    assert_eq!(run.changes(), [[""; 0]], "read once");
+    assert_eq!(run.changes(), [[] as [Change; 0]], "read once");
     let events = &run.outcome.events;
     assert_eq!((events.wrong_lengths, run.missing()), (3, 0), "{events:?}");
 }
@@ -360,7 +362,7 @@ impl Bus for Shaky {
 }
 
 /// Records with something that happens to the interface, and a restart of the node at 2.2 s whose boot-up nobody hears.
-fn shaken(events: &[(u64, Event)]) -> (Kept, Outcome) {
+fn shaken(events: &[(u64, Event)]) -> (Kept, RecordingReport) {
     let text = format!("clock = \"virtual\"\n{DPS}");
     let mut inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
     inner.attach(Other::new(&[(2200, "000#8105")]));
@@ -458,7 +460,7 @@ fn a_restart_among_frames_that_were_lost() {
     assert!(psi > 15, "started again, and read by what it is now: {units:?}");
     let read = kept.notes.iter().filter(|note| matches!(note, Note::ReadAgain(..)));
     assert_eq!(read.count(), 1, "once a minute is enough: {:?}", kept.notes);
-    let doubt = "node 5 changed while frames were lost: its rows of the ";
-    assert!(outcome.remarks.iter().any(|remark| remark.starts_with(doubt)), "{:?}", outcome.remarks);
-    assert!(!outcome.remarks.iter().any(|remark| remark.contains("read again")), "{:?}", outcome.remarks);
+    let has = |wanted: fn(&Remark) -> bool| outcome.remarks.iter().any(wanted);
+    assert!(has(|remark| matches!(remark, Remark::ChangedWhileFramesLost(..))), "{:?}", outcome.remarks);
+    assert!(!has(|remark| matches!(remark, Remark::NotReadAgain(_))), "{:?}", outcome.remarks);
 }

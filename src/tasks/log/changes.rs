@@ -1,85 +1,102 @@
-//! What has changed of an instrument, in words.
+//! What has changed in the setup of a node.
 
+use crate::canopen::id::CanId;
+use crate::canopen::pdo::{TpdoNumber, Transmission};
+use crate::device::unit::Unit;
 use crate::measure::layout::{Signal, Tpdo};
 use crate::node::Node;
 
-/// What is different now, as far as measurements go; empty where nothing is.
-pub(super) fn changes(before: &Node, now: &Node) -> Vec<String> {
+/// A change of a node's setup that concerns its measurements.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// Another device has this node-ID. Before and after: 1018h:4.
+    Device(Option<u32>, Option<u32>),
+    /// The node no longer has this TPDO.
+    TpdoRemoved(TpdoNumber),
+    /// Bit 31 of the COB-ID was set.
+    TpdoDisabled(TpdoNumber),
+    /// Parameters of a TPDO.
+    Tpdo(TpdoNumber, Vec<TpdoChange>),
+    /// The unit of a signal (6131h), before and after.
+    Unit(String, Option<Unit>, Option<Unit>),
+    /// The decimal digits of a signal (6132h), before and after.
+    Digits(String, Option<u8>, Option<u8>),
+    /// The data type of a signal.
+    Type(String),
+}
+
+/// A changed parameter of a TPDO, with its new value.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum TpdoChange {
+    /// Signals and objects that are mapped.
+    Mapping(Vec<String>),
+    /// The CAN identifier.
+    CanId(CanId),
+    /// The transmission type.
+    Transmission(Transmission),
+    /// The event timer in ms.
+    EventTimer(u16),
+    /// Other bits of the COB-ID.
+    CobIdFlags,
+}
+
+/// The differences between two surveys of a node; empty if there are none.
+pub(super) fn changes(before: &Node, now: &Node) -> Vec<Change> {
     let mut changes = Vec::new();
     let (old, new) = (&before.identity, &now.identity);
     if (old.vendor, old.product, old.serial) != (new.vendor, new.product, new.serial) {
-        let serial = |serial: Option<u32>| serial.map_or_else(|| "none".to_owned(), |serial| serial.to_string());
-        let (was, is) = (serial(old.serial), serial(new.serial));
-        changes.push(if was == is {
-            "it is another device".to_owned()
-        } else {
-            format!("it is another device, serial {is} and not {was}")
-        });
+        changes.push(Change::Device(old.serial, new.serial));
     }
     for tpdo in &now.tpdos {
-        let was = before.tpdos.iter().find(|other| other.number == tpdo.number);
-        if was != Some(tpdo) {
-            changes.push(tpdo_now(tpdo, was, now));
+        let old = before.tpdos.iter().find(|other| other.number == tpdo.number);
+        if old != Some(tpdo) {
+            changes.push(tpdo_change(tpdo, old, now));
         }
     }
-    for gone in before.tpdos.iter().filter(|was| now.tpdos.iter().all(|tpdo| tpdo.number != was.number)) {
-        changes.push(format!("it has no {}", gone.number));
-    }
+    let is_gone = |old: &&Tpdo| now.tpdos.iter().all(|tpdo| tpdo.number != old.number);
+    changes.extend(before.tpdos.iter().filter(is_gone).map(|old| Change::TpdoRemoved(old.number)));
     for signal in &now.signals {
-        if let Some(was) = before.signals.iter().find(|other| other.name == signal.name) {
-            changes.extend(signal_now(signal, was));
+        if let Some(old) = before.signals.iter().find(|other| other.name == signal.name) {
+            changes.extend(signal_change(signal, old));
         }
     }
     changes
 }
 
-fn tpdo_now(tpdo: &Tpdo, was: Option<&Tpdo>, now: &Node) -> String {
-    let number = tpdo.number;
+fn tpdo_change(tpdo: &Tpdo, old: Option<&Tpdo>, now: &Node) -> Change {
     if !tpdo.cob_id.is_valid() {
-        return format!("{number} is switched off");
+        return Change::TpdoDisabled(tpdo.number);
     }
     let mut parts = Vec::new();
-    if was.is_none_or(|was| was.mapping != tpdo.mapping || !was.cob_id.is_valid()) {
-        let named = tpdo.mapping.iter().map(|entry| {
+    if old.is_none_or(|old| old.mapping != tpdo.mapping || !old.cob_id.is_valid()) {
+        let names = tpdo.mapping.iter().map(|entry| {
             let signal = now.signals.iter().find(|signal| signal.is_value(entry.object));
             signal.map_or_else(|| entry.object.to_string(), |signal| signal.name.clone())
         });
-        let named: Vec<String> = named.collect();
-        parts.push(if named.is_empty() {
-            "carries nothing".to_owned()
-        } else {
-            format!("carries {}", named.join(", "))
-        });
+        parts.push(TpdoChange::Mapping(names.collect()));
     }
-    if was.is_none_or(|was| was.cob_id.can_id() != tpdo.cob_id.can_id()) {
-        parts.push(format!("comes as {}", tpdo.cob_id.can_id()));
+    if old.is_none_or(|old| old.cob_id.can_id() != tpdo.cob_id.can_id()) {
+        parts.push(TpdoChange::CanId(tpdo.cob_id.can_id()));
     }
-    match tpdo.transmission {
-        Some(transmission) if was.is_none_or(|was| was.transmission != tpdo.transmission) => {
-            parts.push(format!("is sent {transmission}"));
-        }
-        _ => {}
+    if old.is_none_or(|old| old.transmission != tpdo.transmission) {
+        parts.extend(tpdo.transmission.map(TpdoChange::Transmission));
     }
-    if let Some(timer) = tpdo.event_timer_ms.filter(|_| was.is_none_or(|was| was.event_timer_ms != tpdo.event_timer_ms))
-    {
-        parts.push(format!("has an event timer of {timer} ms"));
+    if old.is_none_or(|old| old.event_timer_ms != tpdo.event_timer_ms) {
+        parts.extend(tpdo.event_timer_ms.map(TpdoChange::EventTimer));
     }
     if parts.is_empty() {
-        // Bits of the COB-ID that concern nobody here.
-        parts.push("has another COB-ID word".to_owned());
+        parts.push(TpdoChange::CobIdFlags);
     }
-    format!("{number} {}", parts.join(" and "))
+    Change::Tpdo(tpdo.number, parts)
 }
 
-fn signal_now(signal: &Signal, was: &Signal) -> Option<String> {
-    let name = &signal.name;
-    let unit = |signal: &Signal| signal.unit.map_or_else(|| "no unit".to_owned(), |unit| unit.to_string());
-    if signal.unit != was.unit {
-        return Some(format!("{name} is in {} and not in {}", unit(signal), unit(was)));
+fn signal_change(signal: &Signal, old: &Signal) -> Option<Change> {
+    let name = signal.name.clone();
+    if signal.unit != old.unit {
+        return Some(Change::Unit(name, old.unit, signal.unit));
     }
-    let digits = |signal: &Signal| signal.digits.map_or_else(|| "no".to_owned(), |digits| digits.to_string());
-    if signal.digits != was.digits {
-        return Some(format!("{name} has {} decimal digits and not {}", digits(signal), digits(was)));
+    if signal.digits != old.digits {
+        return Some(Change::Digits(name, old.digits, signal.digits));
     }
-    (signal.value != was.value).then(|| format!("{name} is read as another type"))
+    (signal.value != old.value).then_some(Change::Type(name))
 }

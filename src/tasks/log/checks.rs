@@ -1,4 +1,4 @@
-//! What is checked before a recording changes anything.
+//! Checks before a recording changes anything.
 
 use super::{Mode, Plan};
 use crate::bus::BusError;
@@ -12,7 +12,7 @@ use crate::tasks::{Failure, Kind};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-/// Everything asked for must be in a TPDO, or nothing will ever come of it.
+/// Every requested signal must exist, and must be mapped into a TPDO unless it is polled.
 pub(super) fn check_wanted(instruments: &[Node], plan: &Plan) -> Result<(), Failure> {
     let polled = matches!(plan.mode, Mode::Poll(_));
     for item in &plan.wanted {
@@ -65,7 +65,8 @@ pub(super) fn check_wanted(instruments: &[Node], plan: &Plan) -> Result<(), Fail
     Ok(())
 }
 
-/// Two SYNC producers would double every synchronous TPDO. Nodes that restart meanwhile go to `restarted`.
+/// Refuses if another node sends SYNC: two SYNC producers would double every synchronous TPDO. Adds nodes that restart
+/// meanwhile to `restarted`.
 pub(super) fn refuse_second_sync(
     master: &mut Master<'_>,
     instruments: &[Node],
@@ -96,21 +97,21 @@ pub(super) fn refuse_second_sync(
     }
 }
 
-/// The share of the bus that SYNC at this interval takes with the TPDOs that it brings about, each at its
-/// longest; `None` where the bit rate is not known.
+/// The share of the bus (0 to 1) that SYNC at this interval and the TPDOs after it take, at the greatest frame length;
+/// `None` if the bit rate is unknown.
 pub(super) fn sync_share(master: &Master<'_>, instruments: &[Node], period: Duration) -> Option<f64> {
     let bit_rate = master.bus().bit_rate()?;
     let tpdos = instruments.iter().flat_map(|instrument| &instrument.tpdos).filter(|tpdo| tpdo.cob_id.is_valid());
     let answers = tpdos.filter_map(|tpdo| match tpdo.transmission? {
-        Transmission::AcyclicSync => Some(LONGEST_FRAME_BITS),
-        Transmission::Sync(every) => Some(LONGEST_FRAME_BITS / f64::from(every)),
+        Transmission::AcyclicSync => Some(MAX_FRAME_BITS),
+        Transmission::Sync(every) => Some(MAX_FRAME_BITS / f64::from(every)),
         _ => None,
     });
     Some((SYNC_BITS + answers.sum::<f64>()) / f64::from(bit_rate) / period.as_secs_f64())
 }
 
-/// Eight bytes, every stuff bit, and the gap.
-const LONGEST_FRAME_BITS: f64 = 135.0;
+/// A frame with eight bytes, all stuff bits, and the interframe space.
+const MAX_FRAME_BITS: f64 = 135.0;
 
-/// No byte, some stuff bits, and the gap.
+/// A frame without data, some stuff bits, and the interframe space.
 const SYNC_BITS: f64 = 50.0;

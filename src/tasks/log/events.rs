@@ -1,22 +1,22 @@
-//! What happened on the way, counted.
+//! Counts of the events of a recording.
 
-/// Events of a recording, beside emergencies, gaps and dropped frames.
+/// Events of a recording, except emergencies, gaps and dropped frames.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Events {
+pub struct EventCounts {
     /// Boot-ups of recorded nodes.
     pub restarts: u64,
-    /// Times that a recorded node became silent.
+    /// How often a node stopped sending samples.
     pub silences: u64,
-    /// Times that a heartbeat stopped.
+    /// How often a heartbeat stopped.
     pub heartbeat_losses: u64,
-    /// Times that a node's mapping, unit or digits turned out to be others than before.
+    /// How often the mapping, unit or decimal digits of a node changed.
     pub changes: u64,
-    /// TPDOs and polled values that came while it was not known what they mean: no row was made of them.
+    /// TPDOs and polled values that made no row, because the setup of the node was not known at that time.
     pub not_recorded: u64,
-    /// TPDOs that had not the length of their mapping.
+    /// TPDOs whose length differs from their mapping.
     pub wrong_lengths: u64,
-    /// Times that the interface went down.
+    /// How often the interface went down.
     pub link_losses: u64,
-    /// Times that the controller switched itself off.
+    /// How often the controller went bus-off.
     pub bus_offs: u64,
 }

@@ -1,5 +1,5 @@
-//! Recording without sending: what the TPDOs mean is learned from the SDO traffic of others, else taken
-//! from a description that the user names. It is never guessed.
+//! Passive recording: the setup of the nodes is read from the SDO traffic of another master, or taken from a
+//! description that the user names. It is never guessed.
 
 use crate::bus::Received;
 use crate::canopen::frame::Frame;
@@ -12,29 +12,29 @@ use crate::device::catalog::{Model, recognise};
 use crate::device::unit::Unit;
 use crate::measure::decode::{Decoder, Wanted};
 use crate::measure::layout::{PROCESS_VALUES, Signal, Tpdo};
-use crate::node::Overrides;
-use crate::node::{Identity, Node};
+use crate::node::{Identity, Node, Overrides};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// What was seen of the nodes' object dictionaries.
-pub(super) struct Learner {
+/// Collects the objects that other masters read and write.
+pub(super) struct SetupListener {
     nodes: BTreeSet<NodeId>,
     overrides: Overrides,
     wanted: Vec<Wanted>,
     known: BTreeMap<(NodeId, ObjectId), Vec<u8>>,
-    /// What the nodes refused to tell.
+    /// Objects that the nodes refused to read.
     refused: BTreeSet<(NodeId, ObjectId)>,
     uploads: BTreeMap<NodeId, (ObjectId, Upload)>,
     downloads: BTreeMap<NodeId, (ObjectId, Vec<u8>)>,
-    planned: BTreeSet<CanId>,
-    /// Nodes whose TPDOs came without being understood.
+    /// COB-IDs of the TPDOs that are decoded.
+    decoded: BTreeSet<CanId>,
+    /// Nodes that sent TPDOs whose mapping is unknown.
     pub(super) not_understood: BTreeSet<NodeId>,
 }
 
-impl Learner {
-    pub(super) fn new(nodes: &[NodeId], overrides: &Overrides, wanted: &[Wanted]) -> Learner {
-        Learner {
+impl SetupListener {
+    pub(super) fn new(nodes: &[NodeId], overrides: &Overrides, wanted: &[Wanted]) -> SetupListener {
+        SetupListener {
             nodes: nodes.iter().copied().collect(),
             overrides: overrides.clone(),
             wanted: wanted.to_vec(),
@@ -42,36 +42,35 @@ impl Learner {
             refused: BTreeSet::new(),
             uploads: BTreeMap::new(),
             downloads: BTreeMap::new(),
-            planned: BTreeSet::new(),
+            decoded: BTreeSet::new(),
             not_understood: BTreeSet::new(),
         }
     }
 
-    /// Plans from the descriptions that the user named.
-    pub(super) fn begin(&mut self, decoder: &mut Decoder) {
+    /// Decodes the nodes whose descriptions the user named.
+    pub(super) fn apply_overrides(&mut self, decoder: &mut Decoder) {
         let nodes: Vec<NodeId> = self.overrides.keys().copied().filter(|node| self.nodes.contains(node)).collect();
-        nodes.into_iter().for_each(|node| self.plan(node, decoder));
+        nodes.into_iter().for_each(|node| self.update(node, decoder));
     }
 
-    /// Takes a frame; what it teaches goes into the plans of `decoder`.
+    /// Takes a frame. If it completes the setup of a TPDO, `decoder` decodes that TPDO from now on.
     pub(super) fn take(&mut self, received: &Received, decoder: &mut Decoder) {
         let frame = &received.frame;
         if let Some(node) = frame.id().sdo_request_node() {
             self.request(node, frame);
         } else if let Some(node) = frame.id().sdo_response_node() {
             if self.response(node, frame) {
-                self.plan(node, decoder);
+                self.update(node, decoder);
             }
         } else if let Some(node) = predefined_tpdo(frame)
             && self.nodes.contains(&node)
-            && !self.planned.contains(&frame.id())
+            && !self.decoded.contains(&frame.id())
         {
             self.not_understood.insert(node);
         }
     }
 
-    /// A node has restarted: how it was set up may have been lost with its power. What it is stays, and what the
-    /// user has named.
+    /// A node has restarted: it may have lost its setup. Its identity and the descriptions of the user stay valid.
     pub(super) fn forget(&mut self, node: NodeId, decoder: &mut Decoder) {
         let stays = |(of, object): &(NodeId, ObjectId)| *of != node || !is_setup(*object);
         self.known.retain(|key, _| stays(key));
@@ -81,9 +80,9 @@ impl Learner {
         }
         self.downloads.remove(&node);
         decoder.remove(node);
-        self.planned = decoder.can_ids().collect();
+        self.decoded = decoder.can_ids().collect();
         if self.overrides.contains_key(&node) && self.nodes.contains(&node) {
-            self.plan(node, decoder);
+            self.update(node, decoder);
         }
     }
 
@@ -107,7 +106,7 @@ impl Learner {
         }
     }
 
-    /// Whether something new is known.
+    /// Returns whether an object has a new value.
     fn response(&mut self, node: NodeId, frame: &Frame) -> bool {
         if let (Some((object, _)), [0x60, a, b, c, ..]) = (self.downloads.get(&node), frame.data())
             && *object == ObjectId::from_multiplexer([*a, *b, *c])
@@ -115,7 +114,7 @@ impl Learner {
         {
             return self.learn(node, object, bytes);
         }
-        // The other master sends the requests for segments; ours go nowhere.
+        // The other master requests the segments. The requests of our state machine are not sent.
         let Some((object, upload)) = self.uploads.get_mut(&node) else { return false };
         let object = *object;
         match upload.on_frame(frame, &mut Vec::new()) {
@@ -154,9 +153,9 @@ impl Learner {
         DataType::VisibleString.decode(bytes).ok().map(|value| value.to_string())
     }
 
-    fn plan(&mut self, node: NodeId, decoder: &mut Decoder) {
+    fn update(&mut self, node: NodeId, decoder: &mut Decoder) {
         let mut instrument = self.instrument(node);
-        // An integer without its digits is a number that is wrong by a power of ten.
+        // Without its decimal digits an integer would be wrong by a power of ten.
         let has_digits = |instrument: &Node, tpdo: &Tpdo| {
             tpdo.mapping.iter().all(|entry| {
                 let signal = instrument.signals.iter().find(|signal| signal.is_value(entry.object));
@@ -172,12 +171,12 @@ impl Learner {
         instrument.tpdos = tpdos;
         if !instrument.tpdos.is_empty() {
             decoder.renew(instrument.layout(), &self.wanted);
-            self.planned = decoder.can_ids().collect();
+            self.decoded = decoder.can_ids().collect();
             self.not_understood.remove(&node);
         }
     }
 
-    /// The node as far as it is known: only TPDOs whose identifier and whole mapping are.
+    /// The node as far as it is known, with the TPDOs whose COB-ID and whole mapping are known.
     fn instrument(&self, node: NodeId) -> Node {
         let mut instrument = Node::new(node);
         instrument.identity = Identity {
@@ -208,14 +207,14 @@ impl Learner {
 
     fn signals(&self, instrument: &Node) -> Vec<Signal> {
         let node = instrument.id;
-        let told = |channel| {
+        let unit_and_digits = |channel| {
             let unit = self.number(node, ObjectId::new(0x6131, channel)).map(Unit);
             (unit, self.byte(node, ObjectId::new(0x6132, channel)))
         };
         let described = instrument.model.as_ref().map_or(&[][..], |model| &model.description.signals);
         if !described.is_empty() {
             let signal = |entry: &crate::device::description::SignalEntry| {
-                let (unit, digits) = told(entry.channel);
+                let (unit, digits) = unit_and_digits(entry.channel);
                 Signal {
                     name: entry.name.clone(),
                     channel: entry.channel,
@@ -234,7 +233,7 @@ impl Learner {
         let mut signals: Vec<Signal> = values
             .map(|entry| {
                 let channel = entry.object.sub;
-                let (unit, digits) = told(channel);
+                let (unit, digits) = unit_and_digits(channel);
                 Signal {
                     name: format!("ch{channel}"),
                     channel,
@@ -252,12 +251,12 @@ impl Learner {
     }
 }
 
-/// Whether an object belongs to what TPDOs are read by, and not to what a device is.
+/// Whether an object belongs to the setup of the TPDOs, and not to the identity of the device.
 fn is_setup(object: ObjectId) -> bool {
     matches!(object.index, 0x1800..=0x1bff | 0x6131 | 0x6132)
 }
 
-/// The node whose predefined TPDO identifier this is: it only tells that something was not understood.
+/// The node that sends TPDOs with this COB-ID by the predefined connection set.
 fn predefined_tpdo(frame: &Frame) -> Option<NodeId> {
     match frame.id() {
         CanId::Standard(id) if matches!(id & 0x780, 0x180 | 0x280 | 0x380 | 0x480) && !frame.is_remote() => {

@@ -1,6 +1,6 @@
-//! Polling by SDO: every signal of every node once a period, side by side.
+//! Polling by SDO: every signal of every node once per interval, all nodes in parallel.
 
-use super::{Note, nth};
+use super::nth;
 use crate::bus::Mono;
 use crate::canopen::id::NodeId;
 use crate::master::{Answer, Master, SdoError, Ticket};
@@ -12,12 +12,12 @@ use crate::tasks::read::{Target, requests, sample, targets};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// What is polled, and what is under way.
+/// What is polled, and the requests under way.
 pub(super) struct Poll {
     period: Duration,
     cycles: u64,
     targets: Vec<Target>,
-    /// Which of them are read at the moment.
+    /// Which targets are polled at present.
     live: Vec<bool>,
     open: BTreeMap<Ticket, (usize, Part)>,
     answers: Vec<Parts>,
@@ -55,18 +55,23 @@ impl Poll {
             failing: Vec::new(),
         };
         for instrument in instruments {
-            poll.renew(instrument, wanted, decoder)?;
+            poll.set_node(instrument, wanted, decoder)?;
         }
         Ok(poll)
     }
 
-    /// What is read of a node from now on. It must have been held before if it was read.
+    /// Polls a node from now on. A node that was polled before must be held first.
     ///
     /// # Errors
-    /// Why nothing can be read of it.
-    pub(super) fn renew(&mut self, instrument: &Node, wanted: &[Wanted], decoder: &mut Decoder) -> Result<(), Failure> {
+    /// A requested signal cannot be read.
+    pub(super) fn set_node(
+        &mut self,
+        instrument: &Node,
+        wanted: &[Wanted],
+        decoder: &mut Decoder,
+    ) -> Result<(), Failure> {
         let mut number = 0;
-        // Of several nodes each gives what it has; that somebody has it was checked before.
+        // Of several nodes each is polled for the signals it has. At least one has them: that was checked before.
         let has = |item: &&Wanted| match item {
             Wanted::Signal(name) | Wanted::Status(name) => instrument.signals.iter().any(|signal| signal.name == *name),
             Wanted::Object(_) => true,
@@ -77,7 +82,7 @@ impl Poll {
         }
         for mut target in targets(instrument, &own, &mut number)? {
             target.reading.source = decoder.add_source(target.source.clone());
-            // The places of what was read of the node before are free by now: a node has one request at a time.
+            // Earlier places of this node are free again.
             let is_free = |&at: &usize| {
                 !self.live[at] && self.answers[at].under_way == 0 && self.targets[at].source.node == instrument.id
             };
@@ -94,16 +99,16 @@ impl Poll {
         Ok(())
     }
 
-    /// Nothing is read of a node any more, and what is under way is thrown away when it comes.
+    /// Stops polling a node. Answers under way are ignored.
     pub(super) fn hold(&mut self, node: NodeId) {
         for (target, live) in self.targets.iter().zip(&mut self.live) {
             *live &= target.source.node != node;
         }
     }
 
-    /// When the next cycle begins, counted from `begin`.
-    pub(super) fn due(&self, begin: Mono) -> Mono {
-        begin + nth(self.period, self.cycles)
+    /// When the next cycle starts; the first one is at `start`.
+    pub(super) fn due(&self, start: Mono) -> Mono {
+        start + nth(self.period, self.cycles)
     }
 
     /// The number of the next cycle.
@@ -111,15 +116,15 @@ impl Poll {
         self.cycles
     }
 
-    /// The cycle in which the request of this ticket was begun.
+    /// The cycle in which this request was sent.
     pub(super) fn cycle_of(&self, ticket: Ticket) -> Option<u64> {
         self.open.get(&ticket).map(|&(at, _)| self.answers[at].cycle)
     }
 
-    /// Begins the cycles that are due. What the cycle before has not finished is skipped, and counted.
-    pub(super) fn start_due(&mut self, begin: Mono, now: Mono, master: &mut Master<'_>) -> u64 {
+    /// Starts the cycles that are due. Returns how many polls were skipped because the previous one was not finished.
+    pub(super) fn start_due(&mut self, start: Mono, now: Mono, master: &mut Master<'_>) -> u64 {
         let mut skipped = 0;
-        while self.due(begin) <= now {
+        while self.due(start) <= now {
             self.cycles += 1;
             for (at, target) in self.targets.iter().enumerate() {
                 if !self.live[at] {
@@ -131,7 +136,7 @@ impl Poll {
                     continue;
                 }
                 parts.cycle = self.cycles - 1;
-                // The value last: when it comes the sample is complete, so that rows stand in order of time.
+                // The value last: its answer completes the sample, so rows are in order of time.
                 for (request, part) in requests(target).into_iter().zip([Part::Value, Part::Status]).rev() {
                     self.open.insert(master.start(request), (at, part));
                     parts.under_way += 1;
@@ -141,13 +146,13 @@ impl Poll {
         skipped
     }
 
-    /// Takes an answer; a complete one becomes a sample. A target that begins to fail is said once.
+    /// Takes an answer; a complete one becomes a sample. Returns the first of several failures in a row.
     pub(super) fn answer(
         &mut self,
         ticket: Ticket,
         result: Result<Answer, SdoError>,
         samples: &mut Vec<Sample>,
-    ) -> Option<Note> {
+    ) -> Option<SdoError> {
         let (at, part) = self.open.remove(&ticket)?;
         let parts = &mut self.answers[at];
         parts.under_way -= 1;
@@ -170,7 +175,7 @@ impl Poll {
             }
             Err(error) => {
                 let first = !std::mem::replace(&mut self.failing[at], true);
-                first.then(|| Note::Remark(format!("node {}: {error}", error.node)))
+                first.then_some(error)
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The SYNC producer: when the next one is due, and how well the ones before kept their time.
+//! The SYNC producer: sends SYNC without drift, and measures how late each one was.
 
 use super::nth;
 use crate::bus::Mono;
@@ -8,80 +8,80 @@ use crate::master::Master;
 use crate::measure::histogram::Histogram;
 use std::time::Duration;
 
-/// What was sent, and how late.
+/// The SYNC messages of a recording.
 #[derive(Clone, Debug, Default)]
-pub struct Syncs {
-    /// SYNC messages that the bus took.
+pub struct SyncStatistics {
+    /// SYNC messages sent.
     pub sent: u64,
-    /// Those whose time had passed, and those that nobody took.
+    /// SYNC messages omitted because their time had passed or the bus did not accept them.
     pub left_out: u64,
-    /// How long after its time each was handed to the bus. The times are counted from the first, not from the one
-    /// before: a delay never moves those after it.
+    /// The delay of each SYNC after its nominal time. Nominal times are multiples of the interval since the start: a
+    /// delay does not shift later ones.
     pub delays: Histogram,
 }
 
-/// Sends SYNC at an interval, without drift.
+/// Sends SYNC at an interval.
 pub(super) struct Producer {
-    period: Duration,
+    interval: Duration,
     id: CanId,
-    begin: Mono,
+    start: Mono,
     slot: u64,
-    /// The slot whose SYNC has been given to the master, and not yet taken by the bus.
+    /// The slot whose SYNC the master has, and the bus has not sent yet.
     waiting: Option<u64>,
-    pub(super) syncs: Syncs,
+    statistics: SyncStatistics,
 }
 
 impl Producer {
-    pub(super) fn new(period: Duration, id: CanId, begin: Mono) -> Producer {
-        Producer { period, id, begin, slot: 0, waiting: None, syncs: Syncs::default() }
+    pub(super) fn new(interval: Duration, id: CanId, start: Mono) -> Producer {
+        Producer { interval, id, start, slot: 0, waiting: None, statistics: SyncStatistics::default() }
     }
 
-    /// When the next one is due. Computed from the beginning, never from the last one: no drift.
+    /// When the next SYNC is due. It is computed from the start, so that nothing drifts.
     pub(super) fn due(&self) -> Mono {
-        self.begin + nth(self.period, self.slot)
+        self.start + nth(self.interval, self.slot)
     }
 
-    /// The number of the next one.
+    /// The number of the next SYNC.
     pub(super) fn slot(&self) -> u64 {
         self.slot
     }
 
-    /// Sends the one that is due.
+    /// Sends the SYNC that is due.
     pub(super) fn send(&mut self, master: &mut Master<'_>) {
-        self.look(master);
+        self.check_sent(master);
         if master.send_first(Frame::empty(self.id)) {
             self.waiting = Some(self.slot);
         }
-        self.slot = next_slot(self.begin, master.now(), self.period, self.slot);
+        self.slot = next_slot(self.start, master.now(), self.interval, self.slot);
     }
 
-    /// Looks whether the last one has been sent.
-    pub(super) fn look(&mut self, master: &mut Master<'_>) {
+    /// Counts the last SYNC if it was sent.
+    pub(super) fn check_sent(&mut self, master: &mut Master<'_>) {
         if let Some(at) = master.take_first_at()
             && let Some(slot) = self.waiting.take()
         {
-            self.syncs.sent += 1;
-            self.syncs.delays.add(at.since(self.begin + nth(self.period, slot)));
+            self.statistics.sent += 1;
+            self.statistics.delays.add(at.since(self.start + nth(self.interval, slot)));
         }
     }
 
-    /// All that were sent, at the end.
-    pub(super) fn finish(&mut self, master: &mut Master<'_>) -> Syncs {
-        self.look(master);
+    /// Ends the production and returns what was sent.
+    pub(super) fn finish(mut self, master: &mut Master<'_>) -> SyncStatistics {
+        self.check_sent(master);
         let unsent = u64::from(master.take_back_first());
-        self.syncs.left_out = self.slot - self.syncs.sent - unsent;
-        self.syncs.clone()
+        self.statistics.left_out = self.slot - self.statistics.sent - unsent;
+        self.statistics
     }
 }
 
-/// When the next SYNC is due after that of `slot`. A program that was stopped makes up for none: a burst would
-/// be no rhythm, and two would be closer together than anybody asked for.
-fn next_slot(begin: Mono, now: Mono, period: Duration, slot: u64) -> u64 {
-    let passed = now.since(begin).as_nanos() / period.as_nanos().max(1);
+/// The slot that follows `slot`. A program that was stopped omits the SYNC messages it has missed: a burst would not be
+/// periodic, and two would be closer together than the interval.
+fn next_slot(start: Mono, now: Mono, interval: Duration, slot: u64) -> u64 {
+    let passed = now.since(start).as_nanos() / interval.as_nanos().max(1);
     let passed = u64::try_from(passed).unwrap_or(u64::MAX - 2);
     if passed <= slot {
         return slot + 1;
     }
-    let next = begin + nth(period, passed + 1);
-    if next.since(now) * 2 < period { passed + 2 } else { passed + 1 }
+    let next = start + nth(interval, passed + 1);
+    if next.since(now) * 2 < interval { passed + 2 } else { passed + 1 }
 }

@@ -1,6 +1,6 @@
-//! Which nodes a recording started, and what it has to put back.
+//! The NMT states that a recording changes and restores.
 
-use super::{Mode, Plan};
+use super::{Mode, Plan, Remark};
 use crate::bus::BusError;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtCommand, NmtState, booted};
@@ -9,17 +9,17 @@ use crate::node::Node;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-/// A heartbeat slower than this is not waited for: the node's state counts as unknown.
-const SLOWEST_HEARTBEAT: Duration = Duration::from_secs(2);
+/// With a slower heartbeat the state of a node counts as unknown.
+const MAX_HEARTBEAT_PERIOD: Duration = Duration::from_secs(2);
 
-/// The nodes started, and their states before.
+/// The nodes that were started, and their previous states.
 #[derive(Debug, Default)]
-pub(super) struct States {
+pub(super) struct NmtStates {
     started: BTreeMap<NodeId, Option<NmtState>>,
 }
 
-impl States {
-    /// Starts the nodes that are not known to be operational. Nodes that restart meanwhile go to `restarted`.
+impl NmtStates {
+    /// Starts the nodes that are not known to be operational. Adds nodes that restart meanwhile to `restarted`.
     pub(super) fn start(
         &mut self,
         master: &mut Master<'_>,
@@ -41,14 +41,14 @@ impl States {
         Ok(())
     }
 
-    /// Starts a node again that has been away, if this recording had started it.
+    /// Starts a node again if this recording had started it.
     pub(super) fn start_again(&self, node: NodeId, master: &mut Master<'_>) {
         if self.started.contains_key(&node) {
             master.send(NmtCommand::Start.frame(Some(node)));
         }
     }
 
-    /// Returns every node whose state was known to that state.
+    /// Returns each node to its previous state if that is known.
     pub(super) fn restore(&mut self, master: &mut Master<'_>) -> Result<(), Error> {
         master.cancel();
         for (&node, &before) in &self.started {
@@ -68,22 +68,15 @@ impl States {
         Ok(())
     }
 
-    /// What was switched and stays so, in words.
-    pub(super) fn remarks(&self) -> Vec<String> {
-        let unknown: Vec<String> =
-            self.started.iter().filter(|(_, before)| before.is_none()).map(|(node, _)| node.to_string()).collect();
-        match unknown.as_slice() {
-            [] => Vec::new(),
-            [one] => vec![format!("node {one} was started; its state before is not known, so it stays operational")],
-            _ => vec![format!(
-                "nodes {} were started; their states before are not known, so they stay operational",
-                unknown.join(", ")
-            )],
-        }
+    /// The started nodes that stay operational because their previous state is unknown.
+    pub(super) fn remark(&self) -> Option<Remark> {
+        let unknown: Vec<NodeId> =
+            self.started.iter().filter(|(_, before)| before.is_none()).map(|(&node, _)| node).collect();
+        (!unknown.is_empty()).then_some(Remark::LeftOperational(unknown))
     }
 }
 
-/// The states that heartbeats tell, waited for as long as the slowest of them needs.
+/// The states from heartbeats. Waits as long as the slowest heartbeat needs.
 fn heartbeats(
     master: &mut Master<'_>,
     instruments: &[Node],
@@ -91,7 +84,7 @@ fn heartbeats(
 ) -> Result<BTreeMap<NodeId, NmtState>, Error> {
     let period = |instrument: &Node| {
         let period = Duration::from_millis(u64::from(instrument.heartbeat_ms?));
-        (!period.is_zero() && period <= SLOWEST_HEARTBEAT).then_some(period)
+        (!period.is_zero() && period <= MAX_HEARTBEAT_PERIOD).then_some(period)
     };
     let expected: BTreeMap<NodeId, Duration> =
         instruments.iter().filter_map(|instrument| Some((instrument.id, period(instrument)?))).collect();

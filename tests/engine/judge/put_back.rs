@@ -53,7 +53,11 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[Holds], broken: &mut
                     Ok(said) => format!("{said:?}"),
                     Err(failure) => failure.message.clone(),
                 };
-                if !remarks.contains("not put back") && !remarks.contains("stays") && !remarks.contains("state") {
+                if !remarks.contains("StatesNotRestored")
+                    && !remarks.contains("LeftOperational")
+                    && !remarks.contains("stays")
+                    && !remarks.contains("state")
+                {
                     broken
                         .push(("puts states back", format!("device {place}: {before:?} became {after:?}: {remarks}")));
                 }

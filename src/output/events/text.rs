@@ -1,0 +1,164 @@
+//! The text of the events of a recording.
+
+use super::{Weight, Words};
+use crate::bus::time::spoken;
+use crate::bus::{Fault, ReceiveBuffer};
+use crate::canopen::emcy::Emergency;
+use crate::canopen::id::NodeId;
+use crate::tasks::log::{Change, Note, Remark, TpdoChange, silence_text};
+
+/// The text of a recording's event.
+pub fn words(note: &Note) -> Words {
+    use Weight::{Detail, Note as Info, Warning};
+    let of_all = Words::of_all;
+    match note {
+        Note::Remark(remark) => of_all("remark", Warning, remark_text(remark)),
+        Note::Emergency(node, emergency, meaning) => {
+            of_node(*node, "emcy", Warning, format!("node {node}: {}", emergency_text(*emergency, meaning)))
+        }
+        Note::Share(interval, share) => {
+            let text =
+                format!("SYNC every {} with its TPDOs takes {:.1} % of the bus", spoken(*interval), share * 100.0);
+            Words { event: None, node: None, text, weight: Info }
+        }
+        Note::Restarted(node) => of_node(*node, "reboot", Warning, format!("node {node} restarted")),
+        Note::ReadAgain(node, changes) if changes.is_empty() => {
+            of_node(*node, "read-again", Info, format!("node {node} was read again: its setup is unchanged"))
+        }
+        Note::ReadAgain(node, changes) => {
+            let changes: Vec<String> = changes.iter().map(change_text).collect();
+            let text = format!("node {node} has changed, and is recorded with its new setup: {}", changes.join("; "));
+            of_node(*node, "changed", Warning, text)
+        }
+        Note::Unreadable(node, why) => {
+            let text = format!("{}: node {node} is not recorded until it can be read again", why.message);
+            of_node(*node, "unreadable", Warning, text)
+        }
+        Note::HeartbeatLost(node, since) => {
+            let text = format!("node {node}: heartbeat lost, none for {}", spoken(*since));
+            of_node(*node, "heartbeat-lost", Warning, text)
+        }
+        Note::HeartbeatBack(node) => of_node(*node, "heartbeat-back", Info, format!("node {node}: heartbeat is back")),
+        Note::State(node, state) => of_node(*node, "state", Warning, format!("node {node} is {state} now")),
+        Note::Gap(node, length) => of_node(*node, "gap", Detail, format!("node {node}: a gap of {}", spoken(*length))),
+        Note::Silent(node, since) => {
+            of_node(*node, "lost", Warning, format!("node {node}: silent for {}", spoken(*since)))
+        }
+        Note::Back(node) => of_node(*node, "back", Info, format!("node {node} is back")),
+        Note::WrongLength(node) => {
+            let text = format!("node {node}: a TPDO has another length than its mapping: it makes no row");
+            of_node(*node, "length", Warning, text)
+        }
+        Note::Fault(fault) => of_all("fault", fault_weight(*fault), fault.to_string()),
+        Note::Buffer(buffer) => Words { event: None, node: None, text: buffer_text(*buffer), weight: Detail },
+        Note::Dropped(count) => of_all("dropped", Warning, format!("the kernel dropped {count} frames")),
+        Note::Link(true) => of_all("link-up", Info, "the interface is up again".to_owned()),
+        Note::Link(false) => of_all("link-down", Warning, "the interface went down; waiting for it".to_owned()),
+    }
+}
+
+fn of_node(node: NodeId, event: &'static str, weight: Weight, text: String) -> Words {
+    Words { event: Some(event), node: Some(node), text, weight }
+}
+
+fn emergency_text(emergency: Emergency, meaning: &str) -> String {
+    if emergency.code == 0 {
+        return "emergency over (0000h)".to_owned();
+    }
+    let register = emergency.register.map(|register| format!(", {register}")).unwrap_or_default();
+    format!("emergency {:04X}h, {meaning}{register}", emergency.code)
+}
+
+fn fault_weight(fault: Fault) -> Weight {
+    match fault {
+        Fault::BusOff | Fault::ControllerOverflow => Weight::Warning,
+        Fault::Restarted => Weight::Note,
+        _ => Weight::Detail,
+    }
+}
+
+fn buffer_text(buffer: ReceiveBuffer) -> String {
+    let bytes = buffer.bytes;
+    if buffer.is_small() {
+        return format!("the receive buffer has {bytes} bytes; for a larger one: {}", allow_larger(buffer));
+    }
+    format!("the receive buffer has {bytes} bytes")
+}
+
+/// The command with which the kernel allows the wanted receive buffer. It doubles what is asked for.
+fn allow_larger(buffer: ReceiveBuffer) -> String {
+    format!("sudo sysctl net.core.rmem_max={}", buffer.wanted / 2)
+}
+
+/// The text of a remark on a recording.
+pub fn remark_text(remark: &Remark) -> String {
+    match remark {
+        Remark::NoRequestedSignal(node) => format!("node {node} has none of the requested signals"),
+        Remark::SharedCobId(id, [one, other]) => {
+            format!("nodes {one} and {other} both send TPDOs with COB-ID {id}: these TPDOs make no rows")
+        }
+        Remark::PollFailed(error) => format!("node {}: {error}", error.node),
+        Remark::ChangedWhileFramesLost(node, before) => {
+            let before = spoken(*before);
+            format!("node {node} changed while frames were lost: its rows of the {before} before may be wrong")
+        }
+        Remark::NotReadAgain(node) => format!("node {node} could not be read again: its later frames made no rows"),
+        Remark::LeftOperational(nodes) => match nodes.as_slice() {
+            [node] => format!("node {node} was started; its previous state is unknown, so it stays operational"),
+            nodes => format!(
+                "nodes {} were started; their previous states are unknown, so they stay operational",
+                listed(nodes)
+            ),
+        },
+        Remark::StatesNotRestored(failure) => format!("the nodes' states were not restored: {}", failure.message),
+        Remark::SyncsOmittedWhileDown(count) => format!("{count} SYNC omitted: the interface was down"),
+        Remark::SyncsOmittedTooSlow(count) => format!("{count} SYNC omitted: the program was stopped or too slow"),
+        Remark::SmallReceiveBuffer(buffer) => format!("frames were dropped: {}", buffer_text(*buffer)),
+        Remark::NoMeasurements(node, reason) => {
+            format!("node {node}: no measurements: {}", silence_text(*reason, *node).0)
+        }
+    }
+}
+
+/// `1, 2, 3`.
+fn listed(nodes: &[NodeId]) -> String {
+    nodes.iter().map(NodeId::to_string).collect::<Vec<String>>().join(", ")
+}
+
+fn change_text(change: &Change) -> String {
+    let digits = |digits: &Option<u8>| digits.map_or_else(|| "unknown".to_owned(), |digits| digits.to_string());
+    match change {
+        Change::Device(before, after) if before == after => "it is another device".to_owned(),
+        Change::Device(before, after) => {
+            let serial = |serial: &Option<u32>| serial.map_or_else(|| "none".to_owned(), |serial| serial.to_string());
+            format!("it is another device: serial {}, before {}", serial(after), serial(before))
+        }
+        Change::TpdoRemoved(number) => format!("{number} no longer exists"),
+        Change::TpdoDisabled(number) => format!("{number} is disabled"),
+        Change::Tpdo(number, parts) => {
+            let parts: Vec<String> = parts.iter().map(tpdo_change_text).collect();
+            format!("{number}: {}", parts.join(", "))
+        }
+        Change::Unit(signal, before, after) => {
+            let unit = |unit: &Option<_>| {
+                unit.as_ref().map_or_else(|| "unknown".to_owned(), |unit: &crate::device::unit::Unit| unit.to_string())
+            };
+            format!("{signal}: unit {}, before {}", unit(after), unit(before))
+        }
+        Change::Digits(signal, before, after) => {
+            format!("{signal}: decimal digits {}, before {}", digits(after), digits(before))
+        }
+        Change::Type(signal) => format!("{signal}: another data type"),
+    }
+}
+
+fn tpdo_change_text(change: &TpdoChange) -> String {
+    match change {
+        TpdoChange::Mapping(names) if names.is_empty() => "nothing mapped".to_owned(),
+        TpdoChange::Mapping(names) => format!("mapping {}", names.join(" ")),
+        TpdoChange::CanId(id) => format!("COB-ID {id}"),
+        TpdoChange::Transmission(transmission) => format!("transmission {transmission}"),
+        TpdoChange::EventTimer(milliseconds) => format!("event timer {milliseconds} ms"),
+        TpdoChange::CobIdFlags => "other COB-ID flags".to_owned(),
+    }
+}

@@ -1,0 +1,110 @@
+//! The heartbeats of the recorded nodes: stopped, back, another NMT state.
+
+use crate::bus::Mono;
+use crate::canopen::id::NodeId;
+use crate::canopen::nmt::{Life, NmtState};
+use crate::node::Node;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// A heartbeat is lost after two periods and this time: devices keep their period no better.
+const TOLERANCE: Duration = Duration::from_millis(50);
+
+/// What a heartbeat or boot-up message changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum HeartbeatChange {
+    /// Nothing.
+    None,
+    /// The heartbeat was lost and is back.
+    Back,
+    /// The node has another state than at its last heartbeat.
+    State(NmtState),
+}
+
+#[derive(Debug)]
+struct Heartbeat {
+    /// 1017h.
+    period: Duration,
+    last: Mono,
+    state: Option<NmtState>,
+    is_lost: bool,
+}
+
+/// Watches the nodes that have a heartbeat (1017h is not 0).
+#[derive(Debug, Default)]
+pub(super) struct HeartbeatMonitor {
+    heartbeats: BTreeMap<NodeId, Heartbeat>,
+}
+
+impl HeartbeatMonitor {
+    /// Watches the heartbeat of a node from now on, if it has one.
+    pub(super) fn watch(&mut self, instrument: &Node, now: Mono) {
+        self.heartbeats.remove(&instrument.id);
+        if let Some(milliseconds) = instrument.heartbeat_ms.filter(|&milliseconds| milliseconds > 0) {
+            let period = Duration::from_millis(u64::from(milliseconds));
+            let heartbeat = Heartbeat { period, last: now, state: None, is_lost: false };
+            self.heartbeats.insert(instrument.id, heartbeat);
+        }
+    }
+
+    /// Takes a heartbeat or boot-up message.
+    pub(super) fn take(&mut self, node: NodeId, life: Life, now: Mono) -> HeartbeatChange {
+        let Some(heartbeat) = self.heartbeats.get_mut(&node) else { return HeartbeatChange::None };
+        heartbeat.last = now;
+        let was_lost = std::mem::take(&mut heartbeat.is_lost);
+        let state = match life {
+            Life::State(state) => Some(state),
+            // A boot-up does not show the state that follows.
+            Life::BootUp => None,
+        };
+        let before = std::mem::replace(&mut heartbeat.state, state);
+        match (before, state) {
+            _ if was_lost => HeartbeatChange::Back,
+            (Some(before), Some(state)) if before != state => HeartbeatChange::State(state),
+            _ => HeartbeatChange::None,
+        }
+    }
+
+    /// A node whose heartbeat has stopped, and since when. Each loss is returned once.
+    pub(super) fn next_lost(&mut self, now: Mono) -> Option<(NodeId, Duration)> {
+        let is_late =
+            |heartbeat: &Heartbeat| !heartbeat.is_lost && now.since(heartbeat.last) > heartbeat.period * 2 + TOLERANCE;
+        let (&node, heartbeat) = self.heartbeats.iter_mut().find(|(_, heartbeat)| is_late(heartbeat))?;
+        heartbeat.is_lost = true;
+        Some((node, now.since(heartbeat.last)))
+    }
+
+    /// Nothing could be received until now: all periods start here.
+    pub(super) fn restart(&mut self, now: Mono) {
+        self.heartbeats.values_mut().for_each(|heartbeat| heartbeat.last = now);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lost_after_two_periods_and_back() {
+        let at = |milliseconds| Mono::at(Duration::from_millis(milliseconds));
+        let node = NodeId::new(5).expect("a node-ID");
+        let mut instrument = Node::new(node);
+        let mut monitor = HeartbeatMonitor::default();
+        monitor.watch(&instrument, at(0));
+        assert_eq!(monitor.next_lost(at(1_000_000)), None, "it has none");
+        instrument.heartbeat_ms = Some(100);
+        monitor.watch(&instrument, at(0));
+        let operational = Life::State(NmtState::Operational);
+        let stopped = Life::State(NmtState::Stopped);
+        assert_eq!(monitor.take(node, operational, at(100)), HeartbeatChange::None);
+        assert_eq!(monitor.take(node, stopped, at(200)), HeartbeatChange::State(NmtState::Stopped));
+        assert_eq!(monitor.next_lost(at(450)), None);
+        assert_eq!(monitor.next_lost(at(451)), Some((node, Duration::from_millis(251))));
+        assert_eq!(monitor.next_lost(at(600)), None, "returned once");
+        assert_eq!(monitor.take(node, operational, at(700)), HeartbeatChange::Back);
+        assert_eq!(monitor.take(node, Life::BootUp, at(750)), HeartbeatChange::None);
+        assert_eq!(monitor.take(node, operational, at(800)), HeartbeatChange::None, "no state before a boot-up counts");
+        monitor.restart(at(9000));
+        assert_eq!(monitor.next_lost(at(9250)), None);
+    }
+}

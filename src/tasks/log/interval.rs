@@ -1,0 +1,98 @@
+//! How often something is received, when an interval is a gap, and when the sender counts as silent.
+
+use crate::bus::Mono;
+use std::time::Duration;
+
+/// Without `--max-gap`, an interval of more than this many usual ones is a gap.
+const GAP_FACTOR: u32 = 3;
+
+/// A sender is silent after this many usual intervals.
+const SILENCE_FACTOR: u32 = 5;
+
+/// A sender is never silent before this time.
+const MIN_SILENCE: Duration = Duration::from_secs(1);
+
+/// The usual interval of something, and when it was last received.
+#[derive(Clone, Debug, Default)]
+pub(super) struct IntervalTracker {
+    last: Option<Mono>,
+    usual: Option<Duration>,
+}
+
+impl IntervalTracker {
+    /// Takes one reception. Returns the interval since the last one if it is a gap: longer than `max_gap`, or than
+    /// three usual intervals if there is no `max_gap`.
+    pub(super) fn add(&mut self, now: Mono, max_gap: Option<Duration>) -> Option<Duration> {
+        let mut gap = None;
+        if let Some(last) = self.last.filter(|&last| last < now) {
+            let interval = now.since(last);
+            let longest = max_gap.or(self.usual.map(|usual| usual * GAP_FACTOR));
+            gap = longest.filter(|&longest| interval > longest).map(|_| interval);
+            // A gap counts only as the longest interval that is none. So the next gap is detected as well, and a
+            // sender that became slower has its new interval after a few receptions.
+            self.usual = Some(match self.usual {
+                Some(usual) => (usual * 7 + interval.min(usual * GAP_FACTOR)) / 8,
+                None => interval,
+            });
+        }
+        self.last = Some(now);
+        gap
+    }
+
+    /// Whether anything was ever received.
+    pub(super) fn has_received(&self) -> bool {
+        self.last.is_some()
+    }
+
+    /// How long nothing was received, if that is longer than usual.
+    pub(super) fn silence(&self, now: Mono) -> Option<Duration> {
+        let limit = (self.usual.unwrap_or_default() * SILENCE_FACTOR).max(MIN_SILENCE);
+        self.last.map(|last| now.since(last)).filter(|&silence| silence > limit)
+    }
+
+    /// Whether nothing was ever received, or nothing for longer than usual.
+    pub(super) fn is_lost(&self, now: Mono) -> bool {
+        self.last.is_none() || self.silence(now).is_some()
+    }
+
+    /// Nothing could be received until now: the silence starts here.
+    pub(super) fn restart(&mut self, now: Mono) {
+        self.last = self.last.map(|_| now);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(milliseconds: u64) -> Option<Duration> {
+        Some(Duration::from_millis(milliseconds))
+    }
+
+    fn gaps(at: &[u64], max_gap: Option<Duration>) -> Vec<Option<Duration>> {
+        let mut tracker = IntervalTracker::default();
+        let at = at.iter().map(|&milliseconds| Mono::at(Duration::from_millis(milliseconds)));
+        at.map(|now| tracker.add(now, max_gap)).collect()
+    }
+
+    #[test]
+    fn gap_is_longer_than_three_usual_intervals() {
+        assert_eq!(gaps(&[0, 10, 20, 50], None), [None; 4]);
+        assert_eq!(gaps(&[0, 10, 20, 51], None), [None, None, None, ms(31)]);
+        assert_eq!(gaps(&[0, 10, 20, 30], Some(Duration::from_millis(9))), [None, ms(10), ms(10), ms(10)]);
+        assert_eq!(gaps(&[0, 10, 1000], Some(Duration::from_secs(1))), [None; 3]);
+    }
+
+    #[test]
+    fn second_gap_is_detected() {
+        let gaps = gaps(&[0, 10, 20, 5020, 5030, 5040, 5090], None);
+        assert_eq!(gaps, [None, None, None, ms(5000), None, None, ms(50)]);
+    }
+
+    #[test]
+    fn slower_interval_becomes_the_usual_one() {
+        let at: Vec<u64> = [0, 10, 20].into_iter().chain((1..20).map(|n| 20 + 100 * n)).collect();
+        let gaps = gaps(&at, None);
+        assert!(gaps.iter().flatten().count() <= 6 && gaps.last() == Some(&None), "{gaps:?}");
+    }
+}

@@ -1,0 +1,53 @@
+//! The result of a recording.
+
+use super::Recording;
+use crate::canopen::id::NodeId;
+use crate::tasks::log::silence::{silence_reason, why_nothing};
+use crate::tasks::log::{RecordingReport, Remark};
+
+impl Recording<'_> {
+    /// Ends the recording.
+    pub(in crate::tasks::log) fn report(mut self) -> RecordingReport {
+        let lost = self.liveness.lost(self.tally.end());
+        self.remark_at_end(&lost);
+        let nothing = (self.tally.rows == 0).then(|| why_nothing(&self, self.plan));
+        RecordingReport {
+            rows: self.tally.rows,
+            length: self.tally.length(),
+            lost,
+            nothing,
+            dropped: self.tally.dropped,
+            emergencies: self.tally.emergencies,
+            gaps: self.tally.gaps,
+            skipped: self.tally.skipped,
+            events: self.tally.events.clone(),
+            syncs: self.tally.syncs.clone(),
+            statistics: self.tally.into_statistics(self.decoder.sources()),
+            receive_buffer: self.receive_buffer,
+            timestamps: self.timestamps,
+            remarks: self.remarks,
+            interrupted: self.interrupted,
+        }
+    }
+
+    fn remark_at_end(&mut self, lost: &[NodeId]) {
+        match self.tally.syncs.left_out {
+            0 => {}
+            count if self.tally.events.link_losses > 0 => self.remarks.push(Remark::SyncsOmittedWhileDown(count)),
+            count => self.remarks.push(Remark::SyncsOmittedTooSlow(count)),
+        }
+        let buffer = self.receive_buffer.filter(|buffer| self.tally.dropped > 0 && buffer.is_small());
+        self.remarks.extend(buffer.map(Remark::SmallReceiveBuffer));
+        self.remarks.extend(self.rereads.held().map(Remark::NotReadAgain));
+        if self.tally.rows == 0 {
+            return;
+        }
+        for &node in lost {
+            if let Some(instrument) = self.instruments.iter().find(|instrument| instrument.id == node)
+                && !self.liveness.has_sent(node)
+            {
+                self.remarks.push(Remark::NoMeasurements(node, silence_reason(instrument, self.plan.mode)));
+            }
+        }
+    }
+}

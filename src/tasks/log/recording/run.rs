@@ -1,0 +1,186 @@
+//! The loop of a recording.
+
+use super::Recording;
+use crate::bus::Mono;
+use crate::canopen::id::CanId;
+use crate::master::{Error, Happening, Master};
+use crate::tasks::log::producer::Producer;
+use crate::tasks::log::{FIRST_SAMPLE_TIMEOUT, Mode, Note, Observer, TICK};
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+/// When the loop has something to do, besides frames, polls and SYNC.
+struct Schedule {
+    start: Mono,
+    /// The end of `--duration`.
+    end: Option<Mono>,
+    /// The recording ends here if it has no row.
+    give_up: Mono,
+    next_tick: Mono,
+    /// After Ctrl-C: frames received until this moment are still recorded.
+    interrupted_at: Option<Mono>,
+}
+
+impl Schedule {
+    fn new(start: Mono, duration: Option<Duration>, is_live: bool) -> Schedule {
+        // A recording that is played back may contain other traffic for any time, and has an end of its own.
+        let timeout = if is_live { FIRST_SAMPLE_TIMEOUT } else { Duration::MAX };
+        Schedule {
+            start,
+            end: duration.map(|duration| start + duration),
+            give_up: start + duration.unwrap_or(timeout).min(timeout),
+            next_tick: start + TICK,
+            interrupted_at: None,
+        }
+    }
+
+    fn is_over(&self, now: Mono, rows: u64) -> bool {
+        self.end.is_some_and(|end| now >= end) || rows == 0 && now >= self.give_up
+    }
+}
+
+impl Recording<'_> {
+    /// Records until the end.
+    ///
+    /// # Errors
+    /// The bus failed, or the user ended the recording before its first row.
+    pub(in crate::tasks::log) fn run(
+        &mut self,
+        master: &mut Master<'_>,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Error> {
+        if let Some(buffer) = self.receive_buffer {
+            observer.note(&Note::Buffer(buffer), master.bus().now());
+        }
+        let start = master.now();
+        self.tally.extend_to(start);
+        for instrument in &self.instruments {
+            self.liveness.watch_heartbeat(instrument, start);
+        }
+        let mut producer = match self.plan.mode {
+            Mode::Sync(interval) => {
+                let id = self.instruments.first().map_or(CanId::SYNC, |first| first.sync);
+                Some(Producer::new(interval, id, start))
+            }
+            _ => None,
+        };
+        let result = self.run_loop(start, producer.as_mut(), master, observer);
+        self.timestamps = master.bus().timestamps();
+        if let Some(producer) = producer {
+            self.tally.syncs = producer.finish(master);
+        }
+        let late_drops = master.late_drops();
+        if late_drops > 0 {
+            self.tally.dropped += u64::from(late_drops);
+            observer.note(&Note::Dropped(late_drops), master.bus().now());
+        }
+        result
+    }
+
+    fn run_loop(
+        &mut self,
+        start: Mono,
+        mut producer: Option<&mut Producer>,
+        master: &mut Master<'_>,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Error> {
+        let mut schedule = Schedule::new(start, self.plan.duration, master.bus().is_live());
+        loop {
+            let until = self.next_deadline(&schedule, producer.as_deref());
+            let happening = match schedule.interrupted_at {
+                Some(at) => master.drain(at)?,
+                None => master.next(until)?,
+            };
+            if let Some(producer) = &mut producer {
+                producer.check_sent(master);
+            }
+            let flow = match happening {
+                Happening::Deadline => self.deadline(until, &mut schedule, producer.as_deref_mut(), master, observer),
+                Happening::Ended => ControlFlow::Break(()),
+                Happening::Interrupted => self.interrupt(&mut schedule, master)?,
+                other => self.received(other, master, observer)?,
+            };
+            if flow.is_break() {
+                return Ok(());
+            }
+        }
+    }
+
+    /// The moment at which the loop must act if nothing is received.
+    fn next_deadline(&self, schedule: &Schedule, producer: Option<&Producer>) -> Mono {
+        let give_up = (self.tally.rows == 0).then_some(schedule.give_up);
+        let poll = self.poll.as_ref().map(|poll| poll.due(schedule.start));
+        let reread = self.rereads.due().filter(|_| self.link_is_up);
+        let sync = producer.map(Producer::due);
+        let due = [give_up, schedule.end, sync, poll, reread].into_iter().flatten();
+        due.fold(schedule.next_tick, Mono::min)
+    }
+
+    /// Does what is due at `now`.
+    fn deadline(
+        &mut self,
+        now: Mono,
+        schedule: &mut Schedule,
+        producer: Option<&mut Producer>,
+        master: &mut Master<'_>,
+        observer: &mut dyn Observer,
+    ) -> ControlFlow<()> {
+        if let Some(at) = schedule.interrupted_at {
+            self.tally.extend_to(at);
+            return ControlFlow::Break(());
+        }
+        self.tally.extend_to(now);
+        if schedule.is_over(now, self.tally.rows) {
+            return ControlFlow::Break(());
+        }
+        if let Some(producer) = producer.filter(|producer| now >= producer.due()) {
+            observer.cycle(producer.slot(), master.bus().now())?;
+            producer.send(master);
+        }
+        if let Some(poll) = &mut self.poll {
+            if poll.due(schedule.start) <= now {
+                observer.cycle(poll.next_cycle(), master.bus().now())?;
+            }
+            self.tally.skipped += poll.start_due(schedule.start, now, master);
+        }
+        if self.link_is_up {
+            self.rereads.start_due(now, master);
+            self.report_losses(now, master, observer);
+        }
+        if now < schedule.next_tick {
+            return ControlFlow::Continue(());
+        }
+        schedule.next_tick = now + TICK;
+        observer.tick(master.bus().now(), self.tally.rows)
+    }
+
+    /// Ctrl-C. The first one still records the frames that were received before it; the second one does not wait.
+    fn interrupt(&mut self, schedule: &mut Schedule, master: &Master<'_>) -> Result<ControlFlow<()>, Error> {
+        let is_second = std::mem::replace(&mut self.interrupted, true);
+        if self.tally.rows == 0 {
+            return Err(Error::Interrupted);
+        }
+        if is_second || !master.bus().is_live() {
+            return Ok(ControlFlow::Break(()));
+        }
+        schedule.interrupted_at = Some(master.now());
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn received(
+        &mut self,
+        happening: Happening,
+        master: &mut Master<'_>,
+        observer: &mut dyn Observer,
+    ) -> Result<ControlFlow<()>, Error> {
+        match happening {
+            Happening::Frame(received) => return Ok(self.frame(&received, master, observer)),
+            Happening::Sdo(ticket, result) => return self.answer(ticket, result, master, observer),
+            Happening::Fault(fault, at) => self.fault(fault, at, master, observer),
+            Happening::Dropped(count) => self.dropped(count, master, observer),
+            Happening::Link(up) => self.link(up, master, observer),
+            Happening::Deadline | Happening::Ended | Happening::Interrupted => {}
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+}

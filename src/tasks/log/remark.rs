@@ -1,0 +1,56 @@
+//! What a recording reports besides its rows and counts.
+
+use crate::bus::ReceiveBuffer;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::pdo::TpdoNumber;
+use crate::master::SdoError;
+use crate::tasks::Failure;
+use std::time::Duration;
+
+/// Something to know about a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Remark {
+    /// The node has none of the requested signals.
+    NoRequestedSignal(NodeId),
+    /// Both nodes send TPDOs with this COB-ID: they make no rows.
+    SharedCobId(CanId, [NodeId; 2]),
+    /// A value could not be polled.
+    PollFailed(SdoError),
+    /// The node's setup changed while frames were lost: its rows of this time before may be wrong.
+    ChangedWhileFramesLost(NodeId, Duration),
+    /// The node could not be read again: its later frames made no rows.
+    NotReadAgain(NodeId),
+    /// These nodes were started. Their previous state is unknown, so they stay operational.
+    LeftOperational(Vec<NodeId>),
+    /// The nodes were not returned to their previous NMT states.
+    StatesNotRestored(Box<Failure>),
+    /// This many SYNC messages were omitted while the interface was down.
+    SyncsOmittedWhileDown(u64),
+    /// This many SYNC messages were omitted because the program was stopped or too slow.
+    SyncsOmittedTooSlow(u64),
+    /// Frames were dropped, and the kernel did not allow a larger receive buffer.
+    SmallReceiveBuffer(ReceiveBuffer),
+    /// The node sent no measurements, for this reason.
+    NoMeasurements(NodeId, SilenceReason),
+}
+
+/// Why a node sends no measurements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SilenceReason {
+    /// It does not answer SDO requests.
+    NoAnswer,
+    /// It has no TPDO.
+    NoTpdo,
+    /// Bit 31 of the COB-ID is set in all its TPDOs.
+    AllTpdosDisabled,
+    /// No object is mapped into its TPDOs.
+    NothingMapped,
+    /// This TPDO waits for SYNC, and no node sends SYNC.
+    WaitsForSync(TpdoNumber),
+    /// This TPDO has no event timer, and its value does not change enough.
+    NoEventTimer(TpdoNumber),
+    /// Its TPDOs have another length than their mapping.
+    WrongLength,
+    /// Its TPDOs are set up to be sent.
+    Unknown,
+}

@@ -1,0 +1,201 @@
+//! Nodes whose setup must be read again.
+//!
+//! Anything that may have changed the mapping, unit or digits of a node makes its setup uncertain. From then on its
+//! frames make no rows, until the setup was read again. A missing row is reported and counted; a row decoded with an
+//! old mapping would be a wrong number that looks right.
+
+use crate::bus::Mono;
+use crate::canopen::frame::Frame;
+use crate::canopen::id::NodeId;
+use crate::master::{Answer, Error, Master, SdoError, Ticket};
+use crate::node::Node;
+use crate::node::Overrides;
+use crate::node::survey::BackgroundSurvey;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// Another master that writes a mapping writes many objects: read after this time without a write.
+const WRITE_SETTLE_TIME: Duration = Duration::from_millis(500);
+/// Interval between two attempts to read a node that does not answer.
+const RETRY_INTERVAL: Duration = Duration::from_secs(1);
+/// Shortest interval between two rereads of a node because frames were lost. On an overloaded bus frames are lost
+/// all the time.
+const FRAMES_LOST_INTERVAL: Duration = Duration::from_secs(60);
+/// Shortest interval between two rereads of a node because of a wrong length, if nothing had changed.
+const WRONG_LENGTH_INTERVAL: Duration = Duration::from_secs(60);
+
+/// Why the setup of a node must be read again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum RereadReason {
+    /// The node restarted, or nothing could be received from it for a while. It may have to be started again.
+    Away,
+    /// Another master wrote an object that its TPDOs depend on.
+    Written,
+    /// A TPDO has another length than its mapping and made no row. Other TPDOs still make rows.
+    WrongLength,
+    /// Frames were lost, and among them perhaps a boot-up or a write. This is rare, and rows are missing anyway: the
+    /// node's frames still make rows. If its setup did change, the time since then is reported.
+    FramesLost,
+}
+
+/// A node to be read again.
+struct Pending {
+    /// When to start.
+    due: Mono,
+    survey: Option<BackgroundSurvey>,
+    was_away: bool,
+    /// Since when the node's frames make rows although its setup is uncertain.
+    recorded_since: Option<Mono>,
+    /// Whether a failed attempt was reported.
+    is_failure_reported: bool,
+}
+
+/// A node that was read again.
+pub(super) struct Reread {
+    pub(super) instrument: Node,
+    /// Whether it may have to be started again.
+    pub(super) was_away: bool,
+    /// Since when its frames made rows although its setup was uncertain.
+    pub(super) recorded_since: Option<Mono>,
+}
+
+/// The nodes to be read again.
+pub(super) struct Rereads {
+    overrides: Overrides,
+    pending: BTreeMap<NodeId, Pending>,
+    /// When each node was last to be read because of a wrong length.
+    wrong_lengths: BTreeMap<NodeId, Mono>,
+    /// When each node was last to be read because frames were lost.
+    frames_lost: BTreeMap<NodeId, Mono>,
+}
+
+impl Rereads {
+    pub(super) fn new(overrides: &Overrides) -> Rereads {
+        Rereads {
+            overrides: overrides.clone(),
+            pending: BTreeMap::new(),
+            wrong_lengths: BTreeMap::new(),
+            frames_lost: BTreeMap::new(),
+        }
+    }
+
+    /// Requests that a node is read again; a survey under way starts again. Returns `false` if there is no need.
+    pub(super) fn request(&mut self, node: NodeId, why: RereadReason, now: Mono, master: &mut Master<'_>) -> bool {
+        if why == RereadReason::WrongLength {
+            if self.wrong_lengths.get(&node).is_some_and(|&before| now.since(before) < WRONG_LENGTH_INTERVAL) {
+                return false;
+            }
+            self.wrong_lengths.insert(node, now);
+        }
+        let new =
+            || Pending { due: now, survey: None, was_away: false, recorded_since: None, is_failure_reported: false };
+        if why == RereadReason::FramesLost {
+            self.pending.entry(node).or_insert_with(|| {
+                let earliest = self.frames_lost.get(&node).map_or(now, |&before| before + FRAMES_LOST_INTERVAL);
+                let due = earliest.max(now + WRITE_SETTLE_TIME);
+                self.frames_lost.insert(node, due);
+                Pending { due, was_away: true, recorded_since: Some(now), ..new() }
+            });
+            return true;
+        }
+        let delay = if why == RereadReason::Written { WRITE_SETTLE_TIME } else { Duration::ZERO };
+        let pending = self.pending.entry(node).or_insert_with(new);
+        pending.due = now + delay;
+        pending.was_away |= why == RereadReason::Away;
+        if why != RereadReason::WrongLength {
+            pending.recorded_since = None;
+        }
+        if let Some(survey) = pending.survey.take() {
+            survey.cancel(master);
+        }
+        true
+    }
+
+    /// When the next survey starts.
+    pub(super) fn due(&self) -> Option<Mono> {
+        self.pending.values().filter(|pending| pending.survey.is_none()).map(|pending| pending.due).min()
+    }
+
+    /// Starts the surveys that are due.
+    pub(super) fn start_due(&mut self, now: Mono, master: &mut Master<'_>) {
+        for (&node, pending) in &mut self.pending {
+            if pending.survey.is_none() && pending.due <= now {
+                pending.survey = Some(BackgroundSurvey::begin(node, &self.overrides, master));
+            }
+        }
+    }
+
+    /// Whether this transfer belongs to a survey.
+    pub(super) fn has(&self, ticket: Ticket) -> bool {
+        self.pending.values().any(|pending| pending.has(ticket))
+    }
+
+    /// Takes the result of a transfer. Returns a node when all of it was read, and the first failure of a node.
+    pub(super) fn take(
+        &mut self,
+        ticket: Ticket,
+        result: &Result<Answer, SdoError>,
+        master: &mut Master<'_>,
+    ) -> Option<Result<Reread, (NodeId, Error)>> {
+        let (&node, pending) = self.pending.iter_mut().find(|(_, pending)| pending.has(ticket))?;
+        match pending.survey.as_mut()?.take(ticket, result, master)? {
+            Ok(instrument) => {
+                let (was_away, recorded_since) = (pending.was_away, pending.recorded_since);
+                self.pending.remove(&node);
+                Some(Ok(Reread { instrument, was_away, recorded_since }))
+            }
+            Err(error) => {
+                pending.survey = None;
+                pending.due = master.now() + RETRY_INTERVAL;
+                let is_first = !std::mem::replace(&mut pending.is_failure_reported, true);
+                is_first.then_some(Err((node, error)))
+            }
+        }
+    }
+
+    /// The mapping of a node has changed: the next wrong length is a reason again.
+    pub(super) fn forget_wrong_length(&mut self, node: NodeId) {
+        self.wrong_lengths.remove(&node);
+    }
+
+    /// The nodes whose frames make no rows.
+    pub(super) fn held(&self) -> impl Iterator<Item = NodeId> + '_ {
+        self.pending.iter().filter(|(_, pending)| pending.recorded_since.is_none()).map(|(&node, _)| node)
+    }
+}
+
+impl Pending {
+    fn has(&self, ticket: Ticket) -> bool {
+        self.survey.as_ref().is_some_and(|survey| survey.has(ticket))
+    }
+}
+
+/// The node whose setup this frame of another master changes: PDO parameters and mapping, unit, digits, and the COB-IDs
+/// and times of SYNC, emergency and heartbeat.
+pub(super) fn writes_setup(frame: &Frame) -> Option<NodeId> {
+    let node = frame.id().sdo_request_node()?;
+    let [command, low, high, ..] = frame.data() else { return None };
+    // The start of a download: expedited or segmented (1), or block (6).
+    if !matches!(command >> 5, 1 | 6) {
+        return None;
+    }
+    let index = u16::from_le_bytes([*low, *high]);
+    matches!(index, 0x1005 | 0x1014 | 0x1017 | 0x1800..=0x1bff | 0x6131 | 0x6132).then_some(node)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn writes_that_change_the_setup() {
+        let node = |text: &str| writes_setup(&text.parse().expect("a frame")).map(NodeId::get);
+        for text in ["605#2F001A0000000000", "605#2300180181010080", "605#2331610100004E00", "605#2131610104000000"] {
+            assert_eq!(node(text), Some(5), "{text}");
+        }
+        assert_eq!(node("67F#C2001A0104000000"), Some(127), "block download");
+        for text in ["605#40001A0000000000", "585#6000000000000000", "605#2B10610100000000", "605#", "605#A2001A01"] {
+            assert_eq!(node(text), None, "{text}");
+        }
+    }
+}
