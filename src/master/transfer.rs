@@ -14,7 +14,7 @@
 //! where it pays: see [`BlockMode::Auto`].
 
 use super::{Answer, Error, Happening, Master, Request, SdoError, Ticket};
-use crate::bus::BusError;
+use crate::bus::{BusError, Received};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, DownloadSize};
@@ -156,6 +156,19 @@ impl Master<'_> {
         request: Request,
         progress: &mut dyn FnMut(Moved),
     ) -> Result<Result<Answer, SdoError>, Error> {
+        self.carry_out_watching(request, progress, &mut |_| {})
+    }
+
+    /// Like [`Master::carry_out`]; frames that belong to no SDO transfer are given to `watch`.
+    ///
+    /// # Errors
+    /// Outside: bus errors and Ctrl-C. Inside: what the device does.
+    pub fn carry_out_watching(
+        &mut self,
+        request: Request,
+        progress: &mut dyn FnMut(Moved),
+        watch: &mut dyn FnMut(&Received),
+    ) -> Result<Result<Answer, SdoError>, Error> {
         let ticket = self.start(request);
         // From the latest moment known: a transfer that is over at once costs no look at the clock.
         let mut report_at = self.seen + REPORT_EVERY;
@@ -163,6 +176,7 @@ impl Master<'_> {
         loop {
             match self.next(report_at)? {
                 Happening::Sdo(ended, result) if ended == ticket => return Ok(result),
+                Happening::Frame(received) => watch(&received),
                 Happening::Deadline => {
                     // The first time only tells the time.
                     if let Some(moved) = self.moved(ticket).filter(|_| timed) {

@@ -1,5 +1,6 @@
 //! What is known of one node.
 
+use super::Overrides;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
@@ -51,6 +52,8 @@ pub struct Node {
     pub identity: Identity,
     /// The device description, if the node was recognised or the user named one.
     pub model: Option<Arc<Model>>,
+    /// Whether `model` was looked for: `None` then means an unknown device.
+    pub is_identified: bool,
     /// The signals.
     pub signals: Vec<Signal>,
     /// The TPDOs.
@@ -70,12 +73,19 @@ impl Node {
             id,
             identity: Identity::default(),
             model: None,
+            is_identified: false,
             signals: Vec::new(),
             tpdos: Vec::new(),
             heartbeat_ms: None,
             emergency: CanId::emergency(id),
             sync: CanId::SYNC,
         }
+    }
+
+    /// A node of which only the node-ID is known, with the description that the user named for it.
+    pub fn with_overrides(id: NodeId, overrides: &Overrides) -> Node {
+        let model = overrides.get(&id).cloned();
+        Node { is_identified: model.is_some(), model, ..Node::new(id) }
     }
 
     /// The part that decoding needs.

@@ -1,8 +1,22 @@
 //! One node that the program talks to: what is known of it, and the only ways to read it, write it and wait for it.
+//!
+//! A task gets a [`Node`] from [`survey`] (identity only, or everything that decoding needs), and passes it to
+//! - [`read`]: reads values, several nodes in parallel;
+//! - [`write`]: writes an object in the form that the node accepts, and says how it was confirmed;
+//! - [`wait`]: receives frames until a deadline, with one policy for Ctrl-C, link down and the end of a recording;
+//! - [`names`]: the objects, types and signals behind names.
+//!
+//! Errors are types ([`Error`]); their texts are in `output`.
 
+mod error;
 mod facts;
+pub mod names;
 pub mod read;
 pub mod survey;
+pub mod wait;
+pub mod write;
 
+pub use error::{Error, NameError};
 pub use facts::{Identity, Node};
 pub use survey::Overrides;
+pub use write::{Form, Repeat, WriteOptions, Written};

@@ -141,6 +141,7 @@ pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides)
         let given = overrides.get(&instrument.id).cloned();
         instrument.model = given.or_else(|| recognise(traits));
         instrument.identity = identity;
+        instrument.is_identified = true;
         if let Some(model) = &instrument.model {
             master.set_quirks(instrument.id, &model.description.quirks);
         }
@@ -322,6 +323,20 @@ fn read_units<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A:
             .map(Unit);
         signal.digits =
             values.next().flatten().as_ref().and_then(Value::as_u64).and_then(|digits| u8::try_from(digits).ok());
+    }
+    Ok(())
+}
+
+/// Reads the identity of a node whose description was not looked for yet.
+///
+/// # Errors
+/// A node that does not answer; bus errors and Ctrl-C.
+pub fn identify_late(master: &mut Master<'_>, node: &mut Node) -> Result<(), Error> {
+    if node.is_identified {
+        return Ok(());
+    }
+    if let Some(found) = identify(master, &[node.id], &Overrides::new())?.pop() {
+        (node.identity, node.model, node.is_identified) = (found.identity, found.model, true);
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::master::{Error, LssError, SdoError, SdoFailure};
 use crate::measure::expression::ExpressionError;
+use crate::node;
 use std::fmt;
 
 /// The kinds of failure that scripts tell apart.
@@ -167,6 +168,48 @@ impl From<Error> for Failure {
             Error::Bus(error) => error.into(),
             Error::Sdo(error) => error.into(),
             Error::Interrupted => Failure::new(Kind::Interrupted, "interrupted"),
+        }
+    }
+}
+
+impl From<node::Error> for Failure {
+    fn from(error: node::Error) -> Failure {
+        let of_object = |kind, node, object: ObjectId, message: String| Failure {
+            object: Some(object),
+            ..Failure::of_node(kind, node, message)
+        };
+        match error {
+            node::Error::Bus(error) => error.into(),
+            node::Error::Interrupted => Error::Interrupted.into(),
+            node::Error::Sdo(error) | node::Error::Unknown(error) => error.into(),
+            node::Error::NotKept { node, object, found, .. } => {
+                of_object(Kind::Unexpected, node, object, format!("{object} was acknowledged and reads {found}"))
+            }
+            node::Error::Width { node, object, width, given } => {
+                let message = format!(
+                    "write {object}: the object has {width} bytes, the value {given}, and the device accepts no size"
+                );
+                of_object(Kind::Usage, node, object, message)
+            }
+            node::Error::Value { node, object, error } => {
+                of_object(Kind::Usage, node, object, format!("write {object}: {error}"))
+            }
+            node::Error::TypeUnknown { node, object } => {
+                of_object(Kind::Usage, node, object, format!("write {object}: its type is unknown"))
+                    .hint(format!("state it: cangauge sdo write {node} {object} VALUE --type u32 (or i16, r32, vs)"))
+            }
+            node::Error::Name(error) => {
+                let source = error.title.unwrap_or_else(|| "the standard".to_owned());
+                let message = format!("{source} has no object \"{}\"", error.name);
+                let failure = Failure::of_node(Kind::Usage, error.node, message);
+                if error.nearest.is_empty() {
+                    failure
+                } else {
+                    failure.hint(format!("nearest: {}", error.nearest.join(", ")))
+                }
+            }
+            node::Error::Restarted(node) => Failure::of_node(Kind::Unexpected, node, "it has restarted"),
+            node::Error::NoBootUp(node) => Failure::of_node(Kind::NoAnswer, node, "no boot-up came after the reset"),
         }
     }
 }

@@ -1,0 +1,165 @@
+//! Names and types of a node's objects: from its description, else from the standard.
+
+use super::error::{Error, NameError};
+use super::{Node, survey};
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::{DataType, Value};
+use crate::device::description::ObjectEntry;
+use crate::device::dictionary::Entry;
+use crate::device::nearest::distance;
+use crate::device::standard;
+use crate::master::{Master, Request, SdoError, SdoFailure};
+use crate::measure::layout::{PROCESS_VALUES, Signal};
+
+impl Node {
+    /// The entry of an object, from the description or the standard. Asks the node nothing.
+    pub fn entry(&self, object: ObjectId) -> Option<Entry> {
+        let described = self.model.as_ref().and_then(|model| model.dictionary.get(object).cloned());
+        described.or_else(|| standard::entry(object))
+    }
+
+    /// The entry with this name, from the description or the standard. Asks the node nothing.
+    pub fn entry_by_name(&self, name: &str) -> Option<Entry> {
+        let described = self.model.as_ref().and_then(|model| model.dictionary.find(name).cloned());
+        described.or_else(|| standard::find(name))
+    }
+
+    /// What the description says about an object beyond its type.
+    pub fn described(&self, object: ObjectId) -> Option<&ObjectEntry> {
+        self.model.as_ref()?.description.object(object)
+    }
+
+    /// The name of an object; its address if it has none.
+    pub fn name_of(&self, object: ObjectId) -> String {
+        self.entry(object).map_or_else(|| object.to_string(), |entry| entry.full_name())
+    }
+
+    /// Whether the node can have an object. Without a description every object is possible.
+    pub fn may_have(&self, object: ObjectId) -> bool {
+        let model = self.model.as_ref();
+        model.is_none_or(|model| model.dictionary.is_empty() || model.dictionary.get(object).is_some())
+    }
+
+    /// Whether the description says that an object cannot be written.
+    pub fn is_read_only(&self, object: ObjectId) -> bool {
+        let described = self.model.as_ref().and_then(|model| model.dictionary.get(object));
+        described.is_some_and(|entry| !entry.access.is_writable())
+    }
+
+    /// The type of an object, from the description or the standard; `None` if it is unknown or the description leaves
+    /// it open.
+    pub fn known_type(&self, object: ObjectId) -> Option<DataType> {
+        let is_open = self.model.as_ref().is_some_and(|model| model.untyped.contains(&object));
+        self.entry(object).filter(|_| !is_open).map(|entry| entry.data_type)
+    }
+
+    /// The type of an object of the device profile: as [`Node::known_type`], else by the first digit of the index
+    /// (CiA 404), else UNSIGNED32.
+    pub fn data_type(&self, object: ObjectId) -> DataType {
+        if let Some(entry) = self.entry(object) {
+            return entry.data_type;
+        }
+        let family = PROCESS_VALUES.iter().find(|(index, _)| index >> 12 == object.index >> 12);
+        family.map_or(DataType::Unsigned(4), |&(_, data_type)| data_type)
+    }
+
+    /// The object of a signal in the family of its process value: `low` is the index without its first digit.
+    pub fn in_family(&self, signal: &Signal, low: u16) -> ObjectId {
+        ObjectId::new(signal.value.0.index & 0xf000 | low, signal.channel)
+    }
+
+    /// The object with this name that belongs to a signal: with its channel as sub-index, or without one on a device
+    /// with a single signal.
+    pub fn object_of(&self, signal: &Signal, name: &str) -> Option<ObjectId> {
+        let dictionary = &self.model.as_ref()?.dictionary;
+        let numbered = dictionary.find(&format!("{name}:{}", signal.channel));
+        let single = || dictionary.find(name).filter(|_| self.signals.len() == 1);
+        numbered.or_else(single).map(|entry| entry.object)
+    }
+
+    /// The signal with this name.
+    pub fn signal(&self, name: &str) -> Option<&Signal> {
+        self.signals.iter().find(|signal| signal.name == name)
+    }
+}
+
+/// The entry of an object. Reads the identity of the node if the object is not known without it.
+///
+/// # Errors
+/// A node that does not answer; bus errors and Ctrl-C.
+pub fn entry(master: &mut Master<'_>, node: &mut Node, object: ObjectId) -> Result<Option<Entry>, Error> {
+    if node.entry(object).is_none() {
+        survey::identify_late(master, node)?;
+    }
+    Ok(node.entry(object))
+}
+
+/// The object with this name. Reads the identity of the node if the name is not known without it.
+///
+/// # Errors
+/// [`Error::Name`] with similar names; a node that does not answer; bus errors and Ctrl-C.
+pub fn resolve(master: &mut Master<'_>, node: &mut Node, name: &str) -> Result<ObjectId, Error> {
+    if let Some(entry) = node.entry_by_name(name) {
+        return Ok(entry.object);
+    }
+    survey::identify_late(master, node)?;
+    if let Some(entry) = node.entry_by_name(name) {
+        return Ok(entry.object);
+    }
+    let known: Vec<String> = match &node.model {
+        Some(model) => model.dictionary.iter().map(Entry::full_name).collect(),
+        None => standard::names().collect(),
+    };
+    Err(Error::Name(NameError {
+        node: node.id,
+        name: name.to_owned(),
+        title: node.model.as_ref().map(|model| model.description.title.clone()),
+        nearest: nearest(name, known.into_iter()),
+    }))
+}
+
+/// The type for writing `text` to an object: from the description or the standard, else an integer as wide as the object
+/// if the node indicates its size.
+///
+/// # Errors
+/// [`Error::TypeUnknown`]; a node that does not answer; bus errors and Ctrl-C.
+pub fn type_for(master: &mut Master<'_>, node: &mut Node, object: ObjectId, text: &str) -> Result<DataType, Error> {
+    entry(master, node, object)?;
+    if let Some(data_type) = node.known_type(object) {
+        return Ok(data_type);
+    }
+    let uploaded = match master.transfer_one(Request::read(node.id, object))? {
+        Ok(answer) => answer.uploaded.filter(|uploaded| uploaded.indicated),
+        Err(SdoError { failure: SdoFailure::Refused(_), .. }) => None,
+        Err(error) => return Err(error.into()),
+    };
+    let is_integer = !text.contains(['.', 'e', 'E']) || text.starts_with("0x");
+    match uploaded.and_then(|uploaded| u8::try_from(uploaded.bytes.len()).ok()) {
+        Some(width @ 1..=8) if is_integer && text.starts_with('-') => Ok(DataType::Integer(width)),
+        Some(width @ 1..=8) if is_integer => Ok(DataType::Unsigned(width)),
+        _ => Err(Error::TypeUnknown { node: node.id, object }),
+    }
+}
+
+/// A value as bytes of a type.
+///
+/// # Errors
+/// [`Error::Value`] if it does not fit.
+pub fn encode(node: &Node, object: ObjectId, data_type: DataType, text: &str) -> Result<Vec<u8>, Error> {
+    data_type.encode_text(text).map_err(|error| Error::Value { node: node.id, object, error })
+}
+
+/// The known names that are most similar to a word, at most three, the nearest first.
+pub fn nearest(word: &str, known: impl Iterator<Item = String>) -> Vec<String> {
+    let mut near: Vec<(usize, String)> = known
+        .map(|known| (distance(word, &known), known))
+        .filter(|(distance, _)| *distance <= word.len() / 2)
+        .collect();
+    near.sort();
+    near.into_iter().take(3).map(|(_, name)| name).collect()
+}
+
+/// Bytes as a value of a type; the bytes if they do not fit.
+pub fn value_of(data: &[u8], data_type: DataType) -> Value {
+    super::error::shown(data, data_type)
+}

@@ -1,0 +1,159 @@
+//! The only wait loop: receives until a deadline, until the caller has what it waits for, or until the policy ends it.
+//!
+//! | | [`Policy::Command`] | [`Policy::Observe`] | [`Policy::Reconnect`] | [`Policy::Record`] |
+//! |---|---|---|---|---|
+//! | Ctrl-C | error, transfers aborted | normal end | error, transfers aborted | given to the caller |
+//! | link down | error | error | given to the caller | given to the caller |
+//! | link up again | given to the caller | given to the caller | given to the caller | given to the caller |
+//! | end of a recording | normal end | normal end | normal end | normal end |
+//! | dropped frames, faults | given to the caller | given to the caller | given to the caller | given to the caller |
+//!
+//! A dropped frame never ends a wait: a caller that needs the frame reaches its deadline. Frames, the ends of SDO
+//! transfers, faults and drop counts are given to the caller in the order in which they were received.
+
+use crate::bus::{BusError, Mono};
+use crate::master::{Error, Happening, Master};
+use std::ops::ControlFlow;
+
+/// What ends a wait, beside its deadline and its caller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Policy {
+    /// A step of a command: Ctrl-C and an interface that goes down are errors.
+    Command,
+    /// An observation until Ctrl-C: Ctrl-C is its normal end. An interface that goes down is an error.
+    Observe,
+    /// A step of a command that changes the bit rate: the interface may go down. Ctrl-C is an error.
+    Reconnect,
+    /// A recording: the interface may go down, and Ctrl-C is handled by the caller.
+    Record,
+}
+
+/// How a wait ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Waited<T> {
+    /// The caller has what it waited for.
+    Done(T),
+    /// The deadline passed.
+    Deadline,
+    /// The recording that is replayed ended.
+    Ended,
+    /// Ctrl-C ([`Policy::Observe`] and [`Policy::Record`] only).
+    Interrupted,
+}
+
+impl<T> Waited<T> {
+    /// The result, if the caller has what it waited for.
+    pub fn done(self) -> Option<T> {
+        match self {
+            Waited::Done(result) => Some(result),
+            Waited::Deadline | Waited::Ended | Waited::Interrupted => None,
+        }
+    }
+}
+
+/// Until when the next event may come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Until {
+    /// Wait for events until this moment.
+    Deadline(Mono),
+    /// Only deliver events that were received by this moment, without waiting for more.
+    Drained(Mono),
+}
+
+/// A wait whose deadline changes with what is received.
+pub trait Waiter {
+    /// What the wait returns.
+    type Output;
+    /// How it fails.
+    type Error: From<Error>;
+
+    /// Until when the next event may come. Called before each event.
+    fn until(&self) -> Until;
+
+    /// Handles an event: frames, ends of SDO transfers, faults, drop counts, and [`Happening::Deadline`] once the moment
+    /// of [`Waiter::until`] is reached; [`Happening::Ended`], and as the policy says [`Happening::Interrupted`] and
+    /// [`Happening::Link`].
+    ///
+    /// # Errors
+    /// An error ends the wait.
+    fn on_event(&mut self, master: &mut Master<'_>, event: Happening)
+    -> Result<ControlFlow<Self::Output>, Self::Error>;
+}
+
+/// Waits until the waiter breaks or fails, or the policy ends the wait.
+///
+/// # Errors
+/// Bus errors, what the policy treats as an error, and those of the waiter.
+pub fn run<W: Waiter>(master: &mut Master<'_>, policy: Policy, waiter: &mut W) -> Result<W::Output, W::Error> {
+    loop {
+        let event = match waiter.until() {
+            Until::Deadline(at) => master.next(at),
+            Until::Drained(at) => master.drain(at),
+        }?;
+        let event = apply(master, policy, event)?;
+        if let ControlFlow::Break(output) = waiter.on_event(master, event)? {
+            return Ok(output);
+        }
+    }
+}
+
+/// Waits until `until`, or until `on_event` breaks.
+///
+/// `on_event` receives frames, ends of SDO transfers, faults, drop counts, and changes of the link as the policy says.
+///
+/// # Errors
+/// Bus errors, and what the policy treats as an error.
+pub fn wait<T>(
+    master: &mut Master<'_>,
+    until: Mono,
+    policy: Policy,
+    on_event: impl FnMut(&mut Master<'_>, Happening) -> ControlFlow<T>,
+) -> Result<Waited<T>, Error> {
+    struct Simple<F>(Mono, F);
+
+    impl<T, F: FnMut(&mut Master<'_>, Happening) -> ControlFlow<T>> Waiter for Simple<F> {
+        type Output = Waited<T>;
+        type Error = Error;
+
+        fn until(&self) -> Until {
+            Until::Deadline(self.0)
+        }
+
+        fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<Waited<T>>, Error> {
+            Ok(match event {
+                Happening::Deadline => ControlFlow::Break(Waited::Deadline),
+                Happening::Ended => ControlFlow::Break(Waited::Ended),
+                Happening::Interrupted => ControlFlow::Break(Waited::Interrupted),
+                event => match (self.1)(master, event) {
+                    ControlFlow::Break(result) => ControlFlow::Break(Waited::Done(result)),
+                    ControlFlow::Continue(()) => ControlFlow::Continue(()),
+                },
+            })
+        }
+    }
+
+    run(master, policy, &mut Simple(until, on_event))
+}
+
+/// Lets time pass until `until`. Frames are ignored.
+///
+/// # Errors
+/// Bus errors, and what the policy treats as an error.
+pub fn pause(master: &mut Master<'_>, until: Mono, policy: Policy) -> Result<(), Error> {
+    wait(master, until, policy, |_, _| ControlFlow::<()>::Continue(())).map(|_| ())
+}
+
+/// Turns an event into an error if the policy says so.
+fn apply(master: &mut Master<'_>, policy: Policy, event: Happening) -> Result<Happening, Error> {
+    match (event, policy) {
+        (Happening::Interrupted, Policy::Command | Policy::Reconnect) => {
+            master.cancel();
+            Err(Error::Interrupted)
+        }
+        (Happening::Link(false), Policy::Command | Policy::Observe) => {
+            master.cancel();
+            Err(Error::Bus(BusError::Down(master.bus().name().to_owned())))
+        }
+        (event, _) => Ok(event),
+    }
+}

@@ -1,0 +1,260 @@
+//! The only way to write an object.
+//!
+//! An expedited download either contains its size (23h, 27h, 2Bh, 2Fh) or not (22h). Some devices accept only one of the
+//! two forms:
+//! 1. The first request has the form of the device description, else it contains the size.
+//! 2. If the node rejects the form (0504 0001h) or the length (0607 0010h), the other form is sent once. If that is
+//!    rejected as well, the first abort code is reported.
+//! 3. Before a value is sent without its size, the width of the object is checked. Otherwise a node would fill up a
+//!    narrower value: -5 as INTEGER16 would become 65531 in an INTEGER32.
+//! 4. A signature ("save", "load", "zero", a number with "set") starts an action. It is sent once and never repeated.
+//! 5. If no answer comes, a plain value is read back. A signature reads as something else, so its result is unknown.
+
+use super::Node;
+use super::error::{Error, shown};
+use crate::bus::Received;
+use crate::canopen::object::ObjectId;
+use crate::canopen::sdo::{AbortCode, DownloadSize};
+use crate::canopen::value::DataType;
+use crate::device::description::SizeIndication;
+use crate::master::{BlockMode, Master, Moved, Operation, Request, SdoError, SdoFailure};
+use std::time::Duration;
+
+/// Whether an expedited download contains its size.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Form {
+    /// As the device description says, else with the size; the other form if the node rejects the first one.
+    #[default]
+    Auto,
+    /// With the size.
+    Indicated,
+    /// Without the size (22h).
+    Omitted,
+}
+
+/// Whether a request without an answer may be sent again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Repeat {
+    /// It is repeated as often as the timing says, then the object is read back. Not for signatures.
+    #[default]
+    Repeatable,
+    /// The object is read back after each request. It is written again only if it holds another value.
+    Once,
+}
+
+/// Options of a write.
+pub struct WriteOptions<'a> {
+    /// Whether the request contains the size.
+    pub form: Form,
+    /// When block transfer is used.
+    pub blocks: BlockMode,
+    /// Whether a request without an answer may be sent again.
+    pub repeat: Repeat,
+    /// The shortest time-out for the answer. Writing to non-volatile memory takes up to 3 s.
+    pub at_least: Duration,
+    /// Called every 100 ms with the bytes transferred.
+    pub progress: &'a mut dyn FnMut(Moved),
+    /// Called with each frame that belongs to no SDO transfer.
+    pub watch: &'a mut dyn FnMut(&Received),
+}
+
+/// How a write was confirmed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Written {
+    /// The node acknowledged it.
+    Acknowledged,
+    /// No answer came, and the object was read back and holds the value.
+    ReadBack,
+}
+
+/// Writes an object with the default options.
+///
+/// # Errors
+/// As [`write_with`].
+pub fn write(master: &mut Master<'_>, node: &Node, object: ObjectId, data: &[u8]) -> Result<Written, Error> {
+    let (progress, watch) = (&mut |_| {}, &mut |_: &Received| {});
+    write_with(master, node, object, data, &mut WriteOptions::new(progress, watch))
+}
+
+/// Writes an object.
+///
+/// # Errors
+/// [`Error::Sdo`] if the object is known to be unchanged, [`Error::Unknown`] if no answer came and nothing proves whether
+/// the node carried out the write, [`Error::Width`] if the value is narrower than the object and the node accepts no
+/// size; bus errors and Ctrl-C.
+pub fn write_with(
+    master: &mut Master<'_>,
+    node: &Node,
+    object: ObjectId,
+    data: &[u8],
+    options: &mut WriteOptions<'_>,
+) -> Result<Written, Error> {
+    let mut attempts_left = master.timing().retries;
+    let mut sizes = sizes(node, options.form);
+    let mut first_refusal: Option<SdoError> = None;
+    // A rejected block transfer was not rejected for its form.
+    let is_expedited = (1..=4).contains(&data.len()) && options.blocks != BlockMode::Always;
+    let is_auto = options.form == Form::Auto && is_expedited;
+    if is_auto && sizes[0] == DownloadSize::Omitted {
+        check_width(master, node, object, data, options)?;
+    }
+    loop {
+        let request = request(master, node, object, data, sizes[0], options);
+        let Err(error) = master.carry_out_watching(request, options.progress, options.watch)? else {
+            return Ok(Written::Acknowledged);
+        };
+        match error.failure {
+            SdoFailure::Refused(AbortCode::COMMAND_SPECIFIER | AbortCode::LENGTH)
+                if is_auto && first_refusal.is_none() =>
+            {
+                sizes.reverse();
+                if sizes[0] == DownloadSize::Omitted
+                    && check_width(master, node, object, data, options).is_err_and(|error| !error.is_fatal())
+                {
+                    return Err(error.into());
+                }
+                first_refusal = Some(error);
+            }
+            SdoFailure::Refused(_) => return Err(first_refusal.unwrap_or(error).into()),
+            _ if error.operation == Operation::Read => return Err(error.into()),
+            _ if !may_be_lost(&error) => return Err(Error::Unknown(error)),
+            _ => match read_back(master, node, object, data, options)? {
+                Some(true) => return Ok(Written::ReadBack),
+                Some(false) if options.repeat == Repeat::Once && attempts_left > 0 => attempts_left -= 1,
+                Some(false) => return Err(error.into()),
+                None => return Err(Error::Unknown(error)),
+            },
+        }
+    }
+}
+
+/// Writes a value and reads it back.
+///
+/// # Errors
+/// As [`write`]; [`Error::NotKept`] if the object reads differently.
+pub fn write_and_verify(
+    master: &mut Master<'_>,
+    node: &Node,
+    object: ObjectId,
+    data: &[u8],
+    data_type: DataType,
+) -> Result<Written, Error> {
+    let written = write(master, node, object, data)?;
+    let found = master.read(node.id, object, data_type)??;
+    let wanted = shown(data, data_type);
+    if found == wanted {
+        return Ok(written);
+    }
+    Err(Error::NotKept { node: node.id, object, written: wanted, found })
+}
+
+/// Whether these bytes are a signature: "save", "load", "zero", or a number with "set".
+///
+/// A signature starts an action, and what the object reads afterwards is something else (2321h: the detected bit rate).
+pub fn is_signature(data: &[u8]) -> bool {
+    data == b"save" || data == b"load" || data == b"zero" || data.len() == 4 && data[1..] == *b"set"
+}
+
+impl<'a> WriteOptions<'a> {
+    /// The default options.
+    pub fn new(progress: &'a mut dyn FnMut(Moved), watch: &'a mut dyn FnMut(&Received)) -> WriteOptions<'a> {
+        WriteOptions {
+            form: Form::Auto,
+            blocks: BlockMode::Never,
+            repeat: Repeat::Repeatable,
+            at_least: Duration::ZERO,
+            progress,
+            watch,
+        }
+    }
+}
+
+/// The forms, in the order in which they are tried.
+fn sizes(node: &Node, form: Form) -> [DownloadSize; 2] {
+    let described = node.model.as_ref().map(|model| model.description.sdo.size);
+    match (form, described) {
+        (Form::Omitted, _) | (Form::Auto, Some(SizeIndication::Omitted)) => {
+            [DownloadSize::Omitted, DownloadSize::Indicated]
+        }
+        (Form::Indicated, _) | (Form::Auto, Some(SizeIndication::Indicated) | None) => {
+            [DownloadSize::Indicated, DownloadSize::Omitted]
+        }
+    }
+}
+
+fn request(
+    master: &Master<'_>,
+    node: &Node,
+    object: ObjectId,
+    data: &[u8],
+    size: DownloadSize,
+    options: &WriteOptions<'_>,
+) -> Request {
+    let request = Request::write(node.id, object, data.to_vec(), size).blocks(options.blocks.for_write(data.len()));
+    let request = if options.at_least > master.timing().timeout { request.within(options.at_least) } else { request };
+    if options.repeat == Repeat::Once || is_signature(data) { request.once() } else { request }
+}
+
+/// Checks that the object is not wider than the value. The width comes from the description, else from the object if
+/// the node indicates sizes. A signature fills its object.
+fn check_width(
+    master: &mut Master<'_>,
+    node: &Node,
+    object: ObjectId,
+    data: &[u8],
+    options: &mut WriteOptions<'_>,
+) -> Result<(), Error> {
+    if data.len() == 4 || is_signature(data) {
+        return Ok(());
+    }
+    let width = match node.known_type(object).and_then(DataType::width) {
+        Some(width) => Some(width),
+        None => {
+            let answer = master.carry_out_watching(Request::read(node.id, object), options.progress, options.watch)?;
+            let uploaded = answer.ok().and_then(|answer| answer.uploaded);
+            uploaded.filter(|uploaded| uploaded.indicated).map(|uploaded| uploaded.bytes.len())
+        }
+    };
+    match width {
+        Some(width) if width > data.len() => Err(Error::Width { node: node.id, object, width, given: data.len() }),
+        Some(_) | None => Ok(()),
+    }
+}
+
+/// Whether the object holds the value; `None` if that cannot be known: a signature, or an object that cannot be read.
+fn read_back(
+    master: &mut Master<'_>,
+    node: &Node,
+    object: ObjectId,
+    data: &[u8],
+    options: &mut WriteOptions<'_>,
+) -> Result<Option<bool>, Error> {
+    if is_signature(data) || data.is_empty() {
+        return Ok(None);
+    }
+    let answer = master.carry_out_watching(Request::read(node.id, object), options.progress, options.watch)?;
+    let Some(uploaded) = answer.ok().and_then(|answer| answer.uploaded) else { return Ok(None) };
+    // A node that does not indicate the size sends four bytes for every type.
+    let has_width = !uploaded.indicated || uploaded.bytes.len() == data.len();
+    Ok(Some(has_width && uploaded.bytes.get(..data.len()) == Some(data)))
+}
+
+/// Whether the request or its answer may have been lost. After any other failure the node may act later.
+fn may_be_lost(error: &SdoError) -> bool {
+    matches!(error.failure, SdoFailure::NoAnswer { .. } | SdoFailure::Ambiguous | SdoFailure::Disturbed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signatures_and_plain_values_are_distinguished() {
+        for signature in [&b"save"[..], b"load", b"zero", b"\x03set"] {
+            assert!(is_signature(signature));
+        }
+        for plain in [&b"sav"[..], b"evas", &[1, 2, 3, 4], b"set"] {
+            assert!(!is_signature(plain));
+        }
+    }
+}
