@@ -8,7 +8,7 @@ use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::{AbortCode, DownloadSize};
 use cangauge::canopen::value::{DataType, Value};
 use cangauge::device::catalog::{Model, built_in};
-use cangauge::device::description::{Access, ObjectEntry, Remap, SizeIndication};
+use cangauge::device::description::{Access, ObjectEntry, Remap, Signature, SizeIndication};
 use cangauge::device::dictionary::Entry;
 use cangauge::master::{Happening, Master, Request, SdoFailure, Timing};
 use cangauge::sim::{Device, Setup};
@@ -128,22 +128,14 @@ fn described(model: &Model) -> Vec<(Entry, &ObjectEntry)> {
     model.dictionary.iter().map(|entry| (entry.clone(), object(entry))).collect()
 }
 
-fn number(scalar: &Option<cangauge::device::description::Scalar>, data_type: DataType) -> Option<f64> {
+fn number(scalar: &Option<cangauge::device::scalar::Scalar>, data_type: DataType) -> Option<f64> {
     let bytes = scalar.as_ref()?.encode(data_type, node()).ok()?;
     data_type.decode(&bytes).ok()?.as_f64()
 }
 
 /// The numbers of `allow`.
 fn listed(described: &ObjectEntry) -> Vec<(f64, f64)> {
-    let parse = |text: &str| {
-        let hex = text.strip_prefix("0x").map(|digits| u32::from_str_radix(digits, 16).expect("hexadecimal"));
-        f64::from(hex.unwrap_or_else(|| text.parse().expect("a number")))
-    };
-    let range = |text: &String| match text.split_once('-') {
-        Some((low, high)) => (parse(low), parse(high)),
-        None => (parse(text), parse(text)),
-    };
-    described.allow.iter().map(range).collect()
+    described.allow.iter().map(|range| (f64::from(range.low), f64::from(range.high))).collect()
 }
 
 /// The lowest and the highest number of a type of integers.
@@ -322,22 +314,16 @@ fn is_sound(desk: &Desk<'_>, object: ObjectId, number: f64) -> bool {
 fn signatures_act_and_nothing_else_does() {
     for model in built_in() {
         for (entry, described) in described(model) {
-            let Some(signature) = described.signature.as_deref() else { continue };
+            let Some(signature) = described.signature else { continue };
             with_desk(model, |desk| {
                 let place = format!("{} {} {}", desk.name(), entry.object, entry.full_name());
                 let refused = Err(desk.listed(&[NOT_STORED]));
                 for wrong in [&b"evas"[..], b"SAVE", &[0; 4], b"lolo"] {
                     assert_eq!(desk.write(entry.object, wrong), refused, "{place}: {wrong:?}");
                 }
-                let right: &[u8] = match signature {
-                    "save" => b"save",
-                    "load" => b"load",
-                    "zero" => b"zero",
-                    "set" => b"\x03set",
-                    other => panic!("{place}: {other}"),
-                };
-                assert_eq!(desk.write(entry.object, right), Ok(()), "{place}");
-                if signature == "set" {
+                let right = if signature == Signature::Set { "\u{3}set" } else { signature.as_str() };
+                assert_eq!(desk.write(entry.object, right.as_bytes()), Ok(()), "{place}");
+                if signature == Signature::Set {
                     assert_eq!(desk.read(&entry), Ok(Value::Unsigned(3)), "{place}");
                 }
             });
@@ -444,7 +430,7 @@ fn every_object_says_what_it_is() {
 }
 
 fn index(object: &ObjectEntry) -> u16 {
-    object.objects().expect("an address").next().expect("one").index
+    object.at.first.index
 }
 
 #[test]

@@ -5,9 +5,10 @@
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::value::DataType;
-use cangauge::device::description::{Access, Scalar};
+use cangauge::device::description::Access;
 use cangauge::device::dictionary::{Dictionary, Entry};
 use cangauge::device::eds::{self, Eds};
+use cangauge::device::scalar::Scalar;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -37,7 +38,7 @@ fn default(eds: &Eds, name: &str) -> Option<Scalar> {
 }
 
 fn text(text: &str) -> Option<Scalar> {
-    Some(Scalar::Text(text.to_owned()))
+    Some(Scalar::from(text))
 }
 
 fn integer(number: i64) -> Option<Scalar> {

@@ -169,7 +169,7 @@ fn model(what: &str, eds: bool, global: &Global) -> anyhow::Result<Arc<Model>> {
             return Ok(model);
         }
         if !what.contains(['.', '/']) {
-            let names: Vec<&str> = catalog::built_in().iter().map(|model| model.description.name.as_str()).collect();
+            let names: Vec<&str> = catalog::names().collect();
             let message = format!("there is no built-in device \"{what}\"");
             let hint = format!("there are: {}; or name a file", names.join(", "));
             return Err(Failure::new(Kind::Usage, message).hint(hint).into());
@@ -193,7 +193,7 @@ fn model(what: &str, eds: bool, global: &Global) -> anyhow::Result<Arc<Model>> {
         return Ok(Arc::new(Model::from_eds(&eds)));
     }
     let text = String::from_utf8(bytes).map_err(|_| usage("it is no text".to_owned()))?;
-    Ok(Arc::new(Model::from_toml(&text).map_err(|error| usage(error.to_string()))?))
+    Ok(Arc::new(Model::from_toml(&text).map_err(|error| Failure::new(Kind::Usage, error.in_file(what)))?))
 }
 
 /// The nodes meant; `all` are those that a scan finds.

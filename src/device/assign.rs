@@ -1,22 +1,19 @@
 //! How a device is given its node-ID and bit rate: the ways that lead there, as data, and the indices that stand
 //! for bit rates.
 
-use super::description::{Description, from_text};
+use super::description::Description;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
-use serde::Deserialize;
 use std::collections::BTreeMap;
 
 /// One way to a new node-ID and bit rate. The first one that a description has is the one to take.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssignEntry {
     /// By which means.
     pub way: AssignWay,
     /// The NMT state that the device wants for it; any, where nothing is said.
     pub state: Option<AssignState>,
     /// Whether a device that does not answer LSS is asked once more in STOPPED.
-    #[serde(default)]
     pub retry_stopped: bool,
     /// Where the node-ID is written.
     pub node_id: Option<AssignPlace>,
@@ -26,16 +23,12 @@ pub struct AssignEntry {
     /// service for that.
     pub store: Option<ObjectId>,
     /// What brings it into force.
-    #[serde(default)]
     pub applies: Applies,
     /// No source prints it: it is done only when it is asked for by name.
-    #[serde(default)]
     pub unverified: bool,
     /// Page or table of the manual.
-    #[serde(default)]
     pub page: String,
     /// What the manual contradicts or leaves open.
-    #[serde(default)]
     pub doubt: String,
 }
 
@@ -58,8 +51,7 @@ impl AssignEntry {
 }
 
 /// By which means a device takes its node-ID and bit rate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssignWay {
     /// CiA 305.
     Lss,
@@ -68,8 +60,7 @@ pub enum AssignWay {
 }
 
 /// The NMT state that a device wants.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssignState {
     /// PRE-OPERATIONAL.
     PreOperational,
@@ -78,8 +69,7 @@ pub enum AssignState {
 }
 
 /// What brings a new node-ID or bit rate into force.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Applies {
     /// A reset of the node.
     #[default]
@@ -89,16 +79,13 @@ pub enum Applies {
 }
 
 /// An object that takes a node-ID or the index of a bit rate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AssignPlace {
     /// Where.
     pub object: ObjectId,
     /// Its type.
-    #[serde(rename = "type", deserialize_with = "from_text")]
     pub data_type: DataType,
     /// Whether the number goes with the signature: `nn 's' 'e' 't'`, that is 0x746573nn.
-    #[serde(default)]
     pub signature: bool,
 }
 
@@ -144,11 +131,7 @@ impl RateTable {
         let own = description.filter(|description| !description.bit_rates.is_empty());
         let auto = description.and_then(|description| description.auto_bit_rate);
         match own {
-            Some(description) => {
-                let rates = description.bit_rates.iter();
-                let rates = rates.filter_map(|(index, &rate)| Some((index.parse().ok()?, rate))).collect();
-                RateTable { rates, auto, source: RateSource::Device }
-            }
+            Some(description) => RateTable { rates: description.bit_rates.clone(), auto, source: RateSource::Device },
             None => RateTable { rates: STANDARD.into_iter().collect(), auto, source: RateSource::Standard },
         }
     }

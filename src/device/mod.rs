@@ -7,6 +7,7 @@ pub mod dictionary;
 pub mod eds;
 pub mod nearest;
 pub mod quirk;
+pub mod scalar;
 pub mod sensor;
 pub mod standard;
 pub mod unit;

@@ -1,10 +1,7 @@
 //! Deviations of real devices that data alone cannot express, each by name.
 
-use serde::Deserialize;
-
 /// A deviation from the standard. Each acts in one place, which names it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quirk {
     /// Uploads are answered with command specifier 60h that carries the data.
     ///

@@ -41,6 +41,7 @@
 //! ```
 
 mod file;
+mod values;
 
 use super::device::Device;
 use super::record::Recorder;

@@ -2,13 +2,14 @@
 //! (CiA 404: x100h, x130h, 6150h and what belongs to them).
 
 use super::filter::{self, Filter};
-use super::model::{Direction, Overload, Quantity};
+use super::model::{Direction, Quantity};
 use super::number;
 use super::objects::Objects;
+use super::setup::Setup;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::device::catalog::Model;
-use crate::device::description::{SignalEntry, SimChannel};
+use crate::device::description::SignalEntry;
 use crate::device::unit::Unit;
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -81,22 +82,16 @@ pub(super) struct Reading {
 }
 
 impl Channels {
-    pub(super) fn new(
-        model: &Model,
-        objects: &Objects,
-        channels: &[SimChannel],
-        overloads: &[(u8, Overload)],
-        seed: u64,
-        serial: u32,
-    ) -> Channels {
-        let sim = &model.description.sim;
+    pub(super) fn new(setup: &Setup, objects: &Objects) -> Channels {
+        let Setup { model, sim, channels, overloads, seed, serial, .. } = setup;
         let sample = Duration::from_micros(u64::from(sim.sample_us.unwrap_or(1000)));
         let list = model.description.signals.iter().filter_map(|signal| {
             let channel = channels.iter().find(|channel| channel.channel == signal.channel)?.clone();
             let mine = overloads.iter().filter(|(number, _)| *number == signal.channel);
             let mine = mine.map(|(_, overload)| *overload).collect();
-            let quantity = Quantity::new(channel, sample, sim.overload_percent, mine, seed, serial);
-            Some(Channel::new(signal, quantity, model, objects))
+            let quantity = Quantity::new(channel, sample, sim.overload_percent, mine, *seed, *serial);
+            let filter = Filter::new(&model.description, signal.channel, sim.mean_until_pdo);
+            Some(Channel::new(signal, quantity, filter, model, objects))
         });
         let list: Vec<Channel> = list.collect();
         let mut shown = BTreeMap::new();
@@ -254,13 +249,13 @@ impl Channels {
 }
 
 impl Channel {
-    fn new(signal: &SignalEntry, quantity: Quantity, model: &Model, objects: &Objects) -> Channel {
+    fn new(signal: &SignalEntry, quantity: Quantity, filter: Filter, model: &Model, objects: &Objects) -> Channel {
         let sub = signal.channel;
         let in_family =
             |(low, kind): (u16, Kind)| FAMILIES.iter().map(move |family| (ObjectId::new(family | low, sub), kind));
         let offset = (ObjectId::new(0x6127, sub), Kind::Distance);
         let described = model.description.objects.iter().filter(|entry| entry.follows_unit == Some(sub));
-        let described = described.flat_map(|entry| entry.objects().into_iter().flatten());
+        let described = described.flat_map(|entry| entry.objects());
         let follows = IN_PV_UNIT
             .into_iter()
             .flat_map(in_family)
@@ -268,7 +263,6 @@ impl Channel {
             .chain(described.map(|object| (object, Kind::Distance)))
             .filter(|(object, _)| objects.has(*object))
             .collect();
-        let filter = Filter::new(&model.description, sub);
         Channel { signal: signal.clone(), quantity, filter, seen: None, follows }
     }
 
@@ -402,6 +396,7 @@ mod tests {
     use super::*;
     use crate::canopen::id::NodeId;
     use crate::device::catalog;
+    use crate::sim::Overload;
 
     fn id(text: &str) -> ObjectId {
         text.parse().expect("an object")
@@ -411,11 +406,13 @@ mod tests {
 
     /// A device whose every channel stands still at `base`, given in its own unit.
     fn still(name: &str, base: f64, overloads: &[(u8, Overload)]) -> (Objects, Channels) {
-        let model = catalog::by_name(name).expect("built in");
-        let objects = Objects::new(&model, NodeId::new(5).expect("a node-ID"));
-        let still = |channel: &SimChannel| SimChannel { base, amplitude: 0.0, noise: 0.0, ..channel.clone() };
-        let channels: Vec<SimChannel> = model.description.sim.channels.iter().map(still).collect();
-        let channels = Channels::new(&model, &objects, &channels, overloads, 1, 1);
+        let mut setup = Setup::new(catalog::by_name(name).expect("built in"), NodeId::new(5).expect("a node-ID"));
+        for channel in &mut setup.channels {
+            (channel.base, channel.amplitude, channel.noise) = (base, 0.0, 0.0);
+        }
+        setup.overloads = overloads.to_vec();
+        let objects = Objects::new(&setup.model, NodeId::new(5).expect("a node-ID"));
+        let channels = Channels::new(&setup, &objects);
         (objects, channels)
     }
 
@@ -506,7 +503,7 @@ mod tests {
     fn extremes_are_those_of_what_was_looked_at() {
         let model = catalog::by_name("mh4").expect("built in");
         let objects = Objects::new(&model, NodeId::new(5).expect("a node-ID"));
-        let mut channels = Channels::new(&model, &objects, &model.description.sim.channels, &[], 1, 1);
+        let mut channels = Channels::new(&Setup::new(model, NodeId::MIN), &objects);
         let mut values = Vec::new();
         for millisecond in 0..200 {
             let at = Duration::from_millis(millisecond * 100);

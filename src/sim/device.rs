@@ -11,7 +11,7 @@ use super::objects::{Area, Objects};
 use super::record::{Line, Recorder, line, plain};
 use super::sdo_server::SdoServer;
 use super::settings::{Pair, Rate, Settings};
-use super::setup::{GoneAfter, Setup};
+use super::setup::{GoneAfter, SERIAL_NUMBER, Setup};
 use super::tpdo::{Cause, Tpdo};
 use crate::bus::memory::{Outbox, Station, Tuning};
 use crate::bus::time::Mono;
@@ -30,7 +30,6 @@ const RECONNECT: Duration = Duration::from_millis(10);
 const COB_ID_SYNC: ObjectId = ObjectId::new(0x1005, 0);
 const GUARD_TIME: ObjectId = ObjectId::new(0x100c, 0);
 const HEARTBEAT_TIME: ObjectId = ObjectId::new(0x1017, 0);
-const SERIAL_NUMBER: ObjectId = ObjectId::new(0x1018, 4);
 const NMT_STARTUP: ObjectId = ObjectId::new(0x1f80, 0);
 /// CAN overrun and SYNC length: the code that CiA 301 has for a SYNC with unexpected bytes.
 const SYNC_LENGTH: u16 = 0x8240;
@@ -91,7 +90,7 @@ impl Device {
                 .map_err(|error| format!("{object}: {error}"))?;
             objects.preset(*object, bytes);
         }
-        let channels = Channels::new(model, &objects, &setup.channels, &setup.overloads, setup.seed, setup.serial);
+        let channels = Channels::new(&setup, &objects);
         let tpdos = Tpdo::all(&objects);
         let answers_60 = description.quirks.contains(&Quirk::UploadAnswered60);
         let sdo = SdoServer::new(description.sdo.clone(), answers_60);
@@ -100,7 +99,7 @@ impl Device {
         let settings = Settings::new(description, &objects, pair);
         let memory = Memory { node, settings, objects, channels, emergencies, remap: description.pdo.remap };
         let oddities = &setup.oddities;
-        let lss = Slave::new(description.sim.lss.clone(), oddities.refuse.clone(), oddities.scans_for_ever);
+        let lss = Slave::new(setup.sim.lss.clone(), oddities.refuse.clone(), oddities.scans_for_ever);
         Ok(Device {
             setup,
             memory,
@@ -369,7 +368,7 @@ impl Device {
     fn look_for_overload(&mut self, now: Mono) {
         let time = now.since_start();
         self.overload_look = self.memory.channels.next_overload_change(time).map(Mono::at);
-        let Some(code) = self.setup.model.description.sim.overload_emcy else { return };
+        let Some(code) = self.setup.sim.overload_emcy else { return };
         let Memory { objects, channels, emergencies, .. } = &mut self.memory;
         for (channel, overload) in channels.overloads(time) {
             match overload {

@@ -3,7 +3,6 @@
 
 use super::model::Quantity;
 use super::objects::Objects;
-use crate::canopen::id::parse_u32;
 use crate::canopen::object::ObjectId;
 use crate::device::description::Description;
 use std::collections::BTreeMap;
@@ -52,9 +51,8 @@ pub(super) struct Filter {
 
 impl Filter {
     /// That of a channel as its device describes it; without 61A0h there is none, whatever is asked.
-    pub(super) fn new(description: &Description, channel: u8) -> Filter {
+    pub(super) fn new(description: &Description, channel: u8, until_pdo: bool) -> Filter {
         let codes = description.object(ObjectId::new(TYPE, channel)).map(|entry| &entry.values);
-        let until_pdo = description.sim.mean_until_pdo;
         let kinds = codes.into_iter().flatten().filter_map(|(code, meaning)| {
             let kind = match meaning.as_str() {
                 "moving average" => Kind::Moving,
@@ -62,7 +60,7 @@ impl Filter {
                 "repeating average" => Kind::Repeating,
                 _ => return None,
             };
-            Some((parse_u32(code)?, kind))
+            Some((u32::try_from(*code).ok()?, kind))
         });
         Filter {
             channel,
@@ -189,7 +187,7 @@ mod tests {
 
     fn filter(kind: Kind, constant: u64) -> Filter {
         let mh4 = catalog::by_name("mh4").expect("built in");
-        Filter { kind, constant, ..Filter::new(&mh4.description, 1) }
+        Filter { kind, constant, ..Filter::new(&mh4.description, 1, false) }
     }
 
     /// What shows after each of the samples.
@@ -213,7 +211,8 @@ mod tests {
     #[test]
     fn codes_are_those_of_the_description() {
         let of = |name: &str, channel: u8| {
-            let kinds = Filter::new(&catalog::by_name(name).expect("built in").description, channel).kinds;
+            let kinds =
+                Filter::new(&catalog::by_name(name).expect("built in").description, channel, name == "mc1609").kinds;
             [0, 1, 2].map(|code| kinds.get(&code).copied())
         };
         assert_eq!(of("mh4", 1), [None, Some(Kind::Moving), Some(Kind::Repeating)]);
@@ -310,7 +309,7 @@ mod tests {
         let mh4 = catalog::by_name("mh4").expect("built in");
         let mut objects = Objects::new(&mh4, NodeId::new(5).expect("a node-ID"));
         let (quantity, at) = (noisy(Vec::new()), Duration::from_millis);
-        let mut filter = Filter::new(&mh4.description, 1);
+        let mut filter = Filter::new(&mh4.description, 1, false);
         filter.begin(&objects, &quantity, at(3));
         assert_eq!(filter.value(&quantity, at(100)), quantity.sample(100), "none as delivered");
         let [kind, constant] = [TYPE, CONSTANT].map(|index| ObjectId::new(index, 1));

@@ -2,7 +2,7 @@
 
 use super::settings::Settings;
 use crate::canopen::id::NodeId;
-use crate::device::description::SimLss;
+use crate::sim::data::SimLss;
 use std::collections::BTreeMap;
 use std::time::Duration;
 

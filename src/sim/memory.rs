@@ -4,13 +4,13 @@
 use super::abort::Abort;
 use super::channels::Channels;
 use super::emergency::Emergencies;
-use super::objects::{Group, Objects, Signature};
+use super::objects::{Group, Objects};
 use super::sdo_server::Dictionary;
 use super::settings::Settings;
 use super::tpdo;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::device::description::Remap;
+use crate::device::description::{Remap, Signature};
 use crate::device::unit::Unit;
 use std::time::Duration;
 

@@ -11,6 +11,7 @@
 mod abort;
 mod bench;
 mod channels;
+mod data;
 mod device;
 mod emergency;
 mod filter;
@@ -30,6 +31,7 @@ mod tpdo;
 
 pub use abort::Abort;
 pub use bench::{Bench, BenchError};
+pub use data::{SimChannel, SimData, SimLss, SimState};
 pub use device::Device;
 pub use model::{Direction, Overload};
 pub use nmt::State;

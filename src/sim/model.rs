@@ -1,6 +1,6 @@
 //! The quantity that a simulated channel measures: a pure function of seed and time.
 
-use crate::device::description::SimChannel;
+use crate::sim::data::SimChannel;
 use std::time::Duration;
 
 /// Which side of the measuring range the quantity has left.

@@ -6,8 +6,9 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::device::catalog::Model;
-use crate::device::description::{Access, ObjectEntry, Scalar, parse_range};
+use crate::device::description::{Access, ObjectEntry, Signature, StoreGroup};
 use crate::device::quirk::Quirk;
+use crate::device::scalar::{NumberRange, Scalar};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -22,44 +23,20 @@ pub(super) struct Spec {
     access: Access,
     low: Option<f64>,
     high: Option<f64>,
-    allow: Vec<(u32, u32)>,
+    allow: Vec<NumberRange>,
     default: Option<Scalar>,
     group: Option<Group>,
 }
 
-/// What must be written to an object that does something instead of holding a value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Signature {
-    /// "save": keeps parameters beyond a reset.
-    Save,
-    /// "load": forgets the kept ones.
-    Load,
-    /// "zero": autozero, or forgets minimum and maximum.
-    Zero,
-    /// "set" behind the value: node-ID and bit rate.
-    Set,
-}
-
-impl Signature {
-    fn read(text: &str) -> Option<Signature> {
-        Some(match text {
-            "save" => Signature::Save,
-            "load" => Signature::Load,
-            "zero" => Signature::Zero,
-            "set" => Signature::Set,
-            _ => return None,
-        })
-    }
-
-    /// Whether these bytes carry the signature. "set" leaves the lowest byte to the value.
-    fn fits(self, bytes: &[u8]) -> bool {
-        match self {
-            Signature::Save => bytes == b"save",
-            Signature::Load => bytes == b"load",
-            Signature::Zero => bytes == b"zero",
-            Signature::Set => bytes.get(1..) == Some(b"set"),
-        }
-    }
+/// Whether these bytes carry the signature. "set" leaves the lowest byte to the value.
+fn is_signed(signature: Signature, bytes: &[u8]) -> bool {
+    let word: &[u8] = match signature {
+        Signature::Save => b"save",
+        Signature::Load => b"load",
+        Signature::Zero => b"zero",
+        Signature::Set => return bytes.get(1..) == Some(b"set"),
+    };
+    bytes == word
 }
 
 /// Parameters that are saved and restored together.
@@ -84,18 +61,19 @@ impl Group {
         })
     }
 
-    fn read(text: &str) -> Option<Group> {
-        Some(match text {
-            "all" => Group::All,
-            "comm" => Group::Communication,
-            "app" => Group::Application,
-            _ => return None,
-        })
-    }
-
     /// Whether a command for `self` reaches an entry of group `entry`.
     fn reaches(self, entry: Group) -> bool {
         self == Group::All || self == entry
+    }
+}
+
+impl From<StoreGroup> for Group {
+    fn from(group: StoreGroup) -> Group {
+        match group {
+            StoreGroup::All => Group::All,
+            StoreGroup::Communication => Group::Communication,
+            StoreGroup::Application => Group::Application,
+        }
     }
 }
 
@@ -133,7 +111,7 @@ impl Objects {
     pub(super) fn new(model: &Model, node: NodeId) -> Objects {
         let mut specs = BTreeMap::new();
         for entry in &model.description.objects {
-            for object in entry.objects().into_iter().flatten() {
+            for object in entry.objects() {
                 specs.insert(object, Spec::new(entry));
             }
         }
@@ -246,7 +224,7 @@ impl Objects {
     pub(super) fn check_write(&self, object: ObjectId, bytes: &[u8]) -> Result<&Spec, Abort> {
         let spec = self.check_length(object, bytes)?;
         if let Some(signature) = spec.signature {
-            return if signature.fits(bytes) { Ok(spec) } else { Err(Abort::NOT_STORED) };
+            return if is_signed(signature, bytes) { Ok(spec) } else { Err(Abort::NOT_STORED) };
         }
         if spec.only_if_zero.iter().any(|&other| self.number(other) != 0) && bytes.iter().any(|&byte| byte != 0) {
             return Err(Abort::NOT_STORED);
@@ -307,23 +285,19 @@ fn is_cob_id(object: ObjectId) -> bool {
 
 impl Spec {
     fn new(entry: &ObjectEntry) -> Spec {
-        let limit = |scalar: &Option<Scalar>| match scalar {
-            Some(Scalar::Integer(number)) => Some(*number as f64),
-            Some(Scalar::Real(number)) => Some(*number),
-            Some(Scalar::Text(_)) | None => None,
-        };
+        let limit = |scalar: &Option<Scalar>| scalar.as_ref().and_then(Scalar::as_f64);
         Spec {
             name: entry.name.clone(),
             data_type: entry.data_type,
             pdo: entry.pdo,
-            signature: entry.signature.as_deref().and_then(Signature::read),
+            signature: entry.signature,
             only_if_zero: entry.only_if_zero.clone(),
             access: entry.access,
             low: limit(&entry.low),
             high: limit(&entry.high),
-            allow: entry.allow.iter().filter_map(|part| parse_range(part)).collect(),
+            allow: entry.allow.clone(),
             default: entry.default.clone(),
-            group: entry.stored.as_deref().and_then(Group::read),
+            group: entry.stored.map(Group::from),
         }
     }
 
@@ -348,8 +322,7 @@ impl Spec {
         if self.low.is_some_and(|low| number < low) {
             return Err(Abort::TOO_LOW);
         }
-        let listed = |&(low, high): &(u32, u32)| f64::from(low) <= number && number <= f64::from(high);
-        if !self.allow.is_empty() && !self.allow.iter().any(listed) {
+        if !self.allow.is_empty() && !self.allow.iter().any(|range| range.contains(number)) {
             return Err(Abort::VALUE);
         }
         Ok(())

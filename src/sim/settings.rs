@@ -55,11 +55,8 @@ struct Place {
 
 impl Settings {
     pub(super) fn new(description: &Description, objects: &Objects, pair: Pair) -> Settings {
-        let mut codes: Vec<(u8, Rate)> = description
-            .bit_rates
-            .iter()
-            .filter_map(|(code, rate)| Some((code.parse().ok()?, Rate::At(*rate))))
-            .collect();
+        let mut codes: Vec<(u8, Rate)> =
+            description.bit_rates.iter().map(|(code, rate)| (*code, Rate::At(*rate))).collect();
         if codes.is_empty() {
             codes = STANDARD.map(|(code, rate)| (code, Rate::At(rate))).to_vec();
         }

@@ -1,19 +1,25 @@
 //! What a simulated device is told when it is put together.
 
+use super::data::{SimChannel, SimData};
 use super::model::Overload;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::device::catalog::Model;
-use crate::device::description::{Scalar, SimChannel};
+use crate::device::scalar::Scalar;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
+
+/// 1018h:4.
+pub(super) const SERIAL_NUMBER: ObjectId = ObjectId::new(0x1018, 4);
 
 /// What a device is told when it is put together.
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// Its kind.
     pub model: Arc<Model>,
+    /// How its kind is simulated.
+    pub sim: SimData,
     /// Its node-ID; none: it is unconfigured, and only LSS reaches it.
     pub node: Option<NodeId>,
     /// Its bit rate in bit/s; none: that of the bus on which its power comes on first.
@@ -64,10 +70,13 @@ pub enum GoneAfter {
 impl Setup {
     /// A device as its description has it.
     pub fn new(model: Arc<Model>, node: NodeId) -> Setup {
-        let sim = &model.description.sim;
-        let (serial, channels) = (sim.serial, sim.channels.clone());
+        let sim = SimData::of(&model);
+        let channels = sim.channels.clone();
+        let serial = model.dictionary.get(SERIAL_NUMBER).and_then(|entry| entry.default_bytes(node));
+        let serial = serial.and_then(|bytes| bytes.try_into().ok()).map_or(1, u32::from_le_bytes);
         Setup {
             model,
+            sim,
             node: Some(node),
             bit_rate: None,
             serial,

@@ -11,6 +11,7 @@ mod samples;
 pub use safety::Limit;
 
 use crate::canopen::id::NodeId;
+use crate::device::description::StoreGroup;
 use crate::device::unit::Unit;
 use crate::master::{Master, SdoFailure};
 use crate::measure::sample::Number;
@@ -381,9 +382,9 @@ fn group(master: &mut Master<'_>, device: &Node, channel: &Channel, stores: bool
     let described = device.model.iter().flat_map(|model| &model.description.objects);
     let entry = described
         .filter(|entry| entry.stored.is_some())
-        .find(|entry| entry.objects().into_iter().flatten().any(|object| channel.offsets.first() == Some(&object)));
-    match entry.and_then(|entry| entry.stored.as_deref()) {
-        Some(stored) if stored == Group::Application.as_str() => Ok(Group::Application),
+        .find(|entry| channel.offsets.first().is_some_and(|&offset| entry.at.contains(offset)));
+    match entry.and_then(|entry| entry.stored) {
+        Some(StoreGroup::Application) => Ok(Group::Application),
         Some(_) => Ok(Group::All),
         None if !stores => Ok(Group::All),
         None => match store::plan(master, device, Group::Application) {

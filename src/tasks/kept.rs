@@ -62,8 +62,8 @@ pub(super) fn objects(device: &Node, groups: &[Group]) -> Vec<ObjectId> {
             .iter()
             // Node-ID and bit rate have their own way, and read as what they will be.
             .filter(|entry| entry.signature.is_none() && entry.access.is_readable())
-            .filter(|entry| entry.stored.as_deref().is_some_and(reached))
-            .flat_map(|entry| entry.objects().into_iter().flatten())
+            .filter(|entry| entry.stored.is_some_and(|group| reached(group.as_str())))
+            .flat_map(|entry| entry.objects())
             .collect();
     }
     let mut objects = Vec::new();
@@ -117,7 +117,7 @@ pub(super) fn not_kept(master: &mut Master<'_>, device: &Node) -> Result<Vec<Str
         .filter(|entry| entry.access == Access::Rw && entry.signature.is_none() && entry.stored.is_none())
         // What the device writes by itself is no setting.
         .filter(|entry| entry.name != "error-count")
-        .flat_map(|entry| entry.objects().into_iter().flatten())
+        .flat_map(|entry| entry.objects())
         .collect();
     let held = hold(master, device, &objects)?;
     let changed = held.iter().filter(|held| default(device, held.object).is_some_and(|default| default != held.bytes));
@@ -132,8 +132,7 @@ pub(super) fn default(device: &Node, object: ObjectId) -> Option<Vec<u8>> {
 /// Whether the default of an object is printed, or only likely, or depends on the piece.
 pub(super) fn default_is_sure(device: &Node, object: ObjectId) -> bool {
     let Some(entries) = marked(device) else { return false };
-    let is_it = |entry: &&ObjectEntry| entry.objects().into_iter().flatten().any(|other| other == object);
-    entries.iter().find(is_it).is_some_and(|entry| entry.doubt.is_empty())
+    entries.iter().find(|entry| entry.at.contains(object)).is_some_and(|entry| entry.doubt.is_empty())
 }
 
 /// The NMT state of a node, where something tells it.

@@ -4,6 +4,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::canopen::value::DataType;
+use crate::device::description::StoreGroup;
 use crate::device::quirk::Quirk;
 use crate::master::{Master, SdoError, SdoFailure};
 use crate::node::Node;
@@ -120,10 +121,8 @@ pub fn plan(master: &mut Master<'_>, device: &Node, group: Group) -> Result<Plan
             custom.join(", ")
         ));
         let only_all = device.model.iter().flat_map(|model| &model.description.objects);
-        let only_all: Vec<&str> = only_all
-            .filter(|entry| entry.stored.as_deref() == Some(Group::All.as_str()))
-            .map(|entry| entry.name.as_str())
-            .collect();
+        let only_all: Vec<&str> =
+            only_all.filter(|entry| entry.stored == Some(StoreGroup::All)).map(|entry| entry.name.as_str()).collect();
         if !only_all.is_empty() {
             notes.push(format!("all alone keeps these, they were not stored: {}", only_all.join(", ")));
         }

@@ -12,7 +12,7 @@ use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::value::DataType;
 use cangauge::device::catalog::Model;
-use cangauge::device::description::Scalar;
+use cangauge::device::scalar::Scalar;
 use cangauge::sim::{Device, Direction, GoneAfter, Overload, Recorder, Setup, State};
 use cangauge::tasks::lss::LssAddress;
 use std::sync::Arc;

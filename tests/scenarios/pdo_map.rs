@@ -8,7 +8,7 @@ use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::pdo::TpdoNumber;
 use cangauge::device::catalog::by_name;
-use cangauge::device::description::Scalar;
+use cangauge::device::scalar::Scalar;
 use cangauge::master::{Master, Timing};
 use cangauge::sim::{Device, Setup, State};
 use cangauge::tasks::pdo::{Item, Mapped, Send, Wish, map};

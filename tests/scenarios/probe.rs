@@ -5,7 +5,7 @@ use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::device::catalog;
-use cangauge::device::description::Scalar;
+use cangauge::device::scalar::Scalar;
 use cangauge::master::{Error, Master, Timing};
 use cangauge::sim::{Device, Setup};
 use cangauge::tasks::nmt::probe;

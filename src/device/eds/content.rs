@@ -7,7 +7,8 @@ use super::text::quoted;
 use super::{ObjectFlags, value};
 use crate::canopen::id::NodeId;
 use crate::canopen::value::DataType;
-use crate::device::description::{Access, Scalar};
+use crate::device::description::Access;
+use crate::device::scalar::Scalar;
 
 /// The object type DOMAIN (CiA 301, table 42).
 const DOMAIN: i128 = 2;

@@ -19,8 +19,8 @@ mod sections;
 mod text;
 mod value;
 
-use super::description::Scalar;
 use super::dictionary::Dictionary;
+use super::scalar::Scalar;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use std::collections::{BTreeMap, BTreeSet};

@@ -7,8 +7,8 @@ use super::sections::{self, Parts};
 use super::text::{quoted, shown};
 use super::{ObjectFlags, Warning, value};
 use crate::canopen::object::ObjectId;
-use crate::device::description::Scalar;
 use crate::device::dictionary::Entry;
+use crate::device::scalar::Scalar;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The object dictionary before its entries have names.

@@ -4,7 +4,8 @@ use super::ini::without_comment;
 use super::text::quoted;
 use crate::canopen::id::NodeId;
 use crate::canopen::value::{DataType, ValueError, parse_hex};
-use crate::device::description::{Access, Scalar};
+use crate::device::description::Access;
+use crate::device::scalar::Scalar;
 
 /// What was read, and what is doubtful about it.
 #[derive(Clone, Debug, PartialEq)]
@@ -177,9 +178,9 @@ fn formula(text: &str) -> Option<Reading<Scalar>> {
             doubt = number.doubt.or(doubt);
         }
     }
-    let text = if sum == 0 { NODE_ID.to_owned() } else { format!("{NODE_ID}+0x{sum:X}") };
-    // More than 32 bits is no sum with a node-ID in any object, and no formula to `Scalar::encode`.
-    (nodes == 1 && u32::try_from(sum).is_ok()).then_some(Reading { value: Scalar::Text(text), doubt })
+    // No object takes more than 32 bits for a sum with the node-ID.
+    let sum = u32::try_from(sum).ok().filter(|_| nodes == 1)?;
+    Some(Reading { value: Scalar::NodeIdPlus(sum), doubt })
 }
 
 /// A REAL: `1.5`, `1e3`, with the comma of a German tool, or hexadecimal; all `digits` of a hexadecimal
@@ -291,10 +292,10 @@ mod tests {
     fn formulas_take_every_order() {
         for text in ["$NODEID+0x180", "0x180+$NODEID", "$nodeid + 384", "0x100 + $NodeID + 0x80", "$NODEID+0x180;TPDO1"]
         {
-            assert_eq!(value(text, U32), Some((Scalar::Text("$NODEID+0x180".to_owned()), false)), "{text}");
+            assert_eq!(value(text, U32), Some((Scalar::NodeIdPlus(0x180), false)), "{text}");
         }
-        assert_eq!(value("$NODEID", U8), Some((Scalar::Text("$NODEID".to_owned()), false)));
-        assert_eq!(value("0600+$NODEID", U32), Some((Scalar::Text("$NODEID+0x180".to_owned()), true)));
+        assert_eq!(value("$NODEID", U8), Some((Scalar::NodeIdPlus(0), false)));
+        assert_eq!(value("0600+$NODEID", U32), Some((Scalar::NodeIdPlus(0x180), true)));
         for wrong in ["$NODEID+", "$NODEID-1", "$NODEID+$NODEID", "$NODEID+x", "$NODEID+0x1FFFFFFFF", "$NODEID+-1"] {
             assert!(scalar(wrong, U32).is_err(), "{wrong}");
         }

@@ -5,7 +5,8 @@ use crate::bus::memory::Clock;
 use crate::canopen::id::{NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::device::catalog::{self, Model};
-use crate::device::description::{Scalar, SimChannel};
+use crate::device::scalar::Scalar;
+use crate::sim::data::SimChannel;
 use crate::sim::model::{Direction, Overload};
 use crate::sim::setup::{GoneAfter, Oddities, Setup};
 use serde::{Deserialize, Deserializer};
@@ -218,11 +219,11 @@ impl DeviceEntry {
         if Path::new(&self.kind).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
             let path = beside.join(&self.kind);
             let model = Model::from_toml(&read(&path)?);
-            return model.map(Arc::new).map_err(|error| BenchError::Usage(format!("{}: {error}", path.display())));
+            return model.map(Arc::new).map_err(|error| BenchError::Usage(error.in_file(&path.display().to_string())));
         }
         catalog::by_name(&self.kind).ok_or_else(|| {
-            let known: Vec<&str> = catalog::built_in().iter().map(|model| model.description.name.as_str()).collect();
-            BenchError::Usage(format!("there is no device \"{}\" ({}, or FILE.toml)", self.kind, known.join(", ")))
+            let known: Vec<&str> = catalog::names().collect();
+            BenchError::Usage(format!("no device \"{}\" ({}, or FILE.toml)", self.kind, known.join(", ")))
         })
     }
 }

@@ -6,7 +6,7 @@ use crate::bus::time::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 use crate::canopen::object::ObjectId;
-use crate::device::description::SimState;
+use crate::sim::data::SimState;
 use crate::sim::lss::Then;
 use crate::sim::nmt::State;
 use crate::sim::objects::Area;
@@ -32,7 +32,7 @@ impl Device {
             Phase::Running(State::Operational) => SimState::Operational,
             Phase::Off | Phase::Starting(_) | Phase::Retiming { .. } => return false,
         };
-        let states = &self.setup.model.description.sim.lss.states;
+        let states = &self.setup.sim.lss.states;
         states.is_empty() || states.contains(&state)
     }
 

@@ -3,7 +3,7 @@ use crate::bus::memory::{Clock, MemoryBus};
 use crate::bus::{Bus, Event};
 use crate::device::catalog;
 use crate::device::catalog::Model;
-use crate::device::description::Scalar;
+use crate::device::scalar::Scalar;
 use crate::sim::Direction;
 use crate::sim::model::Overload;
 use std::sync::Arc;

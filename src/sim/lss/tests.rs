@@ -199,7 +199,7 @@ fn one_that_answers_fastscan_for_ever() {
 #[test]
 fn what_a_slave_does_not_know_it_does_not_answer() {
     let model = catalog::by_name("dps").expect("built in");
-    let mut bed = Bed::new("dps", Some(127), model.description.sim.lss.clone());
+    let mut bed = Bed::new("dps", Some(127), crate::sim::data::SimData::of(&model).lss);
     bed.play(&[("0401", "-"), ("5A", "-"), ("5E", "-"), ("46", "-"), ("4C", "-"), ("117E", "11"), ("17", "17")]);
 }
 

@@ -43,10 +43,6 @@ fn memory() -> Memory {
     ]))
 }
 
-fn style(text: &str) -> SdoStyle {
-    toml::from_str(text).expect("a style")
-}
-
 /// Plays request and answer lines; `-` is silence, several answers stand side by side.
 fn transcript(server: &mut SdoServer, memory: &mut Memory, lines: &[(&str, &str)]) {
     for (request, answer) in lines {
@@ -91,7 +87,8 @@ fn expedited() {
 #[test]
 fn sizes_omitted_as_d20_and_dps_do() {
     let mut memory = memory();
-    let mut server = SdoServer::new(style("size = \"omitted\"\nexpedited_only = true"), false);
+    let mut server =
+        SdoServer::new(SdoStyle { size: SizeIndication::Omitted, expedited_only: true, ..SdoStyle::default() }, false);
     transcript(
         &mut server,
         &mut memory,
@@ -108,7 +105,7 @@ fn sizes_omitted_as_d20_and_dps_do() {
             ("6000000000000000", "8000000001000405"),
         ],
     );
-    let mut quirky = SdoServer::new(style("size = \"omitted\""), true);
+    let mut quirky = SdoServer::new(SdoStyle { size: SizeIndication::Omitted, ..SdoStyle::default() }, true);
     transcript(&mut quirky, &mut memory, &[("4000100000000000", "6000100094018200")]);
 }
 
@@ -199,7 +196,7 @@ fn block_transfer_is_not_offered() {
 #[test]
 fn block_download() {
     let mut memory = memory();
-    let mut server = SdoServer::new(style("block = true"), false);
+    let mut server = SdoServer::new(SdoStyle { block: true, ..SdoStyle::default() }, false);
     transcript(
         &mut server,
         &mut memory,
@@ -263,7 +260,7 @@ fn block_download() {
 #[test]
 fn block_upload() {
     let mut memory = memory();
-    let mut server = SdoServer::new(style("block = true"), false);
+    let mut server = SdoServer::new(SdoStyle { block: true, ..SdoStyle::default() }, false);
     memory.0.insert(ObjectId::new(0x2000, 0), b"123456789".to_vec());
     transcript(
         &mut server,
@@ -343,7 +340,7 @@ proptest! {
         requests in proptest::collection::vec((any::<[u8; 8]>(), 0..6usize), 1..60)
     ) {
         let mut memory = memory();
-        let mut server = SdoServer::new(style("block = true"), false);
+        let mut server = SdoServer::new(SdoStyle { block: true, ..SdoStyle::default() }, false);
         for (mut request, kind) in requests {
             // Now and then something that leads on.
             let head = [request[0], 0xc6, 0xa4, 0xa2, 0xa3, 0x81][kind];

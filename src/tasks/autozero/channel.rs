@@ -66,7 +66,7 @@ pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
     let signal = signal(device, entry.channel)?.clone();
     let absolute = absolute(master, device, entry)?;
     let range = range(master, device, &signal, entry.range.as_ref())?;
-    let signature = entry.signature.clone().into_bytes();
+    let signature = entry.signature.clone();
     let offsets = entry.offset.into_iter().collect();
     let is_described = entry.offset.is_some();
     Ok(Channel { signal, object: entry.object, signature, offsets, is_described, absolute, range })

@@ -103,10 +103,7 @@ fn keeps(model: &Model, number: TpdoNumber) -> bool {
     let objects = &model.description.objects;
     let tells = objects.iter().any(|entry| entry.stored.is_some());
     let (communication, mapping) = (number.communication(1), number.mapping(1));
-    let mut own = objects.iter().filter(|entry| {
-        let mut at = entry.objects().into_iter().flatten();
-        at.any(|object| object == communication || object == mapping)
-    });
+    let mut own = objects.iter().filter(|entry| entry.at.contains(communication) || entry.at.contains(mapping));
     !tells || own.all(|entry| entry.stored.is_some() || !entry.access.is_writable())
 }
 

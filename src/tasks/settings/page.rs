@@ -4,6 +4,7 @@ use super::info::{Store, filter_text};
 use super::{Device, Quantity};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
+use crate::device::description::{Access, Signature};
 use crate::device::sensor;
 use crate::device::unit::Unit;
 use crate::measure::layout::Signal;
@@ -118,7 +119,7 @@ pub(super) fn range(
 pub(super) fn bit_rate(device: &Device, values: &BTreeMap<ObjectId, Value>) -> Option<u32> {
     let model = device.model()?;
     let code = values.get(&model.dictionary.find("bit-rate")?.object)?.as_u64()?;
-    model.description.bit_rates.get(&code.to_string()).copied()
+    model.description.bit_rates.get(&u8::try_from(code).ok()?).copied()
 }
 
 /// What 1010h can do, and which settings it keeps.
@@ -133,15 +134,15 @@ pub(super) fn store(device: &Device, values: &BTreeMap<ObjectId, Value>, at: Obj
         return store;
     }
     let settings = objects.iter().filter(|entry| {
-        let acts = entry.signature.as_deref().is_some_and(|signature| signature != "set");
-        entry.access == crate::device::description::Access::Rw && !acts && !entry.at.starts_with("0x1003")
+        let acts = entry.signature.is_some_and(|signature| signature != Signature::Set);
+        entry.access == Access::Rw && !acts && entry.at.first.index != 0x1003
     });
     // Node-ID and bit rate have a way of their own.
     let ways = device.model().map_or(&[][..], |model| &model.description.assign);
     let assigned = ways.iter().flat_map(|way| [way.node_id, way.bit_rate]).flatten().map(|place| place.object);
     let assigned: Vec<ObjectId> = assigned.collect();
     for entry in settings {
-        let is_assigned = entry.objects().is_ok_and(|mut objects| objects.any(|object| assigned.contains(&object)));
+        let is_assigned = entry.objects().any(|object| assigned.contains(&object));
         let names = if entry.stored.is_some() || is_assigned { &mut store.kept } else { &mut store.lost };
         if !names.contains(&entry.name) {
             names.push(entry.name.clone());

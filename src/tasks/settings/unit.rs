@@ -1,7 +1,6 @@
 //! The physical unit of a signal (6131h), and what a new one rescales.
 
 use super::{Device, Quantity};
-use crate::canopen::id::parse_u32;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::device::unit::Unit;
@@ -96,7 +95,7 @@ fn unit_of(device: &Device, signal: &Signal) -> Option<UnitOf> {
     Some(UnitOf {
         signal: signal.name.clone(),
         unit: signal.unit?,
-        takes: allowed.iter().filter_map(|code| parse_u32(code)).map(Unit).collect(),
+        takes: allowed.iter().map(|code| Unit(code.low)).collect(),
         fixed: device.is_fixed(object),
     })
 }
@@ -198,7 +197,7 @@ fn in_unit(device: &Device, signal: &Signal) -> Vec<(ObjectId, Scale)> {
     let offset = std::iter::once((ObjectId::new(0x6127, channel), Scale::Distance));
     let described = device.model().map_or(&[][..], |model| &model.description.objects).iter();
     let described = described.filter(|entry| entry.follows_unit == Some(channel));
-    let described = described.flat_map(|entry| entry.objects().into_iter().flatten());
+    let described = described.flat_map(|entry| entry.objects());
     let named = ["minimum-pv", "maximum-pv"].into_iter().filter_map(|name| device.of_signal(signal, name));
     let mut all: Vec<(ObjectId, Scale)> = standard
         .chain(offset)

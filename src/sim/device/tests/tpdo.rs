@@ -279,15 +279,6 @@ const INHIBITED: &str = r#"
     type = "r32"
     access = "rw"
     default = 0.1
-    [[sim.channel]]
-    channel = 1
-    unit = 0x4E0000
-    base = 5.0
-    amplitude = 1.0
-    period_s = 1.0
-    noise = 0.0
-    start = 0.0
-    end = 10.0
 "#;
 
 #[test]
@@ -295,6 +286,8 @@ fn the_inhibit_time_keeps_events_apart() {
     let run = |inhibit: i64| {
         let model = Arc::new(Model::from_toml(INHIBITED).expect("a description"));
         let mut setup = Setup::new(model, node(5));
+        let [channel] = &mut setup.channels[..] else { panic!("one channel") };
+        (channel.base, channel.amplitude, channel.period_s, channel.noise) = (5.0, 1.0, 1.0, 0.0);
         setup.set = vec![(id("1800:3"), Scalar::Integer(inhibit))];
         setup.start = true;
         bus([setup])

@@ -1,0 +1,228 @@
+//! Checks what the parts of a description state about each other.
+
+use super::table::Table;
+use super::*;
+use crate::canopen::value::DataType;
+use crate::device::assign::AssignWay;
+use std::collections::BTreeSet;
+
+/// The tables of the file, for the lines of mistakes. Each list has the order of the list in [`Description`].
+pub(super) struct Tables<'a, 't> {
+    pub(super) file: &'a Table<'t>,
+    pub(super) identify: Option<&'a Table<'t>>,
+    pub(super) bit_rates: Option<&'a Table<'t>>,
+    pub(super) startup: Option<&'a Table<'t>>,
+    pub(super) assign: Vec<Table<'t>>,
+    pub(super) autozero: Vec<Table<'t>>,
+    pub(super) signals: Vec<Table<'t>>,
+    pub(super) objects: Vec<Table<'t>>,
+    pub(super) emergencies: Vec<Table<'t>>,
+}
+
+/// Highest CiA 404 channel: 6130h has sub-indices 1 to 199.
+const LAST_CHANNEL: u8 = 199;
+
+/// Reports every contradiction.
+pub(super) fn check(description: &Description, tables: &Tables<'_, '_>) {
+    let known = Known::of(description);
+    characters(tables.file, &description.name);
+    objects(description, &known, tables);
+    signals(description, &known, tables);
+    emergencies(description, tables);
+    identify(description, &known, tables);
+    bit_rates(description, tables);
+    assign(description, &known, tables);
+    autozero(description, &known, tables);
+    if let Some((startup, table)) = description.startup.as_ref().zip(tables.startup) {
+        known.require(table, "object", startup.object);
+    }
+}
+
+/// The objects of the description.
+struct Known<'a> {
+    description: &'a Description,
+}
+
+impl Known<'_> {
+    fn of(description: &Description) -> Known<'_> {
+        Known { description }
+    }
+
+    /// An object that is used must be described. A description without any object leaves them to the device.
+    fn require(&self, table: &Table<'_>, key: &str, object: ObjectId) {
+        if !self.description.objects.is_empty() && self.description.object(object).is_none() {
+            table.mistake(key, format!("{key}: there is no [[object]] {object}"));
+        }
+    }
+}
+
+/// Whether a name can be typed: it has lower case, digits and hyphens.
+fn characters(table: &Table<'_>, name: &str) -> bool {
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    let is_plain = !name.is_empty() && name.chars().all(plain);
+    if !is_plain {
+        table.mistake("name", format!("name: \"{name}\" has other characters than a to z, 0 to 9 and -"));
+    }
+    is_plain
+}
+
+/// A name of a signal or an object must not read as an address.
+fn name(table: &Table<'_>, name: &str) {
+    if characters(table, name) && name.parse::<ObjectId>().is_ok() {
+        table.mistake("name", format!("name: \"{name}\" would be read as an address"));
+    }
+}
+
+fn objects(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>) {
+    let mut names = BTreeMap::new();
+    let mut addresses = BTreeSet::new();
+    for (entry, table) in description.objects.iter().zip(&tables.objects) {
+        name(table, &entry.name);
+        for object in entry.objects() {
+            if !addresses.insert(object) {
+                table.mistake("at", format!("at: {object} is described twice"));
+                break;
+            }
+        }
+        let subs = (entry.at.is_run, entry.at.first.index);
+        // Runs of one name may share an index: `ai-input-pv:1` and `ai-input-pv:2` are different names.
+        if names.insert(&entry.name, subs).is_some_and(|other| other != subs || !entry.at.is_run) {
+            table.mistake("name", format!("name: two objects have the name \"{}\"", entry.name));
+        }
+        values(entry, table);
+        if entry.signature.is_some() && (entry.data_type != DataType::Unsigned(4) || !entry.access.is_writable()) {
+            table.mistake("signature", "signature: the object is not a writable u32");
+        }
+        for object in &entry.only_if_zero {
+            known.require(table, "only_if_zero", *object);
+        }
+        if let Some(object) = entry.unit_at {
+            known.require(table, "unit_at", object);
+        }
+    }
+}
+
+/// Default, limits, ranges and meanings fit the type; the default and the meanings are allowed.
+fn values(entry: &ObjectEntry, table: &Table<'_>) {
+    for (key, scalar) in [("low", &entry.low), ("high", &entry.high), ("default", &entry.default)] {
+        let Some(scalar) = scalar else { continue };
+        match scalar.encode(entry.data_type, NodeId::MIN) {
+            Err(error) => table.mistake(key, format!("{key}: {error}")),
+            Ok(_) if scalar.as_f64().is_some_and(|number| !entry.allows(number)) => {
+                table.mistake(key, format!("{key}: {scalar} is not allowed by low, high and allow"));
+            }
+            Ok(_) => {}
+        }
+    }
+    let fits = |number: i64| Scalar::Integer(number).encode(entry.data_type, NodeId::MIN).is_ok();
+    for range in &entry.allow {
+        if let Some(number) = [range.low, range.high].into_iter().find(|number| !fits(i64::from(*number))) {
+            table.mistake("allow", format!("allow: {number} does not fit {}", entry.data_type));
+        }
+    }
+    for number in entry.values.keys() {
+        let number = i64::try_from(*number).unwrap_or(i64::MAX);
+        if !fits(number) || !entry.allows(number as f64) {
+            table.mistake("values", format!("values: {number} is not a value of the object"));
+        }
+    }
+}
+
+fn signals(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>) {
+    let (mut names, mut channels) = (BTreeSet::new(), BTreeSet::new());
+    for (signal, table) in description.signals.iter().zip(&tables.signals) {
+        name(table, &signal.name);
+        if !names.insert(&signal.name) {
+            table.mistake("name", format!("name: two signals have the name \"{}\"", signal.name));
+        }
+        if !(1..=LAST_CHANNEL).contains(&signal.channel) {
+            table.mistake("channel", format!("channel: {} is not in the range 1 to {LAST_CHANNEL}", signal.channel));
+        } else if !channels.insert(signal.channel) {
+            table.mistake("channel", format!("channel: two signals have the channel {}", signal.channel));
+        }
+        for (key, object) in signal.objects() {
+            known.require(table, key, object);
+        }
+    }
+}
+
+fn emergencies(description: &Description, tables: &Tables<'_, '_>) {
+    let mut codes = BTreeSet::new();
+    for (emergency, table) in description.emergencies.iter().zip(&tables.emergencies) {
+        if !codes.insert(emergency.code) {
+            table.mistake("code", format!("code: {:04X}h is described twice", emergency.code));
+        }
+        if emergency.register_bit.is_some_and(|bit| bit > 7) {
+            table.mistake("register_bit", "register_bit: the error register has bits 0 to 7");
+        }
+        if emergency.bytes.len() > 5 {
+            table.mistake("bytes", "bytes: an emergency has bytes 3 to 7, five at most");
+        }
+    }
+}
+
+fn identify(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>) {
+    let Some(table) = tables.identify else { return };
+    for (object, value) in &description.identify.confirm {
+        match description.object(*object) {
+            None => known.require(table, "confirm", *object),
+            Some(entry) => {
+                if let Err(error) = value.encode(entry.data_type, NodeId::MIN) {
+                    table.mistake("confirm", format!("confirm: {object}: {error}"));
+                }
+            }
+        }
+    }
+}
+
+fn bit_rates(description: &Description, tables: &Tables<'_, '_>) {
+    let Some(table) = tables.bit_rates else { return };
+    let mut rates = BTreeSet::new();
+    for (index, rate) in &description.bit_rates {
+        let key = index.to_string();
+        if !(1..=1_000_000).contains(rate) {
+            table.mistake(&key, format!("bit_rates: {rate} bit/s is not in the range 1 to 1000000"));
+        } else if !rates.insert(rate) {
+            table.mistake(&key, format!("bit_rates: two indices have {rate} bit/s"));
+        }
+    }
+}
+
+fn assign(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>) {
+    for (entry, table) in description.assign.iter().zip(&tables.assign) {
+        let places = [("node_id", entry.node_id), ("bit_rate", entry.bit_rate)];
+        let places = places.into_iter().filter_map(|(key, place)| Some((key, place?)));
+        let has_place = entry.node_id.is_some() || entry.bit_rate.is_some();
+        if has_place == (entry.way == AssignWay::Lss) {
+            table.mistake("way", "way: \"objects\" needs node_id or bit_rate, and \"lss\" has neither");
+        }
+        // Objects that only other documents mention are marked as unverified and are not described.
+        for (key, place) in places.filter(|_| !entry.unverified) {
+            known.require(table, key, place.object);
+            if let Some(object) = description.object(place.object).filter(|it| it.data_type != place.data_type) {
+                table.mistake(key, format!("{key}: [[object]] {} has the type {}", object.at, object.data_type));
+            }
+        }
+        if let Some(object) = entry.store {
+            known.require(table, "store", object);
+        }
+    }
+}
+
+fn autozero(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>) {
+    for (entry, table) in description.autozero.iter().zip(&tables.autozero) {
+        known.require(table, "object", entry.object);
+        if let Some(object) = entry.offset {
+            known.require(table, "offset", object);
+        }
+        if let Some(absolute) = &entry.absolute {
+            known.require(table, "absolute", absolute.object);
+        }
+        for object in entry.range.iter().flat_map(|range| [range.start, range.end, range.unit]) {
+            known.require(table, "range", object);
+        }
+        if entry.signature.is_empty() || entry.signature.len() > 4 {
+            table.mistake("signature", "signature: it has 1 to 4 bytes");
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! Reads the TOML file of a description.
+
+use super::table::{Source, Table};
+use super::*;
+use crate::device::assign::AssignPlace;
+use toml::de::DeTable;
+
+/// Reads a description.
+///
+/// # Errors
+/// Every mistake that was found, in the order of the lines; a TOML syntax error is the only one then.
+pub fn read(text: &str) -> Result<Description, Vec<DescriptionError>> {
+    let source = Source::new(text);
+    let document = match DeTable::parse(text) {
+        Ok(document) => document,
+        Err(error) => {
+            source.mistake(error.span().map_or(0, |span| span.start), error.message());
+            return Err(source.into_mistakes());
+        }
+    };
+    let description = description(&mut Table::new(document.get_ref(), 0, &source));
+    let mistakes = source.into_mistakes();
+    match description {
+        Some(description) if mistakes.is_empty() => Ok(description),
+        _ => Err(mistakes),
+    }
+}
+
+/// Reads every table of the file, then checks what they state about each other.
+fn description<'t>(file: &mut Table<'t>) -> Option<Description> {
+    let (name, title, vendor) = (file.required("name"), file.required("title"), file.required("vendor"));
+    let source = file.or_default("source");
+    let (quirks, error_history) = (file.list("quirks"), file.or_default("error_history"));
+    let auto_bit_rate = file.optional("auto_bit_rate");
+    let mut identify = file.table("identify");
+    let mut bit_rates = file.table("bit_rates");
+    let (factory, sdo, pdo) = (part(file, "factory", factory), part(file, "sdo", sdo), part(file, "pdo", pdo));
+    let mut startup = file.table("startup");
+    let (assign, assign_tables) = entries(file, "assign", assign_entry);
+    let (autozero, autozero_tables) = entries(file, "autozero", autozero_entry);
+    let (signals, signal_tables) = entries(file, "signal", signal);
+    let (objects, object_tables) = entries(file, "object", object);
+    let (emergencies, emergency_tables) = entries(file, "emcy", emergency);
+    file.finish();
+    let description = Description {
+        identify: identify.as_mut().map(identify_entry).unwrap_or_default(),
+        bit_rates: bit_rates.as_mut().map(|rates| rates.entries("bit_rates")).unwrap_or_default(),
+        startup: startup.as_mut().and_then(startup_entry),
+        name: name?,
+        title: title?,
+        vendor: vendor?,
+        source,
+        factory,
+        sdo,
+        pdo,
+        quirks,
+        error_history,
+        auto_bit_rate,
+        assign,
+        autozero,
+        signals,
+        objects,
+        emergencies,
+    };
+    check::check(
+        &description,
+        &check::Tables {
+            file,
+            identify: identify.as_ref(),
+            bit_rates: bit_rates.as_ref(),
+            startup: startup.as_ref(),
+            assign: assign_tables,
+            autozero: autozero_tables,
+            signals: signal_tables,
+            objects: object_tables,
+            emergencies: emergency_tables,
+        },
+    );
+    Some(description)
+}
+
+fn part<'t, T: Default>(file: &mut Table<'t>, key: &'static str, read: fn(&mut Table<'t>) -> T) -> T {
+    file.table(key).map(|mut table| read(&mut table)).unwrap_or_default()
+}
+
+/// The entries of an array of tables, and the table of each. Entries with mistakes are missing in both.
+fn entries<'t, T>(
+    file: &mut Table<'t>,
+    key: &'static str,
+    read: fn(&mut Table<'t>) -> Option<T>,
+) -> (Vec<T>, Vec<Table<'t>>) {
+    file.tables(key).into_iter().filter_map(|mut table| Some((read(&mut table)?, table))).unzip()
+}
+
+fn identify_entry(table: &mut Table<'_>) -> Identify {
+    let identify = Identify {
+        device_type: table.optional("device_type"),
+        vendor_id: table.optional("vendor_id"),
+        product_code: table.optional("product_code"),
+        device_name: table.optional("device_name"),
+        confirm: table.table("confirm").map(|confirm| confirm.entries("confirm")).unwrap_or_default(),
+    };
+    table.finish();
+    identify
+}
+
+fn factory(table: &mut Table<'_>) -> Factory {
+    let factory = Factory { node_id: table.optional("node_id"), bit_rate: table.optional("bit_rate") };
+    table.finish();
+    factory
+}
+
+fn sdo(table: &mut Table<'_>) -> SdoStyle {
+    let style = SdoStyle {
+        size: table.or_default("size"),
+        expedited_only: table.or_default("expedited_only"),
+        block: table.or_default("block"),
+        aborts: table.list("aborts"),
+    };
+    table.finish();
+    style
+}
+
+fn pdo(table: &mut Table<'_>) -> PdoStyle {
+    let style = PdoStyle { remap: table.or_default("remap"), timer: table.optional("timer") };
+    table.finish();
+    style
+}
+
+fn assign_entry(table: &mut Table<'_>) -> Option<AssignEntry> {
+    let way = table.required("way");
+    let (state, retry_stopped) = (table.optional("state"), table.or_default("retry_stopped"));
+    let node_id = table.table("node_id").map(|mut place| assign_place(&mut place));
+    let bit_rate = table.table("bit_rate").map(|mut place| assign_place(&mut place));
+    let (store, applies) = (table.optional("store"), table.or_default("applies"));
+    let unverified = table.or_default("unverified");
+    let (page, doubt) = (table.or_default("page"), table.or_default("doubt"));
+    table.finish();
+    let (node_id, bit_rate) = (node_id.flatten(), bit_rate.flatten());
+    Some(AssignEntry { way: way?, state, retry_stopped, node_id, bit_rate, store, applies, unverified, page, doubt })
+}
+
+fn assign_place(table: &mut Table<'_>) -> Option<AssignPlace> {
+    let (object, data_type) = (table.required("object"), table.required("type"));
+    let signature = table.or_default("signature");
+    table.finish();
+    Some(AssignPlace { object: object?, data_type: data_type?, signature })
+}
+
+fn startup_entry(table: &mut Table<'_>) -> Option<Startup> {
+    let (object, wait, auto) = (table.required("object"), table.required("wait"), table.required("auto"));
+    let doubt = table.or_default("doubt");
+    table.finish();
+    Some(Startup { object: object?, wait: wait?, auto: auto?, doubt })
+}
+
+fn autozero_entry(table: &mut Table<'_>) -> Option<Autozero> {
+    let (channel, object) = (table.required("channel"), table.required("object"));
+    let signature: Option<String> = table.optional("signature");
+    let offset = table.optional("offset");
+    let absolute = table.table("absolute").map(|mut absolute| {
+        let (object, value) = (absolute.required("object"), absolute.required("value"));
+        absolute.finish();
+        Some(Absolute { object: object?, value: value? })
+    });
+    let range = table.table("range").map(|mut range| {
+        let (start, end, unit) = (range.required("start"), range.required("end"), range.required("unit"));
+        range.finish();
+        Some(Range { start: start?, end: end?, unit: unit? })
+    });
+    table.finish();
+    let signature = signature.map_or_else(|| b"zero".to_vec(), String::into_bytes);
+    let (absolute, range) = (absolute.flatten(), range.flatten());
+    Some(Autozero { channel: channel?, object: object?, signature, offset, absolute, range })
+}
+
+fn signal(table: &mut Table<'_>) -> Option<SignalEntry> {
+    let (name, channel, value) = (table.required("name"), table.required("channel"), table.required("value"));
+    let also = table.list("also");
+    let (unit, digits, status) = (table.optional("unit"), table.optional("digits"), table.optional("status"));
+    let marker = table.or_default("marker");
+    let (span_start, span_end) = (table.optional("span_start"), table.optional("span_end"));
+    table.finish();
+    let (name, channel, value) = (name?, channel?, value?);
+    Some(SignalEntry { name, channel, value, also, unit, digits, status, marker, span_start, span_end })
+}
+
+fn object(table: &mut Table<'_>) -> Option<ObjectEntry> {
+    let (at, name) = (table.required("at"), table.required("name"));
+    let (data_type, access) = (table.required("type"), table.required("access"));
+    let (default, low, high) = (table.optional("default"), table.optional("low"), table.optional("high"));
+    let (allow, values) = (table.list("allow"), table.table("values"));
+    let (signature, only_if_zero) = (table.optional("signature"), table.list("only_if_zero"));
+    let (pdo, unit) = (table.or_default("pdo"), table.optional("unit"));
+    let (follows_unit, unit_at) = (table.optional("follows_unit"), table.optional("unit_at"));
+    let stored = table.optional("stored");
+    let (text, page, doubt) = (table.or_default("text"), table.or_default("page"), table.or_default("doubt"));
+    let values = values.map(|values| values.entries("values")).unwrap_or_default();
+    table.finish();
+    Some(ObjectEntry {
+        at: at?,
+        name: name?,
+        data_type: data_type?,
+        access: access?,
+        default,
+        low,
+        high,
+        allow,
+        values,
+        signature,
+        only_if_zero,
+        pdo,
+        unit,
+        follows_unit,
+        unit_at,
+        stored,
+        text,
+        page,
+        doubt,
+    })
+}
+
+fn emergency(table: &mut Table<'_>) -> Option<EmergencyEntry> {
+    let (code, text) = (table.required("code"), table.required("text"));
+    let (register_bit, register) = (table.optional("register_bit"), table.optional("register"));
+    let bytes = table.list("bytes");
+    table.finish();
+    Some(EmergencyEntry { code: code?, text: text?, register_bit, register, bytes })
+}

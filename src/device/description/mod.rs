@@ -1,0 +1,300 @@
+//! Device descriptions: the contents of one TOML file in `devices/`, as checked types.
+//!
+//! `load.rs` reads a file once: addresses, ranges and values are parsed, and every mistake has its line. Nothing is
+//! parsed again afterwards.
+
+mod check;
+mod load;
+mod object;
+mod table;
+#[cfg(test)]
+mod tests;
+
+pub use load::read;
+pub use object::{Access, ObjectEntry, ObjectRun, Signature, StoreGroup};
+
+use super::assign::AssignEntry;
+use super::quirk::Quirk;
+use super::scalar::Scalar;
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use std::collections::BTreeMap;
+
+/// A mistake in a description.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {message}")]
+pub struct DescriptionError {
+    /// The line, counted from 1.
+    pub line: usize,
+    /// The mistake, in one line of text.
+    pub message: String,
+}
+
+impl DescriptionError {
+    /// The mistake with its place: `x.toml:6: unknown key "signals" (known: …)`.
+    pub fn in_file(&self, file: &str) -> String {
+        format!("{file}:{}: {}", self.line, self.message)
+    }
+}
+
+/// Everything known about one kind of device.
+#[derive(Clone, Debug, Default)]
+pub struct Description {
+    /// The short name for `--device`, `sim:` and the DEVICE column: `mh4`.
+    pub name: String,
+    /// The name on the label: `WIKA MH-4-CAN`.
+    pub title: String,
+    /// The manufacturer: `WIKA`.
+    pub vendor: String,
+    /// The documents that the facts come from.
+    pub source: String,
+    /// The answers by which the device is recognised.
+    pub identify: Identify,
+    /// Node-ID and bit rate of a new device.
+    pub factory: Factory,
+    /// How its SDO server behaves.
+    pub sdo: SdoStyle,
+    /// How its PDOs are configured.
+    pub pdo: PdoStyle,
+    /// Deviations from the standard that data cannot express.
+    pub quirks: Vec<Quirk>,
+    /// The layout of an entry of its error history (1003h).
+    pub error_history: ErrorHistory,
+    /// The device's own table of bit rates: index to bit rate in bit/s.
+    pub bit_rates: BTreeMap<u8, u32>,
+    /// The index of automatic bit rate detection, if the device has it.
+    pub auto_bit_rate: Option<u8>,
+    /// How the device takes a new node-ID and bit rate; the preferred method first.
+    pub assign: Vec<AssignEntry>,
+    /// The object that decides how the device starts after power-on.
+    pub startup: Option<Startup>,
+    /// The channels that can be set to zero.
+    pub autozero: Vec<Autozero>,
+    /// The measured signals.
+    pub signals: Vec<SignalEntry>,
+    /// The object dictionary.
+    pub objects: Vec<ObjectEntry>,
+    /// The meanings of its emergency codes.
+    pub emergencies: Vec<EmergencyEntry>,
+}
+
+/// The object that decides how the device starts after power-on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Startup {
+    /// An object of type UNSIGNED32.
+    pub object: ObjectId,
+    /// Its value if the device waits for the master.
+    pub wait: u32,
+    /// Its value if the device starts by itself.
+    pub auto: u32,
+    /// What the manual contradicts or leaves open.
+    pub doubt: String,
+}
+
+/// The layout of an emergency in an entry of the error history (1003h:1 …).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ErrorHistory {
+    /// CiA 301, 7.5.2.5: the code in bits 0 to 15; the upper half is manufacturer-specific.
+    #[default]
+    CodeLow,
+    /// The code in bits 0 to 15, byte 4 of the emergency in 16 to 23 and byte 3 in 24 to 31 (MH-4).
+    CodeLowBytesSwapped,
+    /// The code in bits 16 to 31 (HYDAC).
+    CodeHigh,
+}
+
+impl ErrorHistory {
+    /// The emergency code of an entry, and bytes 3 and 4 of the emergency if the entry contains them.
+    pub fn read(self, entry: u32) -> (u16, Option<[u8; 2]>) {
+        let [a, b, c, d] = entry.to_le_bytes();
+        match self {
+            ErrorHistory::CodeLow => (u16::from_le_bytes([a, b]), None),
+            ErrorHistory::CodeLowBytesSwapped => (u16::from_le_bytes([a, b]), Some([d, c])),
+            ErrorHistory::CodeHigh => (u16::from_le_bytes([c, d]), None),
+        }
+    }
+}
+
+/// How a channel is set to zero.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Autozero {
+    /// CiA 404 channel.
+    pub channel: u8,
+    /// The object that takes the signature.
+    pub object: ObjectId,
+    /// The signature in wire order; "zero" in CiA 404.
+    pub signature: Vec<u8>,
+    /// The object that contains the resulting offset, in the unit of the process value.
+    pub offset: Option<ObjectId>,
+    /// How to recognise a sensor that measures absolute pressure: its zero is a vacuum, not a vented line.
+    pub absolute: Option<Absolute>,
+    /// The measuring range of the sensor, if it differs from the adjustable span.
+    pub range: Option<Range>,
+}
+
+/// How to recognise a sensor that measures absolute pressure.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Absolute {
+    /// The object with the kind of the sensor.
+    pub object: ObjectId,
+    /// Its value for absolute pressure.
+    pub value: u32,
+}
+
+/// The objects that contain a measuring range.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Range {
+    /// The object with its start.
+    pub start: ObjectId,
+    /// The object with its end.
+    pub end: ObjectId,
+    /// The object with the unit of both.
+    pub unit: ObjectId,
+}
+
+/// The answers by which a kind of device is recognised; all that are given must agree. A description without any
+/// is used only if the user names it.
+#[derive(Clone, Debug, Default)]
+pub struct Identify {
+    /// 1000h, all 32 bits.
+    pub device_type: Option<u32>,
+    /// 1018h:1.
+    pub vendor_id: Option<u32>,
+    /// 1018h:2.
+    pub product_code: Option<u32>,
+    /// 1008h.
+    pub device_name: Option<String>,
+    /// Objects to read if the identity is not sufficient, and the values that they must have.
+    pub confirm: BTreeMap<ObjectId, Scalar>,
+}
+
+impl Identify {
+    /// Whether no answer is given, so that no device is recognised.
+    pub fn is_empty(&self) -> bool {
+        self.identity_count() == 0 && self.confirm.is_empty()
+    }
+
+    /// How many of device type, vendor-ID, product code and device name are given, 0 to 4.
+    pub fn identity_count(&self) -> usize {
+        let numbers = [self.device_type, self.vendor_id, self.product_code];
+        numbers.iter().flatten().count() + usize::from(self.device_name.is_some())
+    }
+}
+
+/// Node-ID and bit rate of a new device.
+#[derive(Clone, Debug, Default)]
+pub struct Factory {
+    /// Factory node-ID, if the manual gives it.
+    pub node_id: Option<NodeId>,
+    /// Factory bit rate in bit/s, if the manual gives it.
+    pub bit_rate: Option<u32>,
+}
+
+/// How an SDO server behaves.
+#[derive(Clone, Debug, Default)]
+pub struct SdoStyle {
+    /// Whether it indicates sizes (43h, 4Bh …) or omits them (42h).
+    pub size: SizeIndication,
+    /// Whether it has no segmented transfer; its strings then have at most four characters.
+    pub expedited_only: bool,
+    /// Whether it supports block transfer.
+    pub block: bool,
+    /// The abort codes that its manual lists; empty if it lists none.
+    pub aborts: Vec<u32>,
+}
+
+/// Whether the command specifier of an expedited transfer indicates the size.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SizeIndication {
+    /// s = 1.
+    #[default]
+    Indicated,
+    /// s = 0: 22h to write, 42h in the answer to a read.
+    Omitted,
+}
+
+/// How PDOs are configured.
+#[derive(Clone, Debug, Default)]
+pub struct PdoStyle {
+    /// What has to be done before the mapping can be changed.
+    pub remap: Remap,
+    /// The transmission type for cyclic transmission by the event timer, 254 or 255; `None` means 254.
+    pub timer: Option<u8>,
+}
+
+/// What has to be done before a mapping can be changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Remap {
+    /// CiA 301: set bit 31 of the COB-ID, then the number of entries to 0.
+    #[default]
+    Invalidate,
+    /// Set the number of entries to 0, in PRE-OPERATIONAL; the PDO is empty meanwhile. Bit 31 is not needed.
+    CountOnly,
+}
+
+/// One measured signal.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SignalEntry {
+    /// `pressure`, `temperature`, `ch1` …
+    pub name: String,
+    /// CiA 404 channel (the sub-index), 1 to 199.
+    pub channel: u8,
+    /// The object that is read by SDO if no PDO contains the signal.
+    pub value: ObjectId,
+    /// The same quantity at other indices than x130h: D-20-9's 2090h.
+    pub also: Vec<ObjectId>,
+    /// The object with the physical unit (6131h).
+    pub unit: Option<ObjectId>,
+    /// The object with the decimal digits of integer values (6132h).
+    pub digits: Option<ObjectId>,
+    /// The object with the status (6150h), if the device has one.
+    pub status: Option<ObjectId>,
+    /// Whether an overload replaces the value itself (REAL32 NaN, smallest integer).
+    pub marker: bool,
+    /// The object with the start of the measuring range (6148h), if the device has it.
+    pub span_start: Option<ObjectId>,
+    /// The object with the end of the measuring range (6149h), if the device has it.
+    pub span_end: Option<ObjectId>,
+}
+
+impl SignalEntry {
+    /// Every object that belongs to the signal, with its key in the description.
+    pub fn objects(&self) -> impl Iterator<Item = (&'static str, ObjectId)> + '_ {
+        let optional = [
+            ("unit", self.unit),
+            ("digits", self.digits),
+            ("status", self.status),
+            ("span_start", self.span_start),
+            ("span_end", self.span_end),
+        ];
+        let optional = optional.into_iter().filter_map(|(key, object)| Some((key, object?)));
+        [("value", self.value)].into_iter().chain(self.also.iter().map(|object| ("also", *object))).chain(optional)
+    }
+}
+
+/// The meaning of one emergency code of a device.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EmergencyEntry {
+    /// The emergency error code, bytes 0 and 1.
+    pub code: u16,
+    /// Its meaning in words.
+    pub text: String,
+    /// The bit of 1001h that is set with it, 0 to 7.
+    pub register_bit: Option<u8>,
+    /// The whole register as the manual prints it.
+    pub register: Option<u8>,
+    /// The contents of bytes 3 to 7.
+    pub bytes: Vec<String>,
+}
+
+impl Description {
+    /// The entry that describes `object`.
+    pub fn object(&self, object: ObjectId) -> Option<&ObjectEntry> {
+        self.objects.iter().find(|entry| entry.at.contains(object))
+    }
+
+    /// The meaning of an emergency code on this device.
+    pub fn emergency(&self, code: u16) -> Option<&EmergencyEntry> {
+        self.emergencies.iter().find(|entry| entry.code == code)
+    }
+}

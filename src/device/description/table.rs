@@ -1,0 +1,298 @@
+//! Reads TOML tables into checked types and collects every mistake with its line.
+
+use super::DescriptionError;
+use crate::canopen::id::{NodeId, parse_u32};
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
+use crate::device::scalar::{NumberRange, Scalar};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// The text of a description and the mistakes found in it.
+pub(super) struct Source<'a> {
+    text: &'a str,
+    mistakes: RefCell<Vec<DescriptionError>>,
+}
+
+impl<'a> Source<'a> {
+    pub(super) fn new(text: &'a str) -> Source<'a> {
+        Source { text, mistakes: RefCell::default() }
+    }
+
+    /// Adds a mistake at a byte offset of the text.
+    pub(super) fn mistake(&self, offset: usize, message: impl Into<String>) {
+        let before = self.text.as_bytes().get(..offset).unwrap_or_default();
+        let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
+        self.mistakes.borrow_mut().push(DescriptionError { line, message: message.into() });
+    }
+
+    /// Every mistake, in the order of the lines.
+    pub(super) fn into_mistakes(self) -> Vec<DescriptionError> {
+        let mut mistakes = self.mistakes.into_inner();
+        mistakes.sort_by_key(|mistake| mistake.line);
+        mistakes
+    }
+}
+
+/// One table: it knows which keys were asked for, so that all others are mistakes.
+pub(super) struct Table<'t> {
+    table: &'t DeTable<'t>,
+    offset: usize,
+    source: &'t Source<'t>,
+    known: Vec<&'static str>,
+}
+
+impl<'t> Table<'t> {
+    /// `offset`: the place of the table in the text.
+    pub(super) fn new(table: &'t DeTable<'t>, offset: usize, source: &'t Source<'t>) -> Table<'t> {
+        Table { table, offset, source, known: Vec::new() }
+    }
+
+    fn value(&mut self, key: &'static str) -> Option<&'t Spanned<DeValue<'t>>> {
+        self.known.push(key);
+        self.table.get(key)
+    }
+
+    fn read<T: FromToml>(&self, key: &str, value: &Spanned<DeValue<'_>>) -> Option<T> {
+        match T::from_toml(value.get_ref()) {
+            Ok(value) => Some(value),
+            Err(error) => {
+                self.source.mistake(value.span().start, format!("{key}: {error}"));
+                None
+            }
+        }
+    }
+
+    /// Adds a mistake at the value of a key, or at the table if it has no such key.
+    pub(super) fn mistake(&self, key: &str, message: impl Into<String>) {
+        let offset = self.table.get(key).map_or(self.offset, |value| value.span().start);
+        self.source.mistake(offset, message);
+    }
+
+    /// The value of a key; `None` if it is missing or wrong.
+    pub(super) fn optional<T: FromToml>(&mut self, key: &'static str) -> Option<T> {
+        let value = self.value(key)?;
+        self.read(key, value)
+    }
+
+    /// The value of a key that must be there.
+    pub(super) fn required<T: FromToml>(&mut self, key: &'static str) -> Option<T> {
+        let Some(value) = self.value(key) else {
+            self.source.mistake(self.offset, format!("missing key \"{key}\""));
+            return None;
+        };
+        self.read(key, value)
+    }
+
+    /// The value of a key, or the default of its type.
+    pub(super) fn or_default<T: FromToml + Default>(&mut self, key: &'static str) -> T {
+        self.optional(key).unwrap_or_default()
+    }
+
+    /// The values of an array; each wrong one is a mistake.
+    pub(super) fn list<T: FromToml>(&mut self, key: &'static str) -> Vec<T> {
+        match self.value(key).map(|value| (value, value.get_ref())) {
+            Some((_, DeValue::Array(array))) => array.iter().filter_map(|value| self.read(key, value)).collect(),
+            Some((value, other)) => {
+                self.source.mistake(value.span().start, format!("{key}: {} instead of an array", kind(other)));
+                Vec::new()
+            }
+            None => Vec::new(),
+        }
+    }
+
+    /// The entries of a table whose keys are data. `what` names the table in mistakes.
+    pub(super) fn entries<K: FromToml + Ord, V: FromToml>(&self, what: &str) -> BTreeMap<K, V> {
+        let mut entries = BTreeMap::new();
+        for (key, value) in self.table {
+            let text = Spanned::new(key.span(), DeValue::String(key.get_ref().clone()));
+            let (Some(key), Some(value)) = (self.read(what, &text), self.read(what, value)) else { continue };
+            if entries.insert(key, value).is_some() {
+                self.source.mistake(text.span().start, format!("{what}: a key twice"));
+            }
+        }
+        entries
+    }
+
+    /// A table below this one.
+    pub(super) fn table(&mut self, key: &'static str) -> Option<Table<'t>> {
+        let value = self.value(key)?;
+        self.as_table(key, value)
+    }
+
+    /// An array of tables below this one.
+    pub(super) fn tables(&mut self, key: &'static str) -> Vec<Table<'t>> {
+        let Some(value) = self.value(key) else { return Vec::new() };
+        match value.get_ref() {
+            DeValue::Array(array) => array.iter().filter_map(|value| self.as_table(key, value)).collect(),
+            other => {
+                let message = format!("{key}: {} instead of tables [[{key}]]", kind(other));
+                self.source.mistake(value.span().start, message);
+                Vec::new()
+            }
+        }
+    }
+
+    fn as_table(&self, key: &str, value: &'t Spanned<DeValue<'t>>) -> Option<Table<'t>> {
+        match value.get_ref() {
+            DeValue::Table(table) => Some(Table::new(table, value.span().start, self.source)),
+            other => {
+                self.source.mistake(value.span().start, format!("{key}: {} instead of a table", kind(other)));
+                None
+            }
+        }
+    }
+
+    /// Every key that was not asked for is a mistake.
+    pub(super) fn finish(&mut self) {
+        for (name, _) in self.table {
+            if !self.known.contains(&name.get_ref().as_ref()) {
+                let message = format!("unknown key \"{}\" (known: {})", name.get_ref(), self.known.join(", "));
+                self.source.mistake(name.span().start, message);
+            }
+        }
+    }
+}
+
+fn kind(value: &DeValue<'_>) -> &'static str {
+    match value {
+        DeValue::String(_) => "text",
+        DeValue::Integer(_) => "an integer",
+        DeValue::Float(_) => "a number with a fraction",
+        DeValue::Boolean(_) => "true or false",
+        DeValue::Datetime(_) => "a date",
+        DeValue::Array(_) => "an array",
+        DeValue::Table(_) => "a table",
+    }
+}
+
+/// A type that one TOML value can be read as. The error says why the value does not fit.
+pub(super) trait FromToml: Sized {
+    fn from_toml(value: &DeValue<'_>) -> Result<Self, String>;
+}
+
+fn text<'v>(value: &'v DeValue<'_>) -> Result<&'v str, String> {
+    value.as_str().ok_or_else(|| format!("{} instead of text in quotes", kind(value)))
+}
+
+/// The text of a value, parsed.
+pub(super) fn parsed<T: std::str::FromStr>(value: &DeValue<'_>) -> Result<T, String>
+where
+    T::Err: Display,
+{
+    text(value)?.parse().map_err(|error: T::Err| error.to_string())
+}
+
+fn integer(value: &DeValue<'_>) -> Result<i64, String> {
+    let number = value.as_integer().ok_or_else(|| format!("{} instead of an integer", kind(value)))?;
+    i64::from_str_radix(number.as_str(), number.radix()).map_err(|_| format!("{number} is too large"))
+}
+
+impl FromToml for String {
+    fn from_toml(value: &DeValue<'_>) -> Result<String, String> {
+        text(value).map(str::to_owned)
+    }
+}
+
+impl FromToml for bool {
+    fn from_toml(value: &DeValue<'_>) -> Result<bool, String> {
+        value.as_bool().ok_or_else(|| format!("{} instead of true or false", kind(value)))
+    }
+}
+
+/// Unsigned numbers; a key of a table is text, decimal or hexadecimal.
+macro_rules! unsigned {
+    ($($name:ident),*) => {
+        $(impl FromToml for $name {
+            fn from_toml(value: &DeValue<'_>) -> Result<$name, String> {
+                let number = match value.as_str() {
+                    Some(text) => parse_u32(text).map(i64::from).ok_or_else(|| format!("\"{text}\" is not a number"))?,
+                    None => integer(value)?,
+                };
+                $name::try_from(number).map_err(|_| format!("{number} is not in the range 0 to {}", $name::MAX))
+            }
+        })*
+    };
+}
+
+unsigned!(u8, u16, u32, u64);
+
+impl FromToml for NodeId {
+    fn from_toml(value: &DeValue<'_>) -> Result<NodeId, String> {
+        NodeId::new(u8::from_toml(value)?).map_err(|error| error.to_string())
+    }
+}
+
+impl FromToml for Scalar {
+    fn from_toml(value: &DeValue<'_>) -> Result<Scalar, String> {
+        match value {
+            DeValue::Float(number) => {
+                let real = number.as_str().parse().map_err(|_| format!("{number} is not a number"))?;
+                Ok(Scalar::Real(real))
+            }
+            DeValue::Integer(_) => integer(value).map(Scalar::Integer),
+            other => text(other).map(Scalar::from),
+        }
+    }
+}
+
+impl FromToml for ObjectId {
+    fn from_toml(value: &DeValue<'_>) -> Result<ObjectId, String> {
+        parsed(value)
+    }
+}
+
+impl FromToml for DataType {
+    fn from_toml(value: &DeValue<'_>) -> Result<DataType, String> {
+        parsed(value)
+    }
+}
+
+impl FromToml for NumberRange {
+    fn from_toml(value: &DeValue<'_>) -> Result<NumberRange, String> {
+        parsed(value)
+    }
+}
+
+impl FromToml for super::ObjectRun {
+    fn from_toml(value: &DeValue<'_>) -> Result<super::ObjectRun, String> {
+        parsed(value)
+    }
+}
+
+/// Reads an enum from its words; any other word is a mistake that lists them.
+macro_rules! words {
+    ($name:path { $($word:literal => $variant:ident),* $(,)? }) => {
+        impl FromToml for $name {
+            fn from_toml(value: &DeValue<'_>) -> Result<$name, String> {
+                match text(value)? {
+                    $($word => Ok(<$name>::$variant),)*
+                    other => Err(format!("\"{other}\" is not one of: {}", [$($word),*].join(", "))),
+                }
+            }
+        }
+    };
+}
+
+words!(super::Access { "ro" => Ro, "wo" => Wo, "rw" => Rw, "const" => Const });
+words!(super::Signature { "save" => Save, "load" => Load, "zero" => Zero, "set" => Set });
+words!(super::StoreGroup { "all" => All, "comm" => Communication, "app" => Application });
+words!(super::SizeIndication { "indicated" => Indicated, "omitted" => Omitted });
+words!(super::Remap { "invalidate" => Invalidate, "count-only" => CountOnly });
+words!(super::ErrorHistory {
+    "code-low" => CodeLow,
+    "code-low-bytes-swapped" => CodeLowBytesSwapped,
+    "code-high" => CodeHigh,
+});
+words!(crate::device::assign::AssignWay { "lss" => Lss, "objects" => Objects });
+words!(crate::device::assign::AssignState { "pre-operational" => PreOperational, "stopped" => Stopped });
+words!(crate::device::assign::Applies { "reset" => Reset, "power" => Power });
+words!(crate::device::quirk::Quirk {
+    "upload-answered60" => UploadAnswered60,
+    "save-all-resets-cob-ids" => SaveAllResetsCobIds,
+    "cob-id-zero-is-default" => CobIdZeroIsDefault,
+    "emergency-repeats" => EmergencyRepeats,
+});

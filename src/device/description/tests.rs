@@ -1,0 +1,111 @@
+use super::*;
+
+const HEAD: &str = "name = \"x\"\ntitle = \"X\"\nvendor = \"V\"\n";
+
+/// The mistakes of a description that begins with [`HEAD`], which has three lines.
+fn mistakes(text: &str) -> Vec<String> {
+    match read(&format!("{HEAD}{text}")) {
+        Ok(_) => Vec::new(),
+        Err(mistakes) => mistakes.iter().map(|mistake| mistake.in_file("x.toml")).collect(),
+    }
+}
+
+#[test]
+fn source_and_identify_are_optional() {
+    let description = read(HEAD).expect("a description");
+    assert_eq!((description.name.as_str(), description.source.as_str()), ("x", ""));
+    assert!(description.identify.is_empty());
+}
+
+#[test]
+fn unknown_keys_are_listed_with_their_line() {
+    let known = "name, title, vendor, source, quirks, error_history, auto_bit_rate, identify, bit_rates, factory, sdo, \
+                 pdo, startup, assign, autozero, signal, object, emcy";
+    let expected = format!("x.toml:4: unknown key \"signals\" (known: {known})");
+    assert_eq!(mistakes("signals = 1"), [expected]);
+    let below = mistakes(
+        "[sdo]\nsize = \"omitted\"\nsizes = 1\n[[signal]]\nname = \"p\"\nchannel = 1\nvalue = \"0x6130:1\"\nx = 1",
+    );
+    assert_eq!(below[0], "x.toml:6: unknown key \"sizes\" (known: size, expedited_only, block, aborts)");
+    assert!(below[1].starts_with("x.toml:11: unknown key \"x\" (known: name, channel, value, also, "), "{below:?}");
+}
+
+#[test]
+fn syntax_errors_have_their_line() {
+    let [error] = &mistakes("[sdo]\nsize = \n")[..] else { panic!("one mistake") };
+    assert!(error.starts_with("x.toml:5: ") && !error.contains('\n'), "{error}");
+}
+
+#[test]
+fn every_mistake_is_reported() {
+    let text =
+        "auto_bit_rate = 300\nquirks = [\"odd\"]\n[factory]\nnode_id = 200\nbit_rate = \"fast\"\n[sdo]\nsize = 1";
+    assert_eq!(
+        mistakes(text),
+        [
+            "x.toml:4: auto_bit_rate: 300 is not in the range 0 to 255",
+            "x.toml:5: quirks: \"odd\" is not one of: upload-answered60, save-all-resets-cob-ids, \
+             cob-id-zero-is-default, emergency-repeats",
+            &format!("x.toml:7: node_id: {}", NodeId::new(200).expect_err("too large")),
+            "x.toml:8: bit_rate: \"fast\" is not a number",
+            "x.toml:10: size: an integer instead of text in quotes",
+        ]
+    );
+}
+
+#[test]
+fn a_missing_key_has_the_line_of_its_table() {
+    assert_eq!(mistakes("[[signal]]\nname = \"p\"\nvalue = \"0x6130:1\""), ["x.toml:4: missing key \"channel\""]);
+}
+
+#[test]
+fn signals_differ_in_name_and_channel() {
+    let signal =
+        |name: &str, channel: u8| format!("[[signal]]\nname = \"{name}\"\nchannel = {channel}\nvalue = \"0x6130:1\"\n");
+    let two = |first: String, second: String| mistakes(&(first + &second));
+    assert_eq!(
+        two(signal("pressure", 1), signal("temperature", 1)),
+        ["x.toml:10: channel: two signals have the channel 1"]
+    );
+    assert_eq!(two(signal("p", 1), signal("p", 2)), ["x.toml:9: name: two signals have the name \"p\""]);
+    assert_eq!(mistakes(&signal("p", 0)), ["x.toml:6: channel: 0 is not in the range 1 to 199"]);
+    let name = mistakes(&signal("Druck 1", 1));
+    assert_eq!(name, ["x.toml:5: name: \"Druck 1\" has other characters than a to z, 0 to 9 and -"]);
+    assert_eq!(mistakes(&signal("6130", 1)), ["x.toml:5: name: \"6130\" would be read as an address"]);
+}
+
+const OBJECT: &str = "[[object]]\nat = \"0x2000\"\nname = \"o\"\ntype = \"u8\"\naccess = \"rw\"\n";
+
+#[test]
+fn objects_that_are_used_must_be_described() {
+    let text = format!("{OBJECT}[[signal]]\nname = \"p\"\nchannel = 1\nvalue = \"0x2000\"\nunit = \"0x6131:1\"\n");
+    assert_eq!(mistakes(&text), ["x.toml:13: unit: there is no [[object]] 0x6131:1"]);
+    let autozero = format!("[[autozero]]\nchannel = 1\nobject = \"0x6125:1\"\n{OBJECT}");
+    assert_eq!(mistakes(&autozero), ["x.toml:6: object: there is no [[object]] 0x6125:1"]);
+}
+
+#[test]
+fn a_description_without_objects_leaves_them_to_the_device() {
+    let text = "[[signal]]\nname = \"p\"\nchannel = 1\nvalue = \"0x6130:1\"\nunit = \"0x6131:1\"\n";
+    assert_eq!(mistakes(text), Vec::<String>::new());
+}
+
+#[test]
+fn values_of_an_object_fit_its_type_and_limits() {
+    let with = |line: &str| mistakes(&format!("{OBJECT}{line}"));
+    assert_eq!(with("default = 255"), Vec::<String>::new());
+    assert_eq!(with("default = 256"), ["x.toml:9: default: 256 does not fit u8 (0 to 255)"]);
+    assert_eq!(with("low = \"x\""), ["x.toml:9: low: \"x\" is not a value of type u8"]);
+    assert_eq!(with("allow = [\"1-2\"]\ndefault = 3"), ["x.toml:10: default: 3 is not allowed by low, high and allow"]);
+    assert_eq!(with("allow = [\"300\"]"), ["x.toml:9: allow: 300 does not fit u8"]);
+    assert_eq!(with("values = { \"0x100\" = \"many\" }"), ["x.toml:9: values: 256 is not a value of the object"]);
+    assert_eq!(with("signature = \"save\""), ["x.toml:9: signature: the object is not a writable u32"]);
+    assert_eq!(with(OBJECT).len(), 2, "an address and a name twice");
+}
+
+#[test]
+fn the_layout_of_the_error_history() {
+    assert_eq!(ErrorHistory::CodeLow.read(0x1234_5030), (0x5030, None));
+    assert_eq!(ErrorHistory::CodeLowBytesSwapped.read(0x0103_f001), (0xf001, Some([1, 3])));
+    assert_eq!(ErrorHistory::CodeHigh.read(0x5030_0000), (0x5030, None));
+}

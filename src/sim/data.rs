@@ -1,0 +1,180 @@
+//! Data that only the simulator needs: the measured quantities of a device and facts that no manual prints.
+//!
+//! One file in `models/` per device that needs one. A device without a file gets moving quantities that follow from
+//! its description, so that a new device is one description.
+
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
+use crate::device::catalog::Model;
+use crate::device::description::SignalEntry;
+use serde::Deserialize;
+use std::sync::OnceLock;
+
+/// The name of a device and the text of its file, listed by the build script.
+const FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/models.rs"));
+
+/// Data that only the simulator needs.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimData {
+    /// The sample time in microseconds; 1 ms if `None`.
+    pub sample_us: Option<u32>,
+    /// Whether a repeating average covers the samples since the last PDO, instead of 61A1h samples.
+    #[serde(default)]
+    pub mean_until_pdo: bool,
+    /// How far outside of the measuring range an overload begins, in percent of the range.
+    #[serde(default)]
+    pub overload_percent: f64,
+    /// The emergency code of an overload, if the device sends one.
+    pub overload_emcy: Option<u16>,
+    /// What its LSS slave supports.
+    #[serde(default)]
+    pub lss: SimLss,
+    /// The measured quantities, one per signal.
+    #[serde(default, rename = "channel")]
+    pub channels: Vec<SimChannel>,
+}
+
+/// What the LSS slave of a simulated device supports.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimLss {
+    /// The services, by the command specifier of the request; an empty list means all of CiA 305.
+    #[serde(default)]
+    pub services: Vec<u8>,
+    /// The NMT states in which it answers LSS; an empty list means all.
+    #[serde(default)]
+    pub states: Vec<SimState>,
+    /// Whether the answer to the selective switch contains the mode (44h 01h).
+    #[serde(default)]
+    pub tells_mode: bool,
+}
+
+/// An NMT state of a simulated device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SimState {
+    /// STOPPED.
+    Stopped,
+    /// PRE-OPERATIONAL.
+    PreOperational,
+    /// OPERATIONAL.
+    Operational,
+}
+
+/// The course of a simulated quantity: a slow sine with noise.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimChannel {
+    /// The CiA 404 channel.
+    pub channel: u8,
+    /// Unit code of `base`, `amplitude`, `noise`, `start` and `end` (6131h).
+    pub unit: u32,
+    /// The mean value.
+    pub base: f64,
+    /// The amplitude of the sine.
+    pub amplitude: f64,
+    /// The period of the sine in seconds.
+    pub period_s: f64,
+    /// The noise is within this distance of the sine.
+    pub noise: f64,
+    /// Start of the measuring range.
+    pub start: f64,
+    /// End of the measuring range.
+    pub end: f64,
+    /// The field value (x100h) at the start and at the end of the range; 0 and 10000 if `None` (CiA 404).
+    pub field: Option<[f64; 2]>,
+}
+
+impl SimData {
+    /// The data of a device: from its file, else from its description.
+    pub fn of(model: &Model) -> SimData {
+        static PARSED: [OnceLock<SimData>; FILES.len()] = [const { OnceLock::new() }; FILES.len()];
+        let name = &model.description.name;
+        match FILES.iter().zip(&PARSED).find(|((file, _), _)| file == name) {
+            Some(((_, text), parsed)) => parsed.get_or_init(|| toml::from_str(text).unwrap_or_default()).clone(),
+            None => SimData::generic(model),
+        }
+    }
+
+    /// Quantities in the middle of the ranges that the description gives, else between 0 and 100.
+    fn generic(model: &Model) -> SimData {
+        // A value with a default does not move: the simulator returns the default.
+        let moves =
+            |signal: &&SignalEntry| model.dictionary.get(signal.value).is_some_and(|entry| entry.default.is_none());
+        let channels = model.description.signals.iter().filter(moves).map(|signal| {
+            let end = |object: Option<ObjectId>| number(model, object?, signal.digits);
+            let range = end(signal.span_start).zip(end(signal.span_end)).filter(|(start, end)| start < end);
+            let (start, end) = range.unwrap_or((0.0, 100.0));
+            let unit = signal.unit.and_then(|unit| number(model, unit, None)).unwrap_or(0.0);
+            let length = end - start;
+            SimChannel {
+                channel: signal.channel,
+                unit: format!("{unit:.0}").parse().unwrap_or(0),
+                base: start + 0.5 * length,
+                amplitude: 0.05 * length,
+                period_s: 20.0 + f64::from(signal.channel),
+                noise: 0.0005 * length,
+                start,
+                end,
+                field: None,
+            }
+        });
+        SimData { channels: channels.collect(), ..SimData::default() }
+    }
+}
+
+/// The default of an object; an integer is divided by the power of ten of its decimal digits.
+fn number(model: &Model, object: ObjectId, digits: Option<ObjectId>) -> Option<f64> {
+    let entry = model.dictionary.get(object)?;
+    let number = entry.data_type.decode(&entry.default_bytes(NodeId::MIN)?).ok()?.as_f64()?;
+    let is_real = matches!(entry.data_type, DataType::Real32 | DataType::Real64);
+    let digits = digits.filter(|_| !is_real).and_then(|digits| number_of_digits(model, digits)).unwrap_or(0);
+    Some(number / 10f64.powi(digits))
+}
+
+fn number_of_digits(model: &Model, object: ObjectId) -> Option<i32> {
+    let entry = model.dictionary.get(object)?;
+    let number = entry.data_type.decode(&entry.default_bytes(NodeId::MIN)?).ok()?.as_u64()?;
+    i32::try_from(number.min(9)).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::catalog::{built_in, by_name};
+    use crate::device::scalar::Scalar;
+
+    #[test]
+    fn every_file_belongs_to_a_device_and_loads() {
+        for (name, text) in FILES {
+            assert!(by_name(name).is_some(), "{name}");
+            toml::from_str::<SimData>(text).unwrap_or_else(|error| panic!("{name}: {error}"));
+        }
+    }
+
+    #[test]
+    fn every_signal_has_a_quantity_within_its_range_and_in_its_unit() {
+        for model in built_in() {
+            let (sim, device) = (SimData::of(model), &model.description.name);
+            for signal in &model.description.signals {
+                let quantity = sim.channels.iter().find(|quantity| quantity.channel == signal.channel);
+                let quantity = quantity.unwrap_or_else(|| panic!("{device} {}: no simulated quantity", signal.name));
+                assert!(quantity.start <= quantity.base - quantity.amplitude, "{device} {}", signal.name);
+                assert!(quantity.base + quantity.amplitude <= quantity.end, "{device} {}", signal.name);
+                let unit = signal.unit.and_then(|unit| model.dictionary.get(unit)?.default.clone());
+                assert_eq!(unit, Some(Scalar::Integer(quantity.unit.into())), "{device} {}", signal.name);
+            }
+            assert_eq!(sim.channels.len(), model.description.signals.len(), "{device}");
+        }
+    }
+
+    #[test]
+    fn a_device_without_a_file_moves_in_the_middle_of_its_range() {
+        let dps = by_name("dps").expect("built in");
+        let [channel] = &SimData::generic(&dps).channels[..] else { panic!("one channel") };
+        // 6148h and 6149h: 0 and 100000 with three digits, in psi.
+        assert_eq!((channel.start, channel.end, channel.base, channel.unit), (0.0, 100.0, 50.0, 0x00ab_0000));
+    }
+}
