@@ -19,7 +19,7 @@ use crate::output::events::Events;
 use crate::output::progress::Progress;
 use crate::output::rows::FileFormat;
 use crate::output::summary::{self, Written};
-use crate::tasks::check::{Expecting, all_met};
+use crate::tasks::check::{Checker, all_satisfied};
 use crate::tasks::log::{Mode, Plan, RecordingReport, log};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
@@ -109,10 +109,10 @@ impl Log {
         let wanted: Vec<&Wanted> = self.signals.iter().map(|signal| &signal.0).collect();
         for expression in &self.expect {
             if let Nodes::These(nodes) = &self.nodes {
-                expression.names_only(nodes)?;
+                expression.check_nodes(nodes)?;
             }
             if !wanted.is_empty() {
-                expression.needs_only(&wanted)?;
+                expression.check_recorded(&wanted)?;
             }
         }
         Ok(())
@@ -147,10 +147,10 @@ impl Log {
             let mut screen = Screen::new(rows, events, progress, console);
             // Whoever only listens from then on leaves the nodes to others.
             screen.claims = self.poll.is_none().then(|| std::mem::take(claims));
-            let mut expecting = Expecting::new(&self.expect, &plan.nodes, true, &mut screen);
-            let outcome = log(master, &plan, &mut expecting);
+            let mut checker = Checker::new(&self.expect, &plan.nodes, true, &mut screen);
+            let outcome = log(master, &plan, &mut checker);
             let verdicts = match &outcome {
-                Ok(outcome) => expecting.verdicts(outcome),
+                Ok(outcome) => checker.verdicts(outcome),
                 Err(_) => Ok(Vec::new()),
             };
             let interrupted = match &outcome {
@@ -195,7 +195,7 @@ impl Log {
             }
         }
         // What was expected and is not so comes first: it gives the exit code.
-        let (unmet, lost) = (all_met(verdicts, &[]).err(), self.lost(outcome));
+        let (unmet, lost) = (all_satisfied(verdicts, &[]).err(), self.lost(outcome));
         let name = |file: &Option<OutFile>| {
             file.as_ref().map_or_else(|| "stdout".to_owned(), |file| file.path().display().to_string())
         };

@@ -1,8 +1,8 @@
-//! What `log` and `check` share: both record.
+//! Functions that `log` and `check` share.
 
 use super::Global;
 use super::args::{BusSpec, Duration};
-use crate::measure::expression::verdict::{Ruling, Verdict};
+use crate::measure::expression::verdict::{Outcome, Verdict};
 use crate::output::console::Console;
 use crate::output::events::{Weight, Words};
 use crate::output::verdict;
@@ -21,10 +21,10 @@ pub(super) fn sync_interval(text: &str) -> Result<Duration, String> {
     }
 }
 
-/// Refuses to send at an interval into a recording that is played back.
+/// Refuses `--sync` and `--poll` for a recording (`replay:`), which cannot send.
 pub(super) fn refuse_to_send(global: &Global, interval: Option<Duration>) -> Result<(), Failure> {
     if matches!(global.bus, Some(BusSpec::Replay(_))) && interval.is_some() {
-        return Err(Failure::new(Kind::Usage, "a recording (replay:) receives only: --sync and --poll send"));
+        return Err(Failure::new(Kind::Usage, "a recording (replay:) is receive-only: --sync and --poll send"));
     }
     Ok(())
 }
@@ -42,11 +42,11 @@ pub(super) fn print_event(console: &Console, words: &Words) {
 pub(super) fn print_verdicts(console: &Console, verdicts: &[Verdict]) {
     for verdict in verdicts {
         let node = verdict.node.map(|node| format!("node {node}: ")).unwrap_or_default();
-        let line = format!("{node}{}: {}", verdict.text, verdict::findings(verdict));
-        match verdict.ruling {
-            Ruling::Ok => console.note(&format!("ok: {line}")),
-            Ruling::Fail => console.warn(&format!("not as expected: {line}")),
-            Ruling::NoData => console.warn(&line),
+        let line = format!("{node}{}: {}", verdict.text, verdict::findings(verdict, &[]));
+        match verdict.outcome {
+            Outcome::Ok => console.note(&format!("ok: {line}")),
+            Outcome::Fail => console.warn(&format!("failed: {line}")),
+            Outcome::NoData => console.warn(&line),
         }
     }
 }

@@ -1,51 +1,52 @@
-//! Verdicts as the XML that CI servers read (the JUnit form, as Jenkins and GitLab take it): one test case per
-//! expression, and per node where an expression is judged for several.
+//! Verdicts as JUnit XML for CI servers (Jenkins, GitLab, GitHub): one test case per expression and node.
 
 use super::verdict::findings;
-use crate::measure::expression::verdict::{Ruling, Verdict};
-use crate::tasks::check::Report;
+use crate::measure::expression::verdict::{Outcome, Verdict};
+use crate::tasks::Failure;
+use crate::tasks::check::CheckReport;
 use std::fmt::Write;
 
-/// The whole document.
-pub fn document(report: &Report) -> String {
-    let count = |ruling| report.count(ruling);
+/// Returns the complete document.
+pub fn document(report: &CheckReport) -> String {
     let seconds = report.length.as_secs_f64();
     let counts = format!(
         "tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"0\" time=\"{seconds:.3}\"",
         report.verdicts.len(),
-        count(Ruling::Fail),
-        count(Ruling::NoData)
+        report.count(Outcome::Fail),
+        report.count(Outcome::NoData)
     );
-    let stamp = report.begun.map(|begun| {
-        let time = humantime::format_rfc3339_seconds(begun.wall.system_time()).to_string();
-        // The form knows no time zone.
+    let stamp = report.started.map(|started| {
+        let time = humantime::format_rfc3339_seconds(started.wall.system_time()).to_string();
+        // JUnit timestamps have no time zone.
         format!(" timestamp=\"{}\"", time.trim_end_matches('Z'))
     });
     let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     // Writing to a String cannot fail.
     let _ = writeln!(text, "<testsuites name=\"cangauge check\" {counts}>");
     let _ = writeln!(text, "  <testsuite name=\"cangauge check\" {counts}{}>", stamp.unwrap_or_default());
-    report.verdicts.iter().for_each(|verdict| case(&mut text, verdict, seconds));
+    report.verdicts.iter().for_each(|verdict| test_case(&mut text, verdict, &report.failures, seconds));
     text.push_str("  </testsuite>\n</testsuites>\n");
     text
 }
 
-fn case(text: &mut String, verdict: &Verdict, seconds: f64) {
+fn test_case(text: &mut String, verdict: &Verdict, failures: &[Failure], seconds: f64) {
     let class = verdict.node.map_or_else(|| "cangauge".to_owned(), |node| format!("cangauge.node-{node}"));
-    let (name, found) = (escaped(&verdict.text), escaped(&findings(verdict)));
+    let (name, found) = (escape(&verdict.text), escape(&findings(verdict, failures)));
     let _ = writeln!(text, "    <testcase classname=\"{class}\" name=\"{name}\" time=\"{seconds:.3}\">");
-    let _ = match verdict.ruling {
-        Ruling::Ok => writeln!(text, "      <system-out>{found}</system-out>"),
-        Ruling::Fail => {
+    let _ = match verdict.outcome {
+        Outcome::Ok => writeln!(text, "      <system-out>{found}</system-out>"),
+        Outcome::Fail => {
             writeln!(text, "      <failure type=\"check-failed\" message=\"{found}\">{name}: {found}</failure>")
         }
-        Ruling::NoData => writeln!(text, "      <error type=\"no-answer\" message=\"{found}\">{name}: {found}</error>"),
+        Outcome::NoData => {
+            writeln!(text, "      <error type=\"no-answer\" message=\"{found}\">{name}: {found}</error>")
+        }
     };
     text.push_str("    </testcase>\n");
 }
 
-/// Text as it may stand in XML, between tags and in attributes. Characters that XML 1.0 has not become U+FFFD.
-fn escaped(text: &str) -> String {
+/// Escapes text for XML elements and attributes. Characters that XML 1.0 does not allow become U+FFFD.
+fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for character in text.chars() {
         match character {
@@ -69,24 +70,26 @@ mod tests {
     use super::*;
     use crate::bus::{Mono, Stamp, Wall};
     use crate::canopen::id::NodeId;
+    use crate::measure::expression::verdict::Reason;
+    use crate::tasks::Kind;
     use std::time::Duration;
 
     #[test]
-    fn one_test_case_per_expression() {
-        let ok = Verdict { ruling: Ruling::Ok, reason: None, ..Verdict::nothing("a < 1 and b > 2", None, "") };
-        let fail = Verdict {
-            ruling: Ruling::Fail,
+    fn each_verdict_is_one_test_case() {
+        let verdict = |text: &str, outcome, node| Verdict {
+            outcome,
             reason: None,
-            node: NodeId::new(5).ok(),
-            ..Verdict::nothing("a in 1..2", None, "")
+            node,
+            ..Verdict::no_data(text, None, Reason::TooFewSamples)
         };
-        let none = Verdict::nothing("|a| < 1", None, "\"no\" <answer> & more\u{1b}\n");
-        let begun = Stamp { mono: Mono::START, wall: Wall::at(Duration::from_secs(1_700_000_000)) };
-        let report = Report {
+        let ok = verdict("a < 1 and b > 2", Outcome::Ok, None);
+        let fail = verdict("a in 1..2", Outcome::Fail, NodeId::new(5).ok());
+        let none = Verdict::no_data("|a| < 1", None, Reason::Failed(0));
+        let report = CheckReport {
             verdicts: vec![ok, fail, none],
-            begun: Some(begun),
+            started: Some(Stamp { mono: Mono::START, wall: Wall::at(Duration::from_secs(1_700_000_000)) }),
             length: Duration::from_millis(1500),
-            failures: Vec::new(),
+            failures: vec![Failure::new(Kind::NoAnswer, "\"no\" <answer> & more\u{1b}\n")],
             remarks: Vec::new(),
         };
         assert_eq!(

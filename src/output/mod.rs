@@ -1,5 +1,6 @@
 //! Rows and text: what goes to stdout, stderr and files. Knows no bus and no command line.
 
+pub mod check_progress;
 pub mod console;
 pub mod csv;
 mod elapsed;
@@ -10,7 +11,6 @@ pub mod interfaces;
 pub mod json;
 pub mod json_lss;
 pub mod junit;
-pub mod limits;
 pub mod pdo;
 pub mod progress;
 pub mod rows;

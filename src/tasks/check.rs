@@ -1,15 +1,14 @@
-//! Judges measurements by what is expected of them: one reading, or all of a recording.
+//! Checks measurements against expressions: one reading by SDO, or all samples of a recording.
 
 use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
 use crate::master::{Error, Master};
 use crate::measure::expression::Expression;
-use crate::measure::expression::bind::Offers;
-use crate::measure::expression::judge::Jury;
-use crate::measure::expression::verdict::{Ruling, Silence, Verdict};
+use crate::measure::expression::bind::AvailableSignals;
+use crate::measure::expression::evaluator::Evaluator;
+use crate::measure::expression::verdict::{MissingData, Outcome, Reason, Verdict};
 use crate::measure::sample::{Sample, Source};
-use crate::node::Node;
-use crate::node::Overrides;
+use crate::node::{Node, Overrides};
 use crate::tasks::log::{self, Mode, Note, Observer, RecordingReport, Remark, log};
 use crate::tasks::read::{Target, requests, sample, surveyed, targets};
 use crate::tasks::{Failure, Kind};
@@ -17,50 +16,63 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// What is expected, and how it is measured.
+/// What to check, and how to measure.
 #[derive(Clone, Debug)]
-pub struct Plan {
-    /// Of which nodes.
+pub struct CheckOptions {
+    /// The nodes.
     pub nodes: Vec<NodeId>,
-    /// Whether a node that lacks a signal is left out where another one has it.
-    pub excuse: bool,
-    /// What is expected.
+    /// Skip a node without the signal if another node has it.
+    pub skip_unsupported: bool,
+    /// All must be satisfied.
     pub expressions: Vec<Expression>,
-    /// How the values come, and for how long if not to the end of what is played; `None` for one reading by SDO.
-    pub measuring: Option<(Mode, Option<Duration>)>,
-    /// Descriptions named by the user.
+    /// Record with this mode, for this time or until the end of a replayed recording. `None`: one reading by SDO.
+    pub recording: Option<(Mode, Option<Duration>)>,
+    /// Descriptions given by the user.
     pub overrides: Overrides,
 }
 
-/// What came of it.
+/// The result of a check.
 #[derive(Clone, Debug)]
-pub struct Report {
-    /// In the order of the expressions and their nodes.
+pub struct CheckReport {
+    /// The verdicts, sorted by expression and node.
     pub verdicts: Vec<Verdict>,
-    /// When the first value came.
-    pub begun: Option<Stamp>,
-    /// From the first value to the last.
+    /// When the first value was received.
+    pub started: Option<Stamp>,
+    /// From the first value to the last one.
     pub length: Duration,
-    /// Why values did not come.
+    /// Why values are missing. [`Reason::Failed`] refers to these.
     pub failures: Vec<Failure>,
-    /// What else there is to say.
+    /// Further observations.
     pub remarks: Vec<Remark>,
 }
 
-impl Report {
-    /// How many of the expressions came to this.
-    pub fn count(&self, ruling: Ruling) -> usize {
-        self.verdicts.iter().filter(|verdict| verdict.ruling == ruling).count()
+impl CheckReport {
+    /// The report of a check that stopped before the first measurement.
+    pub fn not_measured(expressions: &[Expression], failure: Failure) -> CheckReport {
+        let verdict = |expression: &Expression| Verdict::no_data(expression.text(), None, Reason::Failed(0));
+        CheckReport {
+            verdicts: expressions.iter().map(verdict).collect(),
+            started: None,
+            length: Duration::ZERO,
+            failures: vec![failure],
+            remarks: Vec::new(),
+        }
+    }
+
+    /// The number of verdicts with this outcome.
+    pub fn count(&self, outcome: Outcome) -> usize {
+        self.verdicts.iter().filter(|verdict| verdict.outcome == outcome).count()
     }
 }
 
-/// Why not everything that was expected is so; nothing if it is.
+/// Checks that all verdicts are good.
 ///
 /// # Errors
-/// That something failed, else that there was nothing to judge by, with the reason in `failures`.
-pub fn all_met(verdicts: &[Verdict], failures: &[Failure]) -> Result<(), Failure> {
-    let count = |ruling| verdicts.iter().filter(|verdict| verdict.ruling == ruling).count();
-    let (failed, without, all) = (count(Ruling::Fail), count(Ruling::NoData), verdicts.len());
+/// `check-failed` if an expression is not satisfied. Otherwise, if data is missing: the failure that all missing data
+/// has in common, else `no-answer`.
+pub fn all_satisfied(verdicts: &[Verdict], failures: &[Failure]) -> Result<(), Failure> {
+    let count = |outcome| verdicts.iter().filter(|verdict| verdict.outcome == outcome).count();
+    let (failed, without, all) = (count(Outcome::Fail), count(Outcome::NoData), verdicts.len());
     let word = if all == 1 { "check" } else { "checks" };
     if failed > 0 {
         return Err(Failure::new(Kind::CheckFailed, format!("{failed} of {all} {word} failed")));
@@ -74,33 +86,39 @@ pub fn all_met(verdicts: &[Verdict], failures: &[Failure]) -> Result<(), Failure
     })
 }
 
-/// Measures and judges.
+/// Measures, and evaluates the expressions.
 ///
 /// # Errors
-/// Expressions that do not fit the devices, before anything is measured; what stops the measuring.
-pub fn check(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) -> Result<Report, Failure> {
-    plan.expressions.iter().try_for_each(|expression| expression.names_only(&plan.nodes))?;
-    match plan.measuring {
-        Some((mode, duration)) => record(master, plan, mode, duration, observer),
-        None => read_once(master, plan),
+/// Expressions that do not fit the devices (before anything is measured), and failures of the bus.
+pub fn check(
+    master: &mut Master<'_>,
+    options: &CheckOptions,
+    observer: &mut dyn Observer,
+) -> Result<CheckReport, Failure> {
+    options.expressions.iter().try_for_each(|expression| expression.check_nodes(&options.nodes))?;
+    match options.recording {
+        Some((mode, duration)) => check_recording(master, options, mode, duration, observer),
+        None => check_reading(master, options),
     }
 }
 
-fn read_once(master: &mut Master<'_>, plan: &Plan) -> Result<Report, Failure> {
-    master.listen_to(&plan.nodes)?;
-    let (mut instruments, mut failures, mut silent) = (Vec::new(), Vec::new(), Vec::new());
-    for (node, instrument) in plan.nodes.iter().zip(surveyed(master, &plan.nodes, &plan.overrides)?) {
-        match instrument {
-            Ok(instrument) => instruments.push(instrument),
+/// Reads each signal once by SDO.
+fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<CheckReport, Failure> {
+    master.listen_to(&options.nodes)?;
+    let (mut known, mut failures, mut missing) = (Vec::new(), Vec::new(), Vec::new());
+    for (&node, result) in options.nodes.iter().zip(surveyed(master, &options.nodes, &options.overrides)?) {
+        match result {
+            Ok(node) => known.push(node),
             Err(failure) => {
-                silent.push(Silence { node: *node, signal: None, reason: failure.message.clone() });
+                missing.push(MissingData { node, signal: None, reason: Reason::Failed(failures.len()) });
                 failures.push(failure);
             }
         }
     }
-    let mut jury = Jury::new(&plan.expressions);
-    jury.bind(&plan.nodes, &Offers::of_instruments(instruments.iter().map(Node::layout)), plan.excuse, &silent)?;
-    let all = wanted_targets(&instruments, &jury)?;
+    let mut evaluator = Evaluator::new(&options.expressions);
+    let available = AvailableSignals::from_layouts(known.iter().map(Node::layout));
+    evaluator.bind(&options.nodes, &available, options.skip_unsupported, &missing)?;
+    let all = wanted_targets(&known, &evaluator)?;
     let sources: Vec<Source> = all.iter().map(|target| target.source.clone()).collect();
     let mut answers = master.transfer(all.iter().flat_map(requests).collect(), &mut |_| {})?.into_iter();
     let mut samples: Vec<Sample> = Vec::new();
@@ -111,146 +129,147 @@ fn read_once(master: &mut Master<'_>, plan: &Plan) -> Result<Report, Failure> {
             Some(Ok(sample)) => samples.push(sample),
             Some(Err(error)) => {
                 let (node, signal) = (target.source.node, Some(target.source.signal.to_string()));
-                silent.push(Silence { node, signal, reason: error.to_string() });
+                missing.push(MissingData { node, signal, reason: Reason::Failed(failures.len()) });
                 failures.push(error.into());
             }
             None => {}
         }
     }
-    jury.take(&samples, &sources);
-    let verdicts = jury.verdicts(None, &silent);
-    let begun = samples.first().map(|sample| sample.at);
-    let length = begun.zip(samples.last()).map_or(Duration::ZERO, |(first, last)| last.at.mono.since(first.mono));
-    Ok(Report { verdicts, begun, length, failures, remarks: Vec::new() })
+    evaluator.add(&samples, &sources);
+    let verdicts = evaluator.verdicts(None, &missing);
+    let started = samples.first().map(|sample| sample.at);
+    let length = started.zip(samples.last()).map_or(Duration::ZERO, |(first, last)| last.at.mono.since(first.mono));
+    Ok(CheckReport { verdicts, started, length, failures, remarks: Vec::new() })
 }
 
-/// What is read of every instrument, numbered through.
-fn wanted_targets(instruments: &[Node], jury: &Jury) -> Result<Vec<Target>, Failure> {
+/// The objects to read of all nodes.
+fn wanted_targets(nodes: &[Node], evaluator: &Evaluator) -> Result<Vec<Target>, Failure> {
     let (mut all, mut number) = (Vec::new(), 0);
-    for instrument in instruments {
-        let wanted = jury.wanted_of(instrument.id);
-        // Nothing wanted would be everything.
+    for node in nodes {
+        let wanted = evaluator.wanted_of(node.id);
+        // An empty list would select all signals.
         if !wanted.is_empty() {
-            all.extend(targets(instrument, &wanted, &mut number)?);
+            all.extend(targets(node, &wanted, &mut number)?);
         }
     }
     Ok(all)
 }
 
-fn record(
+/// Records samples as `log` does, and evaluates each of them.
+fn check_recording(
     master: &mut Master<'_>,
-    plan: &Plan,
+    options: &CheckOptions,
     mode: Mode,
     duration: Option<Duration>,
     observer: &mut dyn Observer,
-) -> Result<Report, Failure> {
+) -> Result<CheckReport, Failure> {
     let mut wanted = Vec::new();
-    for item in plan.expressions.iter().flat_map(Expression::wanted) {
+    for item in options.expressions.iter().flat_map(Expression::wanted) {
         if !wanted.contains(&item) {
             wanted.push(item);
         }
     }
     let recording = log::Plan {
-        nodes: plan.nodes.clone(),
+        nodes: options.nodes.clone(),
         wanted,
         mode,
         duration,
         count: None,
         nmt: true,
         max_gap: None,
-        overrides: plan.overrides.clone(),
+        overrides: options.overrides.clone(),
     };
-    let mut expecting = Expecting::new(&plan.expressions, &plan.nodes, plan.excuse, observer);
-    let outcome = log(master, &recording, &mut expecting)?;
+    let mut checker = Checker::new(&options.expressions, &options.nodes, options.skip_unsupported, observer);
+    let outcome = log(master, &recording, &mut checker)?;
     if outcome.interrupted {
         return Err(Error::Interrupted.into());
     }
-    let begun = expecting.begun;
-    let verdicts = expecting.verdicts(&outcome)?;
+    let started = checker.started;
+    let verdicts = checker.verdicts(&outcome)?;
     let failures = outcome.nothing.into_iter().collect();
-    Ok(Report { verdicts, begun, length: outcome.length, failures, remarks: outcome.remarks })
+    Ok(CheckReport { verdicts, started, length: outcome.length, failures, remarks: outcome.remarks })
 }
 
-/// Judges what an observer is told of a recording.
-pub struct Expecting<'a> {
-    jury: Jury,
+/// An observer of a recording that evaluates expressions, and passes all calls on to another observer.
+pub struct Checker<'a> {
+    evaluator: Evaluator,
     nodes: Vec<NodeId>,
-    excuse: bool,
-    /// Whether the devices were known before they were recorded.
+    skip_unsupported: bool,
+    /// The devices were known before the recording.
     is_bound: bool,
-    /// The sources that something has come of, where the devices were not known: what is known of another one
-    /// may yet be learned.
-    came: BTreeSet<usize>,
-    begun: Option<Stamp>,
+    /// The sources with at least one sample, if the devices were not known before: the units of other sources may
+    /// still be unknown.
+    received: BTreeSet<usize>,
+    started: Option<Stamp>,
     failure: Option<Failure>,
     observer: &'a mut dyn Observer,
 }
 
-impl<'a> Expecting<'a> {
-    /// Passes everything on to `observer` and judges it by `expressions`. With `excuse`, a node that lacks a
-    /// signal is left out where another one has it.
+impl<'a> Checker<'a> {
+    /// With `skip_unsupported`, a node without the signal is skipped if another node has it.
     pub fn new(
         expressions: &[Expression],
         nodes: &[NodeId],
-        excuse: bool,
+        skip_unsupported: bool,
         observer: &'a mut dyn Observer,
-    ) -> Expecting<'a> {
-        Expecting {
-            jury: Jury::new(expressions),
+    ) -> Checker<'a> {
+        Checker {
+            evaluator: Evaluator::new(expressions),
             nodes: nodes.to_vec(),
-            excuse,
+            skip_unsupported,
             is_bound: false,
-            came: BTreeSet::new(),
-            begun: None,
+            received: BTreeSet::new(),
+            started: None,
             failure: None,
             observer,
         }
     }
 
-    fn judge(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
-        let before = self.came.len();
+    fn evaluate(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
+        let before = self.received.len();
         if !self.is_bound {
-            self.came.extend(samples.iter().map(|sample| sample.source));
+            self.received.extend(samples.iter().map(|sample| sample.source));
         }
-        if self.came.len() > before {
-            let came: Vec<Source> = self.came.iter().filter_map(|&source| sources.get(source)).cloned().collect();
-            if let Err(error) = self.jury.bind_recorded(&came) {
+        if self.received.len() > before {
+            let received = self.received.iter().filter_map(|&source| sources.get(source));
+            let received: Vec<Source> = received.cloned().collect();
+            if let Err(error) = self.evaluator.bind_recorded(&received) {
                 self.failure = Some(error.into());
                 return ControlFlow::Break(());
             }
         }
-        self.begun = self.begun.or(samples.first().map(|sample| sample.at));
-        self.jury.take(samples, sources);
+        self.started = self.started.or(samples.first().map(|sample| sample.at));
+        self.evaluator.add(samples, sources);
         ControlFlow::Continue(())
     }
 
-    /// The verdicts at the end of a recording.
+    /// Returns the verdicts at the end of a recording.
     ///
     /// # Errors
-    /// An expression that turned out not to fit the devices.
-    pub fn verdicts(mut self, outcome: &RecordingReport) -> Result<Vec<Verdict>, Failure> {
+    /// An expression that does not fit the devices, if they became known during the recording.
+    pub fn verdicts(mut self, report: &RecordingReport) -> Result<Vec<Verdict>, Failure> {
         if let Some(failure) = self.failure {
             return Err(failure);
         }
-        let silence = |node: &NodeId| {
-            let lost = || format!("node {node} was silent at the end");
-            let reason = outcome.nothing.as_ref().map_or_else(lost, |failure| failure.message.clone());
-            Silence { node: *node, signal: None, reason }
+        let missing = |&node: &NodeId| {
+            let reason = if report.nothing.is_some() { Reason::Failed(0) } else { Reason::NodeStopped(node) };
+            MissingData { node, signal: None, reason }
         };
-        let silent: Vec<Silence> = outcome.lost.iter().map(silence).collect();
-        if !self.is_bound && !self.excuse {
-            self.jury.settle_missing(&self.nodes);
+        let missing: Vec<MissingData> = report.lost.iter().map(missing).collect();
+        if !self.is_bound && !self.skip_unsupported {
+            self.evaluator.add_missing_nodes(&self.nodes);
         }
-        let end = self.begun.map(|begun| begun.mono + outcome.length);
-        Ok(self.jury.verdicts(end, &silent))
+        let end = self.started.map(|started| started.mono + report.length);
+        Ok(self.evaluator.verdicts(end, &missing))
     }
 }
 
-impl Observer for Expecting<'_> {
-    fn begin(&mut self, instruments: &[Node]) -> Result<(), Failure> {
-        self.jury.bind(&self.nodes, &Offers::of_instruments(instruments.iter().map(Node::layout)), self.excuse, &[])?;
+impl Observer for Checker<'_> {
+    fn begin(&mut self, nodes: &[Node]) -> Result<(), Failure> {
+        let available = AvailableSignals::from_layouts(nodes.iter().map(Node::layout));
+        self.evaluator.bind(&self.nodes, &available, self.skip_unsupported, &[])?;
         self.is_bound = true;
-        self.observer.begin(instruments)
+        self.observer.begin(nodes)
     }
 
     fn sources(&mut self, sources: &[Source]) -> Result<(), Failure> {
@@ -262,12 +281,12 @@ impl Observer for Expecting<'_> {
     }
 
     fn polled(&mut self, cycle: u64, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
-        self.judge(samples, sources)?;
+        self.evaluate(samples, sources)?;
         self.observer.polled(cycle, samples, sources)
     }
 
     fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
-        self.judge(samples, sources)?;
+        self.evaluate(samples, sources)?;
         self.observer.samples(samples, sources)
     }
 
@@ -276,7 +295,7 @@ impl Observer for Expecting<'_> {
     }
 
     fn tick(&mut self, at: Stamp, rows: u64) -> ControlFlow<()> {
-        self.observer.standing(&self.jury, at);
+        self.observer.evaluated(&self.evaluator, at);
         self.observer.tick(at, rows)
     }
 }

@@ -23,7 +23,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
 use crate::master::{Error, Master};
 use crate::measure::decode::Wanted;
-use crate::measure::expression::judge::Jury;
+use crate::measure::expression::evaluator::Evaluator;
 use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
 use crate::node::Node;
@@ -151,8 +151,8 @@ pub trait Observer {
     /// An event.
     fn note(&mut self, note: &Note, at: Stamp);
 
-    /// The present state of the checks, before each tick.
-    fn standing(&mut self, _jury: &Jury, _at: Stamp) {}
+    /// The present state of the expressions, as often as [`Observer::tick`].
+    fn evaluated(&mut self, _evaluator: &Evaluator, _at: Stamp) {}
 
     /// Time passes: called ten times a second.
     fn tick(&mut self, at: Stamp, rows: u64) -> ControlFlow<()>;

@@ -1,4 +1,4 @@
-//! `cangauge check` and `log --expect`: what holds, what does not, and what cannot be told.
+//! `cangauge check` and `log --expect`: satisfied, failed, and without data.
 
 use super::Bench;
 use serde_json::json;
@@ -8,8 +8,8 @@ use std::io::{BufRead, BufReader, Read};
 #[cfg(unix)]
 use std::process::{Command, Stdio};
 
-/// Devices whose quantities stand still.
-fn still() -> Bench {
+/// Devices with constant values.
+fn constant() -> Bench {
     let device = |kind: &str, node: u8, channels: &[f64]| {
         let channel = |(at, base): (usize, &f64)| {
             format!("[[device.channel]]\nchannel = {}\nbase = {base:?}\namplitude = 0.0\nnoise = 0.0\n", at + 1)
@@ -20,7 +20,7 @@ fn still() -> Bench {
     Bench::described(&[device("mh4", 5, &[1.25, 25.5]), device("dps", 127, &[50.0])].concat())
 }
 
-/// An MH-4 that is in overload from 300 ms on, for 200 ms.
+/// An MH-4 in overload from 300 ms to 500 ms.
 fn overloaded() -> Bench {
     Bench::described(
         "[[device]]\nkind = \"mh4\"\nnode = 5\n\
@@ -34,7 +34,7 @@ fn check(bench: &Bench, words: &[&str]) -> super::Done {
 
 #[test]
 fn one_reading() {
-    let bench = still();
+    let bench = constant();
     let done = check(&bench, &["5", "pressure in 1..1.5 bar", "temperature < 60", "|pressure| <= 1.25"]).prints(
         "ok    pressure in 1..1.5 bar  1.25 bar\n\
          ok    temperature < 60        25.5 degC\n\
@@ -55,8 +55,8 @@ fn one_reading() {
 }
 
 #[test]
-fn units() {
-    let bench = still();
+fn units_are_converted() {
+    let bench = constant();
     // 50 psi are 3.44738 bar.
     check(&bench, &["127", "pressure in 3.44..3.45 bar"]).prints("ok    pressure in 3.44..3.45 bar  3.447379 bar\n");
     check(&bench, &["127", "pressure <= 50.000"]).prints("ok    pressure <= 50.000  50.000 psi\n");
@@ -67,8 +67,8 @@ fn units() {
 }
 
 #[test]
-fn every_node_for_itself() {
-    let bench = still();
+fn each_node_is_checked() {
+    let bench = constant();
     let done = check(&bench, &["5,127", "pressure < 2 bar", "5.temperature < 60"]).exit(1);
     assert_eq!(
         done.stdout,
@@ -78,16 +78,16 @@ fn every_node_for_itself() {
     );
     check(&bench, &["5,127", "temperature < 60"]).fails(
         2,
-        "cangauge: node 127 has no signal \"temperature\"\n  temperature < 60\n  ^\nhint: it has: pressure\n",
+        "cangauge: node 127: no signal \"temperature\" (it has: pressure)\n  temperature < 60\n  ^\n",
     );
-    // Where everybody was meant, who has it not is excused.
+    // With `all`, nodes without the signal are skipped.
     check(&bench, &["all", "temperature < 60"]).prints("ok    temperature < 60  25.5 degC\n");
     check(&bench, &["all", "humidity < 60"]).exit(2);
 }
 
 #[test]
-fn wrong_words_are_refused_before_the_bus_is_opened() {
-    let bench = still();
+fn wrong_arguments_are_refused_before_the_bus_is_opened() {
+    let bench = constant();
     let refuses = |words: &[&str], stderr: &str| {
         let done = check(&bench, words);
         assert_eq!(done.stderr, stderr);
@@ -95,17 +95,17 @@ fn wrong_words_are_refused_before_the_bus_is_opened() {
     };
     refuses(
         &["5", "pressure < 3 furlong"],
-        "cangauge: \"furlong\" is not a known unit\n  pressure < 3 furlong\n               ^\n\
-         hint: some that are: bar, mbar, kPa, MPa, psi, degC, degF, K, mV, mA, Hz, ms\n",
+        "cangauge: unknown unit \"furlong\"\n  pressure < 3 furlong\n               ^\n\
+         hint: common units: bar, mbar, kPa, MPa, psi, degC, degF, K, mV, mA, Hz, ms\n",
     );
     refuses(
         &["5", "noise(pressure) < 1"],
-        "cangauge: noise() of one reading says nothing\nhint: measure for a while: --for 10s\n",
+        "cangauge: noise() needs more than one reading\nhint: measure for some time: --for 10s\n",
     );
-    refuses(&["5", "6.pressure < 3"], "cangauge: node 6 is none of those named\n  6.pressure < 3\n  ^\n");
+    refuses(&["5", "6.pressure < 3"], "cangauge: node 6 is not one of the given nodes\n  6.pressure < 3\n  ^\n");
     refuses(
         &["5", "pressure < 3\t\u{b0}C\n&& x"],
-        "cangauge: \"&&\" means nothing here; write and\n  pressure < 3 \u{b0}C && x\n                  ^\nhint: cangauge check --help\n",
+        "cangauge: \"&&\" is not supported here; use and\n  pressure < 3 \u{b0}C && x\n                  ^\nhint: cangauge check --help\n",
     );
     for words in [&["5"][..], &["5", ""], &["0", "pressure < 3"], &["5", "pressure < 3", "--sync", "10ms"]] {
         let done = check(&bench, words).exit(2);
@@ -119,24 +119,24 @@ fn wrong_words_are_refused_before_the_bus_is_opened() {
 }
 
 #[test]
-fn what_does_not_fit_the_device_is_refused_before_anything_is_measured() {
-    let bench = still();
+fn unknown_signals_and_wrong_units_are_refused_before_measuring() {
+    let bench = constant();
     check(&bench, &["5", "presure < 3"]).fails(
         2,
-        "cangauge: node 5 has no signal \"presure\"\n  presure < 3\n  ^\n\
-         hint: it has: pressure, temperature, pressure.status, temperature.status\n",
+        "cangauge: node 5: no signal \"presure\" \
+         (it has: pressure, temperature, pressure.status, temperature.status)\n  presure < 3\n  ^\n",
     );
     let done = check(&bench, &["5", "temperature < 3 bar", "--for", "1s", "--sync", "10ms"]).exit(2);
     assert_eq!(
         done.stderr,
-        "cangauge: temperature is in degC, and 3 bar is in bar\n  temperature < 3 bar\n                ^\n"
+        "cangauge: units do not match: temperature is in degC, 3 bar is in bar\n  temperature < 3 bar\n                ^\n"
     );
     assert_eq!((done.frames_of("000").len(), done.frames_of("080").len()), (0, 0), "nothing was started");
 }
 
 #[test]
-fn every_sample_of_a_recording() {
-    let bench = still();
+fn each_sample_of_a_recording_is_checked() {
+    let bench = constant();
     let done =
         check(&bench, &["5,127", "pressure < 4 bar", "rate(pressure) in 5..200", "--for", "2s", "--sync", "10ms"]);
     let lines: Vec<&str> = done.stdout.lines().collect();
@@ -145,7 +145,7 @@ fn every_sample_of_a_recording() {
     assert!(lines[2].starts_with("ok    5    rate(pressure) in 5..200  100.0"), "{}", lines[2]);
     assert_eq!(done.frames_of("080").len(), 200);
     done.exit(0);
-    // Polled, nothing is started.
+    // With --poll no node is started.
     let done = check(&bench, &["5", "mean(temperature) == 25.5", "--for", "1s", "--poll", "100ms"]);
     assert_eq!(done.stdout, "ok    mean(temperature) == 25.5  25.5 degC (n 10)\n");
     assert_eq!(done.exit(0).frames_of("000"), [""; 0]);
@@ -169,15 +169,15 @@ fn an_invalid_sample_fails() {
 }
 
 #[test]
-fn without_data() {
-    let bench = still();
+fn missing_data_is_no_success() {
+    let bench = constant();
     let done = check(&bench, &["9", "pressure < 3"]).exit(3);
     assert_eq!(done.stdout, "none  pressure < 3  no data: node 9: read 0x1000:0: no answer within 500 ms\n");
     assert_eq!(
         done.stderr,
         "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: who is there: cangauge scan\n"
     );
-    // What fails outweighs what could not be judged.
+    // A failed check has priority over missing data.
     check(&bench, &["5,9", "pressure < 3"]).exit(3);
     let done = check(&bench, &["5,9", "pressure < 1", "|5.pressure - 9.pressure| < 1"]).exit(1);
     let words: Vec<&str> = done.stdout.lines().map(|line| &line[..6]).collect();
@@ -192,12 +192,12 @@ fn without_data() {
         done.stdout
     );
     let done = check(&bench, &["5", "noise(pressure) < 3", "--for", "100ms", "--poll", "1s"]).exit(3);
-    assert_eq!(done.stdout, "none  noise(pressure) < 3  no data: there are too few samples for it\n");
+    assert_eq!(done.stdout, "none  noise(pressure) < 3  no data: too few samples\n");
 }
 
 #[test]
 fn json_and_csv() {
-    let bench = still();
+    let bench = constant();
     let rows = check(&bench, &["5,127", "pressure < 2 bar", "-f", "json"]).exit(1).json();
     assert_eq!(
         rows[0],
@@ -215,8 +215,8 @@ fn json_and_csv() {
 }
 
 #[test]
-fn a_report_for_ci_servers() {
-    let bench = still();
+fn junit_reports() {
+    let bench = constant();
     let words = ["5", "pressure < 1 bar", "temperature > 20", "--junit", "report.xml"];
     let done = check(&bench, &words).exit(1);
     assert_eq!(done.stdout.lines().count(), 2);
@@ -226,13 +226,13 @@ fn a_report_for_ci_servers() {
     assert!(report.contains("<testcase classname=\"cangauge.node-5\" name=\"pressure &lt; 1 bar\""), "{report}");
     assert!(report.contains("message=\"1.25 bar\">pressure &lt; 1 bar: 1.25 bar</failure>"), "{report}");
     assert_eq!(report.matches("<testcase ").count(), 2);
-    // A file that exists is not touched unasked.
+    // An existing file is not overwritten.
     fs::write(bench.path("report.xml"), "old").expect("written");
     check(&bench, &words).refuses("report.xml exists");
     assert_eq!(bench.text("report.xml"), "old");
     check(&bench, &[&words[..], &["--force"]].concat()).exit(1);
     assert_eq!(bench.text("report.xml"), report.replace(timestamp(&report), timestamp(&bench.text("report.xml"))));
-    // Nobody answers: an error for each expression, and no file where the words were wrong.
+    // No answer: an error for each expression. Wrong arguments: no file.
     check(&bench, &["9", "pressure < 1", "--junit", "silent.xml", "--for", "1s"]).exit(3);
     assert!(
         bench.text("silent.xml").contains(" tests=\"1\" failures=\"0\" errors=\"1\" "),
@@ -248,35 +248,31 @@ fn timestamp(report: &str) -> &str {
 }
 
 #[test]
-fn a_log_with_expectations() {
-    let bench = still();
+fn log_with_expressions() {
+    let bench = constant();
     let log = |more: &[&str]| {
         bench.run_words(&[&["log", "5", "--sync", "10ms", "--count", "20", "-o", "run.csv", "--force"], more].concat())
     };
     let done = log(&["--expect", "pressure in 1..2 bar", "--expect", "rate(pressure) > 50"]).exit(0);
     assert!(done.stderr.contains("ok: node 5: pressure in 1..2 bar: 1.25 bar (n "), "{}", done.stderr);
     let done = log(&["--expect", "pressure < 1 bar", "--summary", "summary.json"]).exit(1);
-    assert!(
-        done.stderr.contains("warning: not as expected: node 5: pressure < 1 bar: 1.25 bar at "),
-        "{}",
-        done.stderr
-    );
+    assert!(done.stderr.contains("warning: failed: node 5: pressure < 1 bar: 1.25 bar at "), "{}", done.stderr);
     assert_eq!(done.stderr.lines().last(), Some("cangauge: 1 of 1 check failed"));
     assert_eq!(bench.text("run.csv").lines().count(), 21, "the file stays");
     assert!(bench.text("summary.json").contains("\"rows\":20"));
-    log(&["--expect", "6.pressure < 1"]).refuses("node 6 is none of those named");
+    log(&["--expect", "6.pressure < 1"]).refuses("node 6 is not one of the given nodes");
     bench
         .run_words(&["log", "5", "pressure", "--sync", "10ms", "--count", "2", "--expect", "temperature < 1"])
         .refuses("temperature is not recorded");
     let done = log(&["--expect", "pressure < 1 degC"]).exit(2);
     assert_eq!(done.frames_of("000"), [""; 0], "nothing was started");
-    // What is not mapped does not come.
+    // An object that is not mapped is not received.
     let done = log(&["--expect", "0x1001:0 == 0"]).exit(3);
     assert!(done.stderr.contains("no data for 1 of 1 check"), "{}", done.stderr);
 }
 
 #[test]
-fn who_only_listens_learns_the_units_on_the_way() {
+fn a_passive_log_learns_units_from_the_traffic() {
     let bench = Bench::described(
         "[[device]]\nkind = \"dps\"\nnode = 5\nstart = true\n\
          [[device.channel]]\nchannel = 1\nbase = 50.0\namplitude = 0.0\nnoise = 0.0\n",
@@ -288,12 +284,12 @@ fn who_only_listens_learns_the_units_on_the_way() {
     assert!(done.stderr.contains("ok: node 5: pressure in 49..51: 50.000"), "{}", done.stderr);
     log("5.pressure < 49").exit(1);
     let done = log("temperature < 49").exit(3);
-    assert!(done.stderr.contains("temperature < 49: no data: nothing of it was measured"), "{}", done.stderr);
+    assert!(done.stderr.contains("temperature < 49: no data: none of its signals was received"), "{}", done.stderr);
 }
 
 #[test]
-fn a_recording_is_judged_from_its_beginning_to_its_end() {
-    let bench = still();
+fn a_replayed_recording_is_checked_completely() {
+    let bench = constant();
     bench.run("log 5,127 --sync 10ms --duration 2s").exit(0);
     fs::rename(bench.path("trace"), bench.path("t.log")).expect("the trace");
     let replay = |words: &[&str]| bench.finish(&mut bench.command(&[&["-b", "replay:t.log", "check"], words].concat()));
@@ -305,18 +301,22 @@ fn a_recording_is_judged_from_its_beginning_to_its_end() {
     );
     assert_eq!(done.stdout.lines().count(), 4);
     replay(&["all", "pressure < 2 bar"]).exit(1);
-    // Who was named and is not in it is no success.
+    // A named node that is not in the recording is no success.
     let done = replay(&["5,9", "pressure < 2 bar"]).exit(3);
-    assert!(done.stdout.contains("none  9  pressure < 2 bar  no data: node 9 gave nothing of it\n"), "{}", done.stdout);
+    assert!(
+        done.stdout.contains("none  9  pressure < 2 bar  no data: node 9 sent none of its signals\n"),
+        "{}",
+        done.stdout
+    );
     replay(&["5", "humidity < 2"]).exit(3);
     replay(&["5", "pressure < 2 degC"]).exit(2);
     replay(&["5", "pressure < 2", "--for", "1s", "--poll", "10ms"])
-        .refuses("a recording (replay:) receives only: --sync and --poll send");
+        .refuses("a recording (replay:) is receive-only: --sync and --poll send");
 }
 
 #[test]
 #[cfg(unix)]
-fn a_check_that_is_cut_short_says_nothing() {
+fn an_interrupted_check_prints_no_verdict() {
     let bench = Bench::real("mh4@1");
     let check = ["check", "1", "pressure < 1000", "--for", "1h", "--poll", "10ms", "--junit", "r.xml"];
     let mut command = bench.command(&[&["-b", &bench.bus, "--trace", "-"], &check[..]].concat());
@@ -325,7 +325,7 @@ fn a_check_that_is_cut_short_says_nothing() {
     let mut line = String::new();
     while !line.contains("601#40306101") {
         line.clear();
-        assert!(reader.read_line(&mut line).expect("a line") > 0, "it ended before it had measured");
+        assert!(reader.read_line(&mut line).expect("a line") > 0, "it ended before the first measurement");
     }
     let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
     assert!(killed.success());
@@ -337,9 +337,9 @@ fn a_check_that_is_cut_short_says_nothing() {
     assert!(bench.text("r.xml").contains(" errors=\"1\""));
 }
 
-/// Filters smooth: noise of 0.5 bar, evenly spread (0.29 bar), at the output of an MH-4.
+/// Noise of 0.5 bar, evenly distributed (standard deviation 0.29 bar), at the input of an MH-4.
 #[test]
-fn a_filter_takes_the_noise_out() {
+fn a_filter_reduces_noise() {
     let noisy = |set: &str| {
         Bench::described(&format!(
             "[[device]]\nkind = \"mh4\"\nnode = 5\nset = {{ {set} }}\n\

@@ -337,15 +337,15 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
                 Measuring::Poll { ms, for_ms: length } => Some((Mode::Poll(Duration::from_millis(ms)), for_ms(length))),
             };
             let parsed = expected.iter().map(|one| Expression::parse(&one.to_string()).expect("an expression"));
-            let plan = check::Plan {
+            let options = check::CheckOptions {
                 nodes: nodes(ids),
-                excuse: *excuse,
+                skip_unsupported: *excuse,
                 expressions: parsed.collect(),
-                measuring,
+                recording: measuring,
                 overrides: none.clone(),
             };
-            let report = check::check(master, &plan, heard)?;
-            let met = check::all_met(&report.verdicts, &report.failures);
+            let report = check::check(master, &options, heard)?;
+            let met = check::all_satisfied(&report.verdicts, &report.failures);
             heard.verdicts = report.verdicts;
             met?;
             Said::Held

@@ -1,9 +1,9 @@
-//! An expression meets the devices: its signals are found, its units brought together.
+//! Connects an expression to the devices: finds its signals and converts its units.
 
-use super::dimension::{Dimension, Typed, Zeros, absolute, alike, calculate, negative, within};
-use super::evaluate::{Formula, Rule};
+use super::dimension::{Dimension, Offsets, Typed, absolute, calculate, negative, to_one_unit, within};
+use super::formula::{Formula, Rule};
 use super::tree::{Condition, Function, Quantity, SignalName};
-use super::{Expression, ExpressionError, Fault};
+use super::{Expression, ExpressionError, LocatedError};
 use crate::canopen::id::NodeId;
 use crate::device::nearest::distance;
 use crate::device::unit::Unit;
@@ -11,210 +11,219 @@ use crate::measure::decode::Wanted;
 use crate::measure::layout::Layout;
 use crate::measure::sample::Source;
 
-/// A signal that there is.
+/// How many signals an error lists.
+const MAX_LISTED: usize = 8;
+
+/// A signal that a node has.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Offer {
-    /// Of which node.
+pub struct AvailableSignal {
+    /// The node.
     pub node: NodeId,
-    /// As it stands in a [`Source`].
+    /// The name as in [`Source`].
     pub name: String,
-    /// Its unit, where the device tells one.
+    /// The unit, if known.
     pub unit: Option<Unit>,
 }
 
-/// What is offered.
+/// The signals that expressions can use.
 #[derive(Clone, Debug, Default)]
-pub struct Offers {
-    signals: Vec<Offer>,
-    /// Nodes that may be asked for any object.
-    open: Vec<NodeId>,
+pub struct AvailableSignals {
+    signals: Vec<AvailableSignal>,
+    /// Nodes whose objects can all be read by address.
+    readable: Vec<NodeId>,
 }
 
-impl Offers {
-    /// Everything that these devices have.
-    pub fn of_instruments<'a>(instruments: impl IntoIterator<Item = Layout<'a>>) -> Offers {
-        let mut offers = Offers::default();
-        for instrument in instruments {
-            offers.open.push(instrument.node);
-            for signal in instrument.signals {
-                let offer = |name: String, unit| Offer { node: instrument.node, name, unit };
-                offers.signals.push(offer(signal.name.clone(), signal.unit));
+impl AvailableSignals {
+    /// All signals of these nodes, and all objects by address.
+    pub fn from_layouts<'a>(layouts: impl IntoIterator<Item = Layout<'a>>) -> AvailableSignals {
+        let mut available = AvailableSignals::default();
+        for layout in layouts {
+            available.readable.push(layout.node);
+            for signal in layout.signals {
+                let node = layout.node;
+                let entry = |name: String, unit| AvailableSignal { node, name, unit };
+                available.signals.push(entry(signal.name.clone(), signal.unit));
                 if signal.status.is_some() {
-                    offers.signals.push(offer(format!("{}.status", signal.name), None));
+                    available.signals.push(entry(format!("{}.status", signal.name), None));
                 }
             }
         }
-        offers
+        available
     }
 
-    /// What is recorded.
-    pub fn of_sources(sources: &[Source]) -> Offers {
-        let offer =
-            |source: &Source| Offer { node: source.node, name: source.signal.to_string(), unit: unit_of(source) };
-        Offers { signals: sources.iter().map(offer).collect(), open: Vec::new() }
+    /// The signals of a recording.
+    pub fn from_sources(sources: &[Source]) -> AvailableSignals {
+        let entry = |source: &Source| AvailableSignal {
+            node: source.node,
+            name: source.signal.to_string(),
+            unit: unit_of(source),
+        };
+        AvailableSignals { signals: sources.iter().map(entry).collect(), readable: Vec::new() }
     }
 
-    /// The nodes that offer something, each once.
+    /// The nodes with at least one signal, without repetitions.
     pub fn nodes(&self) -> Vec<NodeId> {
-        let mut nodes = self.open.clone();
-        nodes.extend(self.signals.iter().map(|offer| offer.node));
+        let mut nodes = self.readable.clone();
+        nodes.extend(self.signals.iter().map(|signal| signal.node));
         nodes.sort_unstable();
         nodes.dedup();
         nodes
     }
 
-    /// The unit of a signal of a node, where there is such a signal.
+    /// The unit of a signal. The outer `None` means that the node has no such signal.
     fn find(&self, node: NodeId, signal: &SignalName) -> Option<Option<Unit>> {
         let name = signal.name();
-        let offer = self.signals.iter().find(|offer| offer.node == node && offer.name == name);
-        let open = || matches!(signal.what, Wanted::Object(_)) && self.open.contains(&node);
-        offer.map(|offer| offer.unit).or_else(|| open().then_some(None))
+        let known = self.signals.iter().find(|known| known.node == node && known.name == name);
+        let is_readable = || matches!(signal.what, Wanted::Object(_)) && self.readable.contains(&node);
+        known.map(|known| known.unit).or_else(|| is_readable().then_some(None))
     }
 
-    /// Whether `node` has everything that an expression names without a node.
+    /// Whether all signals of an expression exist. Those without a node are searched at `node`.
     pub fn has_all(&self, node: NodeId, expression: &Expression) -> bool {
         expression.signals().iter().all(|signal| self.find(signal.node.unwrap_or(node), signal).is_some())
     }
 
-    /// The names of a node's signals, those first that are most like `name`.
-    fn like(&self, node: NodeId, name: &str) -> Vec<&str> {
+    /// The names of a node's signals, the most similar to `name` first.
+    fn nearest(&self, node: NodeId, name: &str) -> Vec<&str> {
         let mut names: Vec<&str> =
-            self.signals.iter().filter(|offer| offer.node == node).map(|offer| offer.name.as_str()).collect();
+            self.signals.iter().filter(|signal| signal.node == node).map(|signal| signal.name.as_str()).collect();
         names.sort_by_key(|known| distance(name, known));
         names
     }
 }
 
-/// The unit of what is recorded, where its device tells one.
+/// The unit of a recorded signal, if known.
 pub(super) fn unit_of(source: &Source) -> Option<Unit> {
     Unit::from_symbol(&source.unit).filter(|_| !source.unit.is_empty())
 }
 
-/// Something measured that an expression needs.
+/// A measured value that an expression needs.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Slot {
-    /// Of which node.
+pub struct Input {
+    /// The node.
     pub node: NodeId,
-    /// As it stands in a [`Source`].
+    /// The name as in [`Source`].
     pub name: String,
-    /// What has to be measured.
+    /// What to measure.
     pub what: Wanted,
-    /// Its unit, where the device tells one.
+    /// The unit, if known.
     pub unit: Option<Unit>,
 }
 
-/// A quantity whose value a verdict shows.
+/// A quantity whose value the verdict shows.
 #[derive(Clone, Debug)]
-pub(super) struct Display {
+pub(super) struct ShownQuantity {
     pub(super) name: String,
     pub(super) formula: Formula,
     pub(super) unit: Option<Unit>,
 }
 
-/// Samples gathered to one number.
+/// A function of all samples.
 #[derive(Clone, Debug)]
-pub(super) struct Gathered {
+pub(super) struct Aggregate {
     pub(super) function: Function,
     pub(super) argument: Formula,
     name: String,
 }
 
-/// An expression whose signals are known, for one node where it names none.
+/// An expression whose signals and units are known.
 #[derive(Clone, Debug)]
-pub struct Bound {
-    /// The expression as it was written.
+pub struct BoundExpression {
+    /// The expression as entered.
     pub text: String,
-    /// The node that its signals without a node are of; `None` where every signal names one.
+    /// The node of all signals without a node. `None` if each signal has one.
     pub node: Option<NodeId>,
-    /// What is measured for it.
-    pub slots: Vec<Slot>,
-    /// The parts that are judged with every sample, and those that are judged at the end.
-    pub(super) by_sample: Vec<Rule>,
-    pub(super) at_the_end: Vec<Rule>,
-    pub(super) gathered: Vec<Gathered>,
-    pub(super) displays: Vec<Display>,
+    /// The values to measure.
+    pub inputs: Vec<Input>,
+    /// The parts that are evaluated with each sample.
+    pub(super) sample_rules: Vec<Rule>,
+    /// The parts that are evaluated after the last sample.
+    pub(super) final_rules: Vec<Rule>,
+    pub(super) aggregates: Vec<Aggregate>,
+    pub(super) shown: Vec<ShownQuantity>,
 }
 
 impl Expression {
-    /// Whether it speaks of every node that is checked.
-    pub fn is_of_every_node(&self) -> bool {
+    /// Whether it applies to each node that is checked: one of its signals has no node.
+    pub fn applies_to_each_node(&self) -> bool {
         self.signals().iter().any(|signal| signal.node.is_none())
     }
 
-    /// That it names no node but these.
+    /// Checks that it names no other nodes than these.
     ///
     /// # Errors
-    /// The first other one.
-    pub fn names_only(&self, nodes: &[NodeId]) -> Result<(), ExpressionError> {
+    /// The first other node.
+    pub fn check_nodes(&self, nodes: &[NodeId]) -> Result<(), ExpressionError> {
         for signal in self.signals() {
             if let Some(node) = signal.node.filter(|node| !nodes.contains(node)) {
-                return Err(self.fail(signal.at, format!("node {node} is none of those named")));
+                return Err(self.error(signal.at, format!("node {node} is not one of the given nodes")));
             }
         }
         Ok(())
     }
 
-    /// That it needs nothing but this.
+    /// Checks that it needs no other signals than the recorded ones.
     ///
     /// # Errors
     /// The first other signal.
-    pub fn needs_only(&self, recorded: &[&Wanted]) -> Result<(), ExpressionError> {
-        let other = |signal: &&SignalName| !recorded.contains(&&signal.what);
-        match self.signals().into_iter().find(other) {
-            Some(signal) => Err(self.fail(signal.at, format!("{} is not recorded", signal.name()))),
+    pub fn check_recorded(&self, recorded: &[&Wanted]) -> Result<(), ExpressionError> {
+        let missing = |signal: &&SignalName| !recorded.contains(&&signal.what);
+        match self.signals().into_iter().find(missing) {
+            Some(signal) => Err(self.error(signal.at, format!("{} is not recorded", signal.name()))),
             None => Ok(()),
         }
     }
 
-    /// Finds its signals among what is offered, those without a node at `node`.
+    /// Finds its signals. Signals without a node are searched at `node`.
     ///
     /// # Errors
-    /// A signal that there is not, with the nearest ones; units that do not go together.
-    pub fn bind(&self, node: Option<NodeId>, offers: &Offers) -> Result<Bound, ExpressionError> {
-        let node = node.filter(|_| self.is_of_every_node());
+    /// A signal that does not exist, or units that cannot be compared.
+    pub fn bind(&self, node: Option<NodeId>, available: &AvailableSignals) -> Result<BoundExpression, ExpressionError> {
+        let node = node.filter(|_| self.applies_to_each_node());
         let mut binder = Binder {
-            offers,
+            available,
             node,
-            bound: Bound {
+            bound: BoundExpression {
                 text: self.text.clone(),
                 node,
-                slots: Vec::new(),
-                by_sample: Vec::new(),
-                at_the_end: Vec::new(),
-                gathered: Vec::new(),
-                displays: Vec::new(),
+                inputs: Vec::new(),
+                sample_rules: Vec::new(),
+                final_rules: Vec::new(),
+                aggregates: Vec::new(),
+                shown: Vec::new(),
             },
         };
         for part in &self.parts {
-            let rule = binder.rule(part).map_err(|fault| fault.of(&self.text))?;
+            let rule = binder.rule(part).map_err(|error| error.in_text(&self.text))?;
             let mut functions = Vec::new();
             part.functions(&mut functions);
-            let parts = if functions.is_empty() { &mut binder.bound.by_sample } else { &mut binder.bound.at_the_end };
-            parts.push(rule);
+            let bound = &mut binder.bound;
+            let rules = if functions.is_empty() { &mut bound.sample_rules } else { &mut bound.final_rules };
+            rules.push(rule);
         }
         Ok(binder.bound)
     }
 }
 
 struct Binder<'a> {
-    offers: &'a Offers,
+    available: &'a AvailableSignals,
     node: Option<NodeId>,
-    bound: Bound,
+    bound: BoundExpression,
 }
 
 impl Binder<'_> {
-    fn rule(&mut self, condition: &Condition) -> Result<Rule, Fault> {
+    fn rule(&mut self, condition: &Condition) -> Result<Rule, LocatedError> {
         Ok(match condition {
-            Condition::Compare(left, comparison, right, _) => {
-                let (left, right) = alike(self.typed(left)?, self.typed(right)?)?;
+            Condition::Compare(left, relation, right, _) => {
+                let (left, right) = to_one_unit(self.typed(left)?, self.typed(right)?)?;
                 let exact = left.exact && right.exact;
-                let [left, right] = [left, right].map(|side| self.displayed(side));
-                Rule::Compare(left, *comparison, right, exact)
+                let [left, right] = [left, right].map(|side| self.show(side));
+                Rule::Compare(left, *relation, right, exact)
             }
             Condition::Within(value, low, high, _) => {
                 let sides = within(self.typed(value)?, self.typed(low)?, self.typed(high)?)?;
                 let exact = sides.iter().all(|side| side.exact);
-                let [value, low, high] = sides.map(|side| self.displayed(side));
+                let [value, low, high] = sides.map(|side| self.show(side));
                 Rule::Within(value, low, high, exact)
             }
             Condition::And(left, right) => Rule::And(Box::new(self.rule(left)?), Box::new(self.rule(right)?)),
@@ -223,31 +232,32 @@ impl Binder<'_> {
         })
     }
 
-    /// Remembers what was measured, to be shown with the verdict.
-    fn displayed(&mut self, side: Typed) -> Formula {
+    /// Adds a measured quantity to those that the verdict shows. Returns its formula.
+    fn show(&mut self, side: Typed) -> Formula {
         let unit = match side.dimension {
             Dimension::In(unit, _) => Some(unit),
-            Dimension::Bare | Dimension::Plain => None,
+            Dimension::Literal | Dimension::None => None,
         };
-        let shown = |known: &Display| known.name == side.name && known.unit == unit;
-        if side.formula.constant().is_none() && !self.bound.displays.iter().any(shown) {
-            self.bound.displays.push(Display { name: side.name, formula: side.formula.clone(), unit });
+        let is_shown = |known: &ShownQuantity| known.name == side.name && known.unit == unit;
+        if side.formula.constant().is_none() && !self.bound.shown.iter().any(is_shown) {
+            self.bound.shown.push(ShownQuantity { name: side.name, formula: side.formula.clone(), unit });
         }
         side.formula
     }
 
-    fn typed(&mut self, quantity: &Quantity) -> Result<Typed, Fault> {
+    /// Returns the formula and the unit of a quantity.
+    fn typed(&mut self, quantity: &Quantity) -> Result<Typed, LocatedError> {
         let (name, at) = (quantity.to_string(), quantity.at());
         Ok(match quantity {
             Quantity::Number(number, unit, _) => {
-                let dimension = unit.map_or(Dimension::Bare, |unit| Dimension::In(unit, Zeros::Free));
+                let dimension = unit.map_or(Dimension::Literal, |unit| Dimension::In(unit, Offsets::Literal));
                 Typed { formula: Formula::Number(*number), dimension, exact: true, name, at }
             }
             Quantity::Signal(signal) => {
-                let slot = self.slot(signal)?;
-                let unit = self.bound.slots[slot].unit;
-                let dimension = unit.map_or(Dimension::Plain, |unit| Dimension::In(unit, Zeros::Known(1.0)));
-                Typed { formula: Formula::Slot(slot), dimension, exact: true, name, at }
+                let input = self.input(signal)?;
+                let unit = self.bound.inputs[input].unit;
+                let dimension = unit.map_or(Dimension::None, |unit| Dimension::In(unit, Offsets::Known(1.0)));
+                Typed { formula: Formula::Input(input), dimension, exact: true, name, at }
             }
             Quantity::Negative(inner, _) => {
                 let inner = self.typed(inner)?;
@@ -265,62 +275,69 @@ impl Binder<'_> {
             }
             Quantity::Aggregate(function, inner, _) => {
                 let inner = self.typed(inner)?;
-                let dimension = gathered_dimension(*function, inner.dimension);
+                let dimension = aggregate_dimension(*function, inner.dimension);
                 let exact = match function {
                     Function::Min | Function::Max => inner.exact,
                     Function::Count | Function::Invalid => true,
                     Function::Mean | Function::Noise | Function::Rate | Function::Gap => false,
                 };
-                let formula = Formula::Aggregate(self.gathered(*function, inner.formula, &name));
+                let formula = Formula::Aggregate(self.aggregate(*function, inner.formula, &name));
                 Typed { formula, dimension, exact, name, at }
             }
         })
     }
 
-    fn gathered(&mut self, function: Function, argument: Formula, name: &str) -> usize {
-        let gathered = &mut self.bound.gathered;
-        if let Some(known) = gathered.iter().position(|known| known.name == name) {
+    /// Returns the index of an aggregate, and adds it if it is new.
+    fn aggregate(&mut self, function: Function, argument: Formula, name: &str) -> usize {
+        let aggregates = &mut self.bound.aggregates;
+        if let Some(known) = aggregates.iter().position(|known| known.name == name) {
             return known;
         }
-        gathered.push(Gathered { function, argument, name: name.to_owned() });
-        gathered.len() - 1
+        aggregates.push(Aggregate { function, argument, name: name.to_owned() });
+        aggregates.len() - 1
     }
 
-    fn slot(&mut self, signal: &SignalName) -> Result<usize, Fault> {
-        let missing = || Fault::new(signal.at, format!("of which node? 5.{signal}"));
-        let node = signal.node.or(self.node).ok_or_else(missing)?;
-        let Some(unit) = self.offers.find(node, signal) else {
-            return Err(self.unknown(node, signal));
+    /// Returns the index of an input, and adds it if it is new.
+    fn input(&mut self, signal: &SignalName) -> Result<usize, LocatedError> {
+        let no_node = || LocatedError::new(signal.at, format!("no node given for {signal} (example: 5.{signal})"));
+        let node = signal.node.or(self.node).ok_or_else(no_node)?;
+        let Some(unit) = self.available.find(node, signal) else {
+            return Err(self.unknown_signal(node, signal));
         };
-        let slot = Slot { node, name: signal.name(), what: signal.what.clone(), unit };
-        if let Some(known) = self.bound.slots.iter().position(|known| *known == slot) {
+        let input = Input { node, name: signal.name(), what: signal.what.clone(), unit };
+        if let Some(known) = self.bound.inputs.iter().position(|known| *known == input) {
             return Ok(known);
         }
-        self.bound.slots.push(slot);
-        Ok(self.bound.slots.len() - 1)
+        self.bound.inputs.push(input);
+        Ok(self.bound.inputs.len() - 1)
     }
 
-    fn unknown(&self, node: NodeId, signal: &SignalName) -> Fault {
+    fn unknown_signal(&self, node: NodeId, signal: &SignalName) -> LocatedError {
         let name = signal.name();
-        let fault = Fault::new(signal.at, format!("node {node} has no signal \"{name}\""));
-        match self.offers.like(node, &name).as_slice() {
-            [] => fault,
-            names => fault.hint(format!("it has: {}", names.join(", "))),
+        let mut names = self.available.nearest(node, &name);
+        let mut message = format!("node {node}: no signal \"{name}\"");
+        if !names.is_empty() {
+            if names.len() > MAX_LISTED {
+                names.truncate(MAX_LISTED);
+                names.push("...");
+            }
+            message.push_str(&format!(" (it has: {})", names.join(", ")));
         }
+        LocatedError::new(signal.at, message)
     }
 }
 
-/// Code of s and of 1/s (CiA 303-2).
+/// Unit codes of second and hertz (CiA 303-2).
 const SECOND: Unit = Unit(0x0003_0000);
 const HERTZ: Unit = Unit(0x0020_0000);
 
-/// What is left of a dimension when samples are gathered.
-fn gathered_dimension(function: Function, of: Dimension) -> Dimension {
+/// The unit of a function of all samples.
+fn aggregate_dimension(function: Function, of: Dimension) -> Dimension {
     match (function, of) {
-        (Function::Rate, _) => Dimension::In(HERTZ, Zeros::Known(0.0)),
-        (Function::Gap, _) => Dimension::In(SECOND, Zeros::Known(0.0)),
-        (Function::Count | Function::Invalid, _) => Dimension::Plain,
-        (Function::Noise, Dimension::In(unit, _)) => Dimension::In(unit, Zeros::Known(0.0)),
+        (Function::Rate, _) => Dimension::In(HERTZ, Offsets::Known(0.0)),
+        (Function::Gap, _) => Dimension::In(SECOND, Offsets::Known(0.0)),
+        (Function::Count | Function::Invalid, _) => Dimension::None,
+        (Function::Noise, Dimension::In(unit, _)) => Dimension::In(unit, Offsets::Known(0.0)),
         (_, of) => of,
     }
 }

@@ -1,127 +1,134 @@
-//! Units in expressions: what may be compared with what, and how it is brought to one unit.
+//! Units in expressions: which values can be compared, and how they are converted to one unit.
 //!
-//! Scales that do not begin at the same zero (degC, degF, K) want care: a temperature converts otherwise than
-//! a difference of two. So it is kept in mind how often the zero of the scale is in a value, and where that
-//! cannot be told the conversion is refused.
+//! The scales degC, degF and K have different zero points. A temperature is therefore converted with the offset of
+//! the scale, a temperature difference without it. Each value carries the number of times it contains the offset:
+//! once in a temperature, not at all in a difference of two. If this number is unknown, the conversion is refused.
 
-use super::Fault;
-use super::evaluate::Formula;
-use super::tree::{At, Operator};
+use super::LocatedError;
+use super::formula::Formula;
+use super::tree::{Operator, Position};
 use crate::device::unit::Unit;
 
-/// How often the zero of its scale is in a value.
+/// How many times a value contains the offset of its scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Zeros {
-    /// So often: once in a temperature, not at all in a difference of two.
+pub(super) enum Offsets {
+    /// The number of times: 1 in a temperature, 0 in a difference of two.
     Known(f64),
-    /// A number that somebody wrote: as often as in what it stands with.
-    Free,
-    /// Nobody can tell.
+    /// A number in the expression. It adapts to the other side.
+    Literal,
+    /// Unknown, for example in a product of two temperatures.
     Unknown,
 }
 
-/// What a value is of.
+/// The unit of a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Dimension {
-    /// Numbers that somebody wrote without a unit: that of what they stand with.
-    Bare,
-    /// No unit: a count, a ratio, a signal whose device tells none.
-    Plain,
-    /// In this unit.
-    In(Unit, Zeros),
+    /// A number without a unit in the expression. It takes the unit of the other side.
+    Literal,
+    /// No unit: a count, a ratio, or a signal of unknown unit.
+    None,
+    /// A unit.
+    In(Unit, Offsets),
 }
 
-/// A formula and what its value is of.
+/// A formula with the unit of its value.
 #[derive(Clone, Debug)]
 pub(super) struct Typed {
     /// The formula.
     pub(super) formula: Formula,
-    /// What its value is of.
+    /// The unit of its value.
     pub(super) dimension: Dimension,
-    /// Whether its value is a number as it was sent or written, without rounding.
+    /// The value is neither calculated nor converted.
     pub(super) exact: bool,
-    /// As people write it.
+    /// The quantity as written in the expression.
     pub(super) name: String,
-    /// Where it begins.
-    pub(super) at: At,
+    /// Its position in the expression.
+    pub(super) at: Position,
 }
 
 impl Typed {
-    /// Whether it is a number that somebody wrote, with a unit.
+    /// A number with a unit in the expression.
     fn is_literal(&self) -> bool {
-        matches!(self.dimension, Dimension::In(_, Zeros::Free))
+        matches!(self.dimension, Dimension::In(_, Offsets::Literal))
     }
 
-    fn unit_in_words(&self) -> String {
+    /// `p is in bar` or `p has no unit`.
+    fn describe_unit(&self) -> String {
         match self.dimension {
-            Dimension::In(unit, _) => format!("in {unit}"),
-            Dimension::Bare | Dimension::Plain => "without a unit".to_owned(),
+            Dimension::In(unit, _) => format!("{} is in {unit}", self.name),
+            Dimension::Literal | Dimension::None => format!("{} has no unit", self.name),
         }
     }
 
-    /// The same in the unit of `to`; the trouble, if there is any, is with `to`.
-    fn adapted(self, to: &Typed) -> Result<Typed, Fault> {
-        let (from, zeros, unit, others) = match (self.dimension, to.dimension) {
-            (Dimension::Bare, _) | (_, Dimension::Bare) | (Dimension::Plain, Dimension::Plain) => return Ok(self),
+    /// Converts this value to the unit of `to`.
+    fn converted(self, to: &Typed) -> Result<Typed, LocatedError> {
+        let (from, offsets, unit, other_offsets) = match (self.dimension, to.dimension) {
+            (Dimension::Literal, _) | (_, Dimension::Literal) | (Dimension::None, Dimension::None) => return Ok(self),
             (Dimension::In(from, _), Dimension::In(unit, _)) if from == unit => return Ok(self),
-            (Dimension::In(from, zeros), Dimension::In(unit, others)) => (from, zeros, unit, others),
-            _ => return Err(differ(&self, to)),
+            (Dimension::In(from, offsets), Dimension::In(unit, others)) => (from, offsets, unit, others),
+            _ => return Err(units_differ(&self, to)),
         };
         if from.convert(1.0, unit).is_none() {
-            return Err(differ(&self, to));
+            return Err(units_differ(&self, to));
         }
-        let zeros = match (zeros, others) {
+        let offsets = match (offsets, other_offsets) {
             _ if from.has_zero_of(unit) => 0.0,
-            (Zeros::Known(zeros), _) | (Zeros::Free, Zeros::Known(zeros)) => zeros,
-            (Zeros::Free, Zeros::Free) => 1.0,
-            (Zeros::Unknown, _) | (Zeros::Free, Zeros::Unknown) => return Err(cannot_tell(&self, to, from, unit)),
+            (Offsets::Known(offsets), _) | (Offsets::Literal, Offsets::Known(offsets)) => offsets,
+            (Offsets::Literal, Offsets::Literal) => 1.0,
+            (Offsets::Unknown, _) | (Offsets::Literal, Offsets::Unknown) => {
+                return Err(ambiguous(&self, to, from, unit));
+            }
         };
-        let dimension = Dimension::In(unit, if self.is_literal() { Zeros::Free } else { Zeros::Known(zeros) });
-        let formula = Formula::Converted(Box::new(self.formula), from, unit, zeros);
+        let dimension = Dimension::In(unit, if self.is_literal() { Offsets::Literal } else { Offsets::Known(offsets) });
+        let formula = Formula::Converted(Box::new(self.formula), from, unit, offsets);
         Ok(Typed { formula, dimension, exact: false, ..self })
     }
 }
 
-fn differ(first: &Typed, second: &Typed) -> Fault {
-    let (first_unit, second_unit) = (first.unit_in_words(), second.unit_in_words());
-    let message = format!("{} is {first_unit}, and {} is {second_unit}", first.name, second.name);
-    // The trouble is with what somebody wrote rather than with what is measured.
-    Fault::new(if first.is_literal() { first.at } else { second.at }, message)
+fn units_differ(first: &Typed, second: &Typed) -> LocatedError {
+    let message = format!("units do not match: {}, {}", first.describe_unit(), second.describe_unit());
+    // Point at the number, because the user can change it.
+    LocatedError::new(if first.is_literal() { first.at } else { second.at }, message)
 }
 
-fn cannot_tell(first: &Typed, second: &Typed, from: Unit, to: Unit) -> Fault {
-    let literal = if first.is_literal() { first } else { second };
-    let unit = if first.is_literal() { to } else { from };
-    let message = format!("{} may be a temperature here or a difference of two", literal.name);
-    Fault::new(literal.at, message).hint(format!("write it in {unit}"))
+fn ambiguous(first: &Typed, second: &Typed, from: Unit, to: Unit) -> LocatedError {
+    let (literal, unit) = if first.is_literal() { (first, to) } else { (second, from) };
+    let message = format!("{} is ambiguous: a temperature or a temperature difference", literal.name);
+    LocatedError::new(literal.at, message).hint(format!("write it in {unit}"))
 }
 
-/// Two quantities in one unit, to be compared: that of a number that somebody wrote, else that of the first.
-pub(super) fn alike(first: Typed, second: Typed) -> Result<(Typed, Typed), Fault> {
+/// Converts two quantities to one unit: that of a number with a unit, else that of the first quantity.
+pub(super) fn to_one_unit(first: Typed, second: Typed) -> Result<(Typed, Typed), LocatedError> {
     if second.is_literal() {
-        Ok((first.adapted(&second)?, second))
+        Ok((first.converted(&second)?, second))
     } else {
-        let second = second.adapted(&first)?;
+        let second = second.converted(&first)?;
         Ok((first, second))
     }
 }
 
-/// A value with two limits, in one unit.
-pub(super) fn within(value: Typed, low: Typed, high: Typed) -> Result<[Typed; 3], Fault> {
+/// Converts a value and its two limits to one unit.
+pub(super) fn within(value: Typed, low: Typed, high: Typed) -> Result<[Typed; 3], LocatedError> {
     let value = match [&high, &low].into_iter().find(|limit| limit.is_literal()) {
-        Some(limit) => value.adapted(limit)?,
+        Some(limit) => value.converted(limit)?,
         None => value,
     };
-    let (low, high) = (low.adapted(&value)?, high.adapted(&value)?);
+    let (low, high) = (low.converted(&value)?, high.converted(&value)?);
     Ok([value, low, high])
 }
 
-/// Two quantities in a calculation.
-pub(super) fn calculate(first: Typed, operator: Operator, second: Typed, at: At, name: String) -> Result<Typed, Fault> {
-    let begin = first.at;
+/// Combines two quantities. `at` is the position of the operator.
+pub(super) fn calculate(
+    first: Typed,
+    operator: Operator,
+    second: Typed,
+    at: Position,
+    name: String,
+) -> Result<Typed, LocatedError> {
+    let start = first.at;
     let (first, second) = match operator {
         Operator::Multiply => (first, second),
-        // Of an addition the one that was measured gives the unit.
+        // The measured value determines the unit of a sum.
         _ if first.is_literal() && !second.is_literal() && operator != Operator::Divide => {
             let first = addend(first, &second)?;
             (first, second)
@@ -143,88 +150,97 @@ pub(super) fn calculate(first: Typed, operator: Operator, second: Typed, at: At,
         Operator::Multiply | Operator::Divide => product(&first, operator, &second, at)?,
     };
     let formula = Formula::Arithmetic(Box::new(first.formula), operator, Box::new(second.formula));
-    Ok(Typed { formula, dimension, exact: false, name, at: begin })
+    Ok(Typed { formula, dimension, exact: false, name, at: start })
 }
 
-/// A number that somebody wrote may be added to a temperature as a difference or taken from it as another one:
-/// only its own unit says the same either way.
-fn addend(term: Typed, to: &Typed) -> Result<Typed, Fault> {
-    if let (Dimension::In(from, Zeros::Free), Dimension::In(unit, zeros)) = (term.dimension, to.dimension)
-        && zeros != Zeros::Known(0.0)
+/// Converts one term of a sum. A number in another temperature unit is refused: it could be a temperature or a
+/// temperature difference. In the unit of the other term both are the same.
+fn addend(term: Typed, to: &Typed) -> Result<Typed, LocatedError> {
+    if let (Dimension::In(from, Offsets::Literal), Dimension::In(unit, offsets)) = (term.dimension, to.dimension)
+        && offsets != Offsets::Known(0.0)
         && from.convert(1.0, unit).is_some()
         && !from.has_zero_of(unit)
     {
-        return Err(cannot_tell(&term, to, from, unit));
+        return Err(ambiguous(&term, to, from, unit));
     }
-    term.adapted(to)
+    term.converted(to)
 }
 
-/// What a sum of these is of; they have been brought to one unit.
+/// The unit of a sum. Both terms have the same unit.
 fn sum(first: Dimension, operator: Operator, second: Dimension) -> Dimension {
     match (first, second) {
         (Dimension::In(unit, first), Dimension::In(_, second)) => Dimension::In(
             unit,
             match (first, second) {
-                (Zeros::Known(first), Zeros::Known(second)) if operator == Operator::Add => {
-                    Zeros::Known(first + second)
+                (Offsets::Known(first), Offsets::Known(second)) if operator == Operator::Add => {
+                    Offsets::Known(first + second)
                 }
-                (Zeros::Known(first), Zeros::Known(second)) => Zeros::Known(first - second),
-                // To a difference a difference is added.
-                (Zeros::Known(0.0), Zeros::Free) | (Zeros::Free, Zeros::Known(0.0)) => Zeros::Known(0.0),
-                (Zeros::Free, Zeros::Free) => Zeros::Free,
-                _ => Zeros::Unknown,
+                (Offsets::Known(first), Offsets::Known(second)) => Offsets::Known(first - second),
+                // A number added to a difference is a difference.
+                (Offsets::Known(0.0), Offsets::Literal) | (Offsets::Literal, Offsets::Known(0.0)) => {
+                    Offsets::Known(0.0)
+                }
+                (Offsets::Literal, Offsets::Literal) => Offsets::Literal,
+                _ => Offsets::Unknown,
             },
         ),
-        (Dimension::In(unit, zeros), _) | (_, Dimension::In(unit, zeros)) => Dimension::In(
+        (Dimension::In(unit, offsets), _) | (_, Dimension::In(unit, offsets)) => Dimension::In(
             unit,
-            match zeros {
-                Zeros::Known(0.0) | Zeros::Free => zeros,
-                _ => Zeros::Unknown,
+            match offsets {
+                Offsets::Known(0.0) | Offsets::Literal => offsets,
+                _ => Offsets::Unknown,
             },
         ),
-        (Dimension::Bare, Dimension::Bare) => Dimension::Bare,
-        _ => Dimension::Plain,
+        (Dimension::Literal, Dimension::Literal) => Dimension::Literal,
+        _ => Dimension::None,
     }
 }
 
-/// What a product or a quotient of these is of.
-fn product(first: &Typed, operator: Operator, second: &Typed, at: At) -> Result<Dimension, Fault> {
-    let divided = operator == Operator::Divide;
-    let scaled = |unit: Unit, zeros: Zeros, by: &Typed| {
-        let zeros = match (zeros, by.formula.constant()) {
-            (Zeros::Known(zeros), Some(by)) => Zeros::Known(if divided { zeros / by } else { zeros * by }),
-            (Zeros::Free, Some(_)) => Zeros::Free,
-            _ => Zeros::Unknown,
+/// The unit of a product or a quotient.
+fn product(first: &Typed, operator: Operator, second: &Typed, at: Position) -> Result<Dimension, LocatedError> {
+    let is_division = operator == Operator::Divide;
+    let scaled = |unit: Unit, offsets: Offsets, by: &Typed| {
+        let offsets = match (offsets, by.formula.constant()) {
+            (Offsets::Known(offsets), Some(by)) => {
+                Offsets::Known(if is_division { offsets / by } else { offsets * by })
+            }
+            (Offsets::Literal, Some(_)) => Offsets::Literal,
+            _ => Offsets::Unknown,
         };
-        Dimension::In(unit, zeros)
+        Dimension::In(unit, offsets)
     };
     Ok(match (first.dimension, second.dimension) {
-        (Dimension::In(..), Dimension::In(..)) if divided => Dimension::Plain,
-        (Dimension::In(unit, zeros), Dimension::Bare | Dimension::Plain) => scaled(unit, zeros, second),
-        (Dimension::Bare | Dimension::Plain, Dimension::In(unit, zeros)) if !divided => scaled(unit, zeros, first),
-        (_, Dimension::In(..)) => {
-            let (first_unit, second_unit) = (first.unit_in_words(), second.unit_in_words());
-            let word = if divided { "divided by" } else { "times" };
-            let message = format!("a value {first_unit} {word} one {second_unit} has no unit that is known here");
-            return Err(Fault::new(at, message));
+        (Dimension::In(..), Dimension::In(..)) if is_division => Dimension::None,
+        (Dimension::In(unit, offsets), Dimension::Literal | Dimension::None) => scaled(unit, offsets, second),
+        (Dimension::Literal | Dimension::None, Dimension::In(unit, offsets)) if !is_division => {
+            scaled(unit, offsets, first)
         }
-        (Dimension::Bare, Dimension::Bare) => Dimension::Bare,
-        _ => Dimension::Plain,
+        (_, Dimension::In(unit, _)) => {
+            let (verb, preposition) = if is_division { ("divide", "by") } else { ("multiply", "by") };
+            let first = match first.dimension {
+                Dimension::In(unit, _) => unit.to_string(),
+                Dimension::Literal | Dimension::None => "a value without a unit".to_owned(),
+            };
+            let message = format!("cannot {verb} {first} {preposition} {unit}: the result has no known unit");
+            return Err(LocatedError::new(at, message));
+        }
+        (Dimension::Literal, Dimension::Literal) => Dimension::Literal,
+        _ => Dimension::None,
     })
 }
 
-/// What stays of it between two bars: the size of a temperature is none.
+/// The unit of an absolute value. The absolute value of a temperature cannot be converted.
 pub(super) fn absolute(dimension: Dimension) -> Dimension {
     match dimension {
-        Dimension::In(unit, Zeros::Known(zeros)) if zeros != 0.0 => Dimension::In(unit, Zeros::Unknown),
+        Dimension::In(unit, Offsets::Known(offsets)) if offsets != 0.0 => Dimension::In(unit, Offsets::Unknown),
         other => other,
     }
 }
 
-/// What stays of it with its sign turned.
+/// The unit of a negated value.
 pub(super) fn negative(dimension: Dimension) -> Dimension {
     match dimension {
-        Dimension::In(unit, Zeros::Known(zeros)) => Dimension::In(unit, Zeros::Known(-zeros)),
+        Dimension::In(unit, Offsets::Known(offsets)) => Dimension::In(unit, Offsets::Known(-offsets)),
         other => other,
     }
 }

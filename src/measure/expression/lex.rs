@@ -1,17 +1,17 @@
-//! From text to words and signs.
+//! Splits the text of an expression into tokens.
 
-use super::Fault;
-use super::tree::{At, SignalName};
+use super::LocatedError;
+use super::tree::{Position, SignalName};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::measure::decode::Wanted;
 
-/// A word or a sign.
+/// A token of an expression.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Token {
-    /// `9.95`: finite and not negative.
+    /// `9.95`: finite, not negative.
     Number(f64),
-    /// A signal that cannot be anything else: `5.pressure`, `pressure.status`, `0x6130:1`.
+    /// Text that can only be a signal: `5.pressure`, `pressure.status`, `0x6130:1`.
     Signal(SignalName),
     /// A name, a unit, a function or a keyword.
     Word(String),
@@ -19,15 +19,16 @@ pub(super) enum Token {
     Sign(&'static str),
 }
 
-/// The signs, the longer ones first.
+/// The signs. Longer ones come first.
 const SIGNS: [&str; 16] =
     ["..", "<=", ">=", "==", "!=", "<", ">", "+", "-", "*", "/", "(", ")", "|", "\u{2264}", "\u{2265}"];
 
-/// Signs of other languages, and what they are here.
-const FOREIGN: [(&str, &str); 4] = [("&&", "and"), ("=", "=="), ("!", "not"), ("%", "a number of the signal's unit")];
+/// Signs of other languages, and what to use here.
+const FOREIGN_SIGNS: [(&str, &str); 4] =
+    [("&&", "and"), ("=", "=="), ("!", "not"), ("%", "a number in the unit of the signal")];
 
-/// All the tokens of a text with their places.
-pub(super) fn tokens(text: &str) -> Result<Vec<(Token, At)>, Fault> {
+/// Returns all tokens of a text with their positions.
+pub(super) fn tokens(text: &str) -> Result<Vec<(Token, Position)>, LocatedError> {
     let mut tokens = Vec::new();
     let mut at = 0;
     while let Some(rest) = text.get(at..).filter(|rest| !rest.is_empty()) {
@@ -36,15 +37,15 @@ pub(super) fn tokens(text: &str) -> Result<Vec<(Token, At)>, Fault> {
             at += blank;
             continue;
         }
-        let (token, length) = token(rest, At(at))?;
-        tokens.push((token, At(at)));
+        let (token, length) = token(rest, Position(at))?;
+        tokens.push((token, Position(at)));
         at += length;
     }
     Ok(tokens)
 }
 
-/// The token that a text begins with, and its length in bytes.
-fn token(text: &str, at: At) -> Result<(Token, usize), Fault> {
+/// Returns the first token of a text, and its length in bytes.
+fn token(text: &str, at: Position) -> Result<(Token, usize), LocatedError> {
     let first = text.chars().next().unwrap_or_default();
     if first.is_ascii_digit() {
         return number_or_signal(text, at);
@@ -60,77 +61,83 @@ fn token(text: &str, at: At) -> Result<(Token, usize), Fault> {
         });
     }
     if let Some(sign) = SIGNS.into_iter().find(|sign| text.starts_with(sign)) {
-        let meant = match sign {
+        let ascii = match sign {
             "\u{2264}" => "<=",
             "\u{2265}" => ">=",
             sign => sign,
         };
-        return Ok((Token::Sign(meant), sign.len()));
+        return Ok((Token::Sign(ascii), sign.len()));
     }
-    if let Some((sign, meant)) = FOREIGN.into_iter().find(|(sign, _)| text.starts_with(sign)) {
-        return Err(Fault::new(at, format!("\"{sign}\" means nothing here; write {meant}")));
+    if let Some((sign, instead)) = FOREIGN_SIGNS.into_iter().find(|(sign, _)| text.starts_with(sign)) {
+        return Err(LocatedError::new(at, format!("\"{sign}\" is not supported here; use {instead}")));
     }
-    Err(Fault::new(at, format!("\"{first}\" means nothing here")))
+    Err(LocatedError::new(at, format!("unexpected character \"{first}\"")))
 }
 
+/// A letter of a name or of a unit: also the degree sign and both micro signs.
 fn is_letter(character: char) -> bool {
     character.is_ascii_alphabetic() || matches!(character, '\u{b0}' | '\u{b5}' | '\u{3bc}')
 }
 
-/// The name that a text begins with. A hyphen belongs to it where letters stand on both sides without a blank:
-/// `oil-pressure` is a name, `a - b` and `a-1` are not.
+/// Returns the name at the start of a text. A hyphen belongs to the name if it stands between two letters:
+/// `oil-pressure` is a name, `a - b` and `a-1` are differences.
 fn name(text: &str) -> &str {
     let mut end = 0;
     let mut letters = text.char_indices().peekable();
-    let mut before = false;
+    let mut previous_joins = false;
     while let Some((at, letter)) = letters.next() {
-        let hyphen = letter == '-' && before && letters.peek().is_some_and(|&(_, next)| next.is_ascii_alphabetic());
-        if !(is_letter(letter) || letter.is_ascii_digit() || letter == '_' || hyphen) {
+        let next_is_letter = letters.peek().is_some_and(|&(_, next)| next.is_ascii_alphabetic());
+        let is_hyphen = letter == '-' && previous_joins && next_is_letter;
+        if !(is_letter(letter) || letter.is_ascii_digit() || letter == '_' || is_hyphen) {
             break;
         }
-        before = letter != '-';
+        previous_joins = letter != '-';
         end = at + letter.len_utf8();
     }
     &text[..end]
 }
 
-/// What begins with a digit: a number, an object, or a node with its signal.
-fn number_or_signal(text: &str, at: At) -> Result<(Token, usize), Fault> {
-    let hexadecimal = text.starts_with("0x") || text.starts_with("0X");
-    let word = text.find(|character: char| !character.is_ascii_alphanumeric()).map_or(text, |end| &text[..end]);
-    let behind = &text[word.len()..];
-    if behind.starts_with(':') {
+/// Reads a token that starts with a digit: a number, an object, or a node with a signal.
+fn number_or_signal(text: &str, at: Position) -> Result<(Token, usize), LocatedError> {
+    let word = alphanumeric(text);
+    let rest = &text[word.len()..];
+    if rest.starts_with(':') {
         let (object, length) = object(text, at)?;
         return Ok((Token::Signal(SignalName { node: None, what: Wanted::Object(object), at }), length));
     }
-    if let Some(signal) = behind.strip_prefix('.')
+    if let Some(signal) = rest.strip_prefix('.')
         && is_signal(signal)
     {
         let node: NodeId =
-            word.parse().map_err(|_| Fault::new(at, format!("\"{word}\" is not a node-ID: they go from 1 to 127")))?;
-        let inner = At(at.0 + word.len() + 1);
+            word.parse().map_err(|_| LocatedError::new(at, format!("{word} is not a valid node-ID (1 to 127)")))?;
+        let inner = Position(at.0 + word.len() + 1);
         let (what, length) = match token(signal, inner)? {
             (Token::Signal(named), length) if named.node.is_none() => (named.what, length),
             (Token::Word(name), length) => (Wanted::Signal(name), length),
-            _ => return Err(Fault::new(inner, "behind a node and a point stands a signal: 5.pressure")),
+            _ => return Err(LocatedError::new(inner, "expected a signal after the node: 5.pressure")),
         };
         return Ok((Token::Signal(SignalName { node: Some(node), what, at }), word.len() + 1 + length));
     }
-    if hexadecimal {
-        let number =
-            word.get(2..).filter(|digits| digits.len() <= 8).and_then(|digits| u32::from_str_radix(digits, 16).ok());
-        let number = number.ok_or_else(|| Fault::new(at, format!("\"{word}\" is not a number")))?;
+    if let Some(digits) = word.strip_prefix("0x").or_else(|| word.strip_prefix("0X")) {
+        let number = Some(digits).filter(|digits| digits.len() <= 8);
+        let number = number.and_then(|digits| u32::from_str_radix(digits, 16).ok());
+        let number = number.ok_or_else(|| LocatedError::new(at, format!("\"{word}\" is not a number")))?;
         return Ok((Token::Number(f64::from(number)), word.len()));
     }
-    let length = decimal(text);
+    let length = decimal_length(text);
     let number = text[..length].parse().ok().filter(|number: &f64| number.is_finite());
-    let number = number.ok_or_else(|| Fault::new(at, format!("{} is too large", &text[..length])))?;
+    let number = number.ok_or_else(|| LocatedError::new(at, format!("{} is too large", &text[..length])))?;
     Ok((Token::Number(number), length))
 }
 
-/// Whether a signal stands behind a node and its point: a name, or an object with `0x` or a colon.
+/// The letters and digits at the start of a text.
+fn alphanumeric(text: &str) -> &str {
+    text.find(|character: char| !character.is_ascii_alphanumeric()).map_or(text, |end| &text[..end])
+}
+
+/// Whether the text after `5.` is a signal: a name, or an object with a colon.
 fn is_signal(text: &str) -> bool {
-    let word = text.find(|character: char| !character.is_ascii_alphanumeric()).map_or(text, |end| &text[..end]);
+    let word = alphanumeric(text);
     match word.chars().next() {
         Some(first) if first.is_ascii_digit() => text[word.len()..].starts_with(':'),
         Some(first) => first.is_ascii_alphabetic() && !is_exponent(word),
@@ -138,14 +145,14 @@ fn is_signal(text: &str) -> bool {
     }
 }
 
-/// `5.e3` is no node with a signal, whatever else it is.
+/// `e3` is an exponent: `5.e3` is not a signal of node 5.
 fn is_exponent(word: &str) -> bool {
     let digits = word.trim_start_matches(['e', 'E']);
     word.len() == digits.len() + 1 && !digits.is_empty() && digits.bytes().all(|digit| digit.is_ascii_digit())
 }
 
-/// The length of the decimal number that a text begins with: `9`, `9.95`, `1.25e-3`; `9..10` begins with 9.
-fn decimal(text: &str) -> usize {
+/// The length of the decimal number at the start of a text: `9`, `9.95`, `1.25e-3`. In `9..10` it is 1.
+fn decimal_length(text: &str) -> usize {
     let digits = |from: usize| text[from..].bytes().take_while(u8::is_ascii_digit).count();
     let mut length = digits(0);
     if text[length..].starts_with('.') && digits(length + 1) > 0 {
@@ -161,10 +168,10 @@ fn decimal(text: &str) -> usize {
     length
 }
 
-/// `0x6130:1` at the beginning of a text.
-fn object(text: &str, at: At) -> Result<(ObjectId, usize), Fault> {
+/// Reads an object at the start of a text: `0x6130:1`.
+fn object(text: &str, at: Position) -> Result<(ObjectId, usize), LocatedError> {
     let end = text.find(|character: char| !(character.is_ascii_alphanumeric() || character == ':'));
     let word = end.map_or(text, |end| &text[..end]);
-    let object = word.parse().map_err(|error| Fault::new(at, format!("{error}")))?;
+    let object = word.parse().map_err(|error| LocatedError::new(at, format!("{error}")))?;
     Ok((object, word.len()))
 }

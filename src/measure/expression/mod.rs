@@ -1,41 +1,43 @@
-//! What is expected of measurements, as people write it: `pressure in 9.95..10.05 bar`.
+//! Expressions that measurements must satisfy: `pressure in 9.95..10.05 bar`.
 //!
 //! ```text
 //! condition:   condition and condition, condition or condition, not condition, (condition)
 //!              quantity < quantity          also <= > >= == !=
-//!              quantity in quantity..quantity, both ends belong to it
+//!              quantity in quantity..quantity, both ends belong to the range
 //! quantity:    quantity + quantity          also - * /, -quantity, (quantity), |quantity|
-//!              10, 9.95 bar, 1.2 psi        a number alone is in the unit of what it stands with
+//!              10, 9.95 bar, 1.2 psi        a number without a unit takes the unit of the other side
 //!              pressure, ch1, pressure.status, 0x6130:1; of one node: 5.pressure
 //!              mean(quantity), noise(), min(), max(), rate(), gap(), count(), invalid()
 //! ```
 //!
-//! [`Expression::parse`] reads the text before anything is measured. [`bind`] finds the signals and brings
-//! the units together once the devices are known; [`judge`] takes samples and gives verdicts. Nothing here
-//! does I/O or reads a clock, and every text is either an expression or an error that points at a character.
+//! - [`Expression::parse`] reads the text before anything is measured.
+//! - [`bind`] finds the signals and converts the units, when the devices are known.
+//! - [`evaluator`] takes samples and returns verdicts.
+//!
+//! This module does no I/O and reads no clock. Every text is an expression or an error with a position.
 
 pub mod bind;
-mod case;
+mod comparison;
 mod dimension;
-mod evaluate;
-pub mod judge;
+pub mod evaluator;
+mod formula;
 mod lex;
 mod parse;
-mod rules;
 #[cfg(test)]
 mod tests;
 pub mod tree;
+mod validate;
 pub mod verdict;
 
 use crate::measure::decode::Wanted;
 use std::fmt;
 use std::str::FromStr;
-use tree::{At, Condition, SignalName};
+use tree::{Condition, Position, SignalName};
 
-/// The longest text that is taken for an expression, in characters: what is nested in it stays on the stack.
-const LONGEST: usize = 1000;
+/// The longest expression, in characters. It limits how deeply the tree can be nested.
+const MAX_LENGTH: usize = 1000;
 
-/// A text that is an expression.
+/// An expression: one or several conditions that must all be true.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {
     text: String,
@@ -43,42 +45,42 @@ pub struct Expression {
 }
 
 impl Expression {
-    /// Reads an expression.
+    /// Parses an expression.
     ///
     /// # Errors
-    /// What is wrong, and with which character it begins.
+    /// The first mistake, with its position in the text.
     pub fn parse(text: &str) -> Result<Expression, ExpressionError> {
-        // Line ends and tabs are blanks; the places of errors are those in the text without them.
+        // Line ends and tabs become blanks. The positions of errors refer to this text.
         let text = &*text.split_whitespace().collect::<Vec<_>>().join(" ");
-        let fail = |at, message: String| ExpressionError { text: text.to_owned(), at, message, hint: None };
-        if let Some((at, _)) = text.char_indices().nth(LONGEST) {
-            return Err(fail(at, format!("an expression has at most {LONGEST} characters")));
+        if let Some((at, _)) = text.char_indices().nth(MAX_LENGTH) {
+            let message = format!("the expression is too long (at most {MAX_LENGTH} characters)");
+            return Err(LocatedError::new(Position(at), message).in_text(text));
         }
-        let condition = parse::parse(text).map_err(|fault| fault.of(text))?;
+        let condition = parse::parse(text).map_err(|error| error.in_text(text))?;
         let mut parts = Vec::new();
         split(condition, &mut parts);
-        parts.iter().try_for_each(rules::check).map_err(|fault| fault.of(text))?;
+        parts.iter().try_for_each(validate::check).map_err(|error| error.in_text(text))?;
         Ok(Expression { text: text.to_owned(), parts })
     }
 
-    /// The text it was read from, with single blanks.
+    /// The text as entered, with single blanks.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// What has to hold, every one of them: the parts that stand between `and`.
+    /// The conditions joined by `and`. All must be true.
     pub fn parts(&self) -> &[Condition] {
         &self.parts
     }
 
-    /// The signals in it, in the order in which they stand, each once for every time.
+    /// The signals in the order of the text, with repetitions.
     pub fn signals(&self) -> Vec<&SignalName> {
         let mut signals = Vec::new();
         self.parts.iter().for_each(|part| part.signals(&mut signals));
         signals
     }
 
-    /// What has to be measured of a node for it, each once.
+    /// The signals to measure, without repetitions.
     pub fn wanted(&self) -> Vec<Wanted> {
         let mut wanted = Vec::new();
         for signal in self.signals() {
@@ -89,21 +91,21 @@ impl Expression {
         wanted
     }
 
-    /// The first function in it that one sample says nothing about: how much it varies, and how often it comes.
-    pub fn needs_many(&self) -> Option<tree::Function> {
+    /// The first function that needs more than one sample, for example `noise` or `rate`.
+    pub fn needs_many_samples(&self) -> Option<tree::Function> {
         let mut functions = Vec::new();
         self.parts.iter().for_each(|part| part.functions(&mut functions));
-        functions.into_iter().find(|function| function.needs_many())
+        functions.into_iter().find(|function| function.needs_many_samples())
     }
 
-    /// An error at `at` in this text.
-    fn fail(&self, at: At, message: impl Into<String>) -> ExpressionError {
-        ExpressionError { text: self.text.clone(), at: at.0, message: message.into(), hint: None }
+    /// An error at a position of this text.
+    fn error(&self, at: Position, message: impl Into<String>) -> ExpressionError {
+        LocatedError::new(at, message).in_text(&self.text)
     }
 }
 
 impl fmt::Display for Expression {
-    /// The expression with the parentheses and blanks that it needs; it reads back as the same one.
+    /// Writes the expression with the necessary parentheses. The text parses to the same expression.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let [only] = self.parts.as_slice() {
             return only.fmt(f);
@@ -112,7 +114,7 @@ impl fmt::Display for Expression {
             if at > 0 {
                 f.write_str(" and ")?;
             }
-            part.fmt_within(f, tree::Binds::And)?;
+            part.fmt_within(f, tree::Precedence::And)?;
         }
         Ok(())
     }
@@ -126,7 +128,7 @@ impl FromStr for Expression {
     }
 }
 
-/// Every sample has to satisfy both sides of an `and`: they can be judged one by one.
+/// Splits a condition at each `and`. Both sides must be true for every sample, so each is evaluated alone.
 fn split(condition: Condition, parts: &mut Vec<Condition>) {
     match condition {
         Condition::And(left, right) => {
@@ -137,51 +139,51 @@ fn split(condition: Condition, parts: &mut Vec<Condition>) {
     }
 }
 
-/// What is wrong with an expression, and where.
+/// A mistake in an expression, with its position.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct ExpressionError {
-    /// The whole expression.
+    /// The complete expression.
     pub text: String,
-    /// The byte in it that the trouble begins with; its length where something is missing at the end.
+    /// Byte offset of the mistake in `text`. It is the length of `text` if the end is missing.
     pub at: usize,
-    /// In words.
+    /// The mistake, for people.
     pub message: String,
-    /// What helps.
+    /// How to correct it.
     pub hint: Option<String>,
 }
 
 impl ExpressionError {
-    /// The character that the trouble begins with, counted from 1.
+    /// The column of the mistake in characters, counted from 1.
     pub fn column(&self) -> usize {
         self.before().chars().count() + 1
     }
 
-    /// What stands before the trouble.
+    /// The text before the mistake.
     pub fn before(&self) -> &str {
         self.text.get(..self.at).unwrap_or(&self.text)
     }
 }
 
-/// What is wrong with a part of a text, and where; not yet with the text.
+/// A mistake and its position, before the complete text is added.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Fault {
-    at: At,
+struct LocatedError {
+    at: Position,
     message: String,
     hint: Option<String>,
 }
 
-impl Fault {
-    fn new(at: At, message: impl Into<String>) -> Fault {
-        Fault { at, message: message.into(), hint: None }
+impl LocatedError {
+    fn new(at: Position, message: impl Into<String>) -> LocatedError {
+        LocatedError { at, message: message.into(), hint: None }
     }
 
-    fn hint(mut self, hint: impl Into<String>) -> Fault {
+    fn hint(mut self, hint: impl Into<String>) -> LocatedError {
         self.hint = Some(hint.into());
         self
     }
 
-    fn of(self, text: &str) -> ExpressionError {
+    fn in_text(self, text: &str) -> ExpressionError {
         ExpressionError { text: text.to_owned(), at: self.at.0, message: self.message, hint: self.hint }
     }
 }

@@ -1,71 +1,68 @@
-//! From tokens to a tree.
+//! Parses tokens into a tree.
 
-use super::Fault;
+use super::LocatedError;
 use super::lex::{Token, tokens};
-use super::tree::{At, Comparison, Condition, Function, Operator, Quantity, SignalName};
+use super::tree::{Condition, Function, Operator, Position, Quantity, Relation, SignalName};
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
 
-/// How many operators there may be: each one is a level of the tree.
-const MOST: usize = 100;
+/// The largest number of operators. Each operator is a level of the tree.
+const MAX_OPERATORS: usize = 100;
 
-/// How deep parentheses, signs and `not` may be nested.
-const DEEPEST: usize = 50;
+/// The largest nesting depth of parentheses, signs and `not`.
+const MAX_DEPTH: usize = 50;
 
-const COMPARISONS: [Comparison; 6] = [
-    Comparison::Less,
-    Comparison::AtMost,
-    Comparison::Greater,
-    Comparison::AtLeast,
-    Comparison::Equal,
-    Comparison::Unequal,
-];
+/// Units that are suggested for an unknown one.
+const COMMON_UNITS: &str = "bar, mbar, kPa, MPa, psi, degC, degF, K, mV, mA, Hz, ms";
+
+const RELATIONS: [Relation; 6] =
+    [Relation::Less, Relation::AtMost, Relation::Greater, Relation::AtLeast, Relation::Equal, Relation::Unequal];
 
 const KEYWORDS: [&str; 4] = ["in", "and", "or", "not"];
 
-/// What was read: parentheses may hold the one or the other.
+/// The content of parentheses: a value or a condition.
 enum Parsed {
     Quantity(Quantity),
-    Condition(Condition, At),
+    Condition(Condition, Position),
 }
 
 impl Parsed {
-    fn quantity(self) -> Result<Quantity, Fault> {
+    fn quantity(self) -> Result<Quantity, LocatedError> {
         match self {
             Parsed::Quantity(quantity) => Ok(quantity),
-            Parsed::Condition(_, at) => Err(Fault::new(at, "a value is wanted here, and this is a condition")),
+            Parsed::Condition(_, at) => Err(LocatedError::new(at, "expected a value, found a condition")),
         }
     }
 
-    fn condition(self, end: At) -> Result<(Condition, At), Fault> {
+    fn condition(self, end: Position) -> Result<(Condition, Position), LocatedError> {
         match self {
             Parsed::Condition(condition, at) => Ok((condition, at)),
-            Parsed::Quantity(_) => Err(Fault::new(end, "a comparison is missing here: < <= > >= == != or in")
-                .hint("a limit: pressure < 10, a range: pressure in 9.95..10.05")),
+            Parsed::Quantity(_) => Err(LocatedError::new(end, "expected a comparison: < <= > >= == != or in")
+                .hint("examples: pressure < 10, pressure in 9.95..10.05")),
         }
     }
 }
 
-/// Reads a condition.
-pub(super) fn parse(text: &str) -> Result<Condition, Fault> {
-    let mut parser = Parser { tokens: tokens(text)?, next: 0, end: At(text.len()), depth: 0, operators: 0 };
+/// Parses a condition.
+pub(super) fn parse(text: &str) -> Result<Condition, LocatedError> {
+    let mut parser = Parser { tokens: tokens(text)?, next: 0, end: Position(text.len()), depth: 0, operators: 0 };
     let (condition, _) = parser.or()?.condition(parser.at())?;
     match parser.peek() {
         None => Ok(condition),
         Some(token) => {
-            let what = spelled(token);
-            let fault = Fault::new(parser.at(), format!("{what} is not expected here"));
+            let error = LocatedError::new(parser.at(), format!("unexpected {}", spelling(token)));
             Err(match token {
                 Token::Sign("<" | "<=" | ">" | ">=" | "==" | "!=") => {
-                    fault.hint("a range is written with in: pressure in 9.95..10.05")
+                    error.hint("write a range with in: pressure in 9.95..10.05")
                 }
-                _ => fault,
+                _ => error,
             })
         }
     }
 }
 
-fn spelled(token: &Token) -> String {
+/// A token as it is shown in an error.
+fn spelling(token: &Token) -> String {
     match token {
         Token::Number(number) => number.to_string(),
         Token::Signal(signal) => signal.to_string(),
@@ -75,9 +72,9 @@ fn spelled(token: &Token) -> String {
 }
 
 struct Parser {
-    tokens: Vec<(Token, At)>,
+    tokens: Vec<(Token, Position)>,
     next: usize,
-    end: At,
+    end: Position,
     depth: usize,
     operators: usize,
 }
@@ -87,11 +84,12 @@ impl Parser {
         self.tokens.get(self.next).map(|(token, _)| token)
     }
 
-    fn at(&self) -> At {
+    fn at(&self) -> Position {
         self.tokens.get(self.next).map_or(self.end, |&(_, at)| at)
     }
 
-    fn takes(&mut self, sign: &str) -> bool {
+    /// Skips the next token if it is `sign`.
+    fn skip(&mut self, sign: &str) -> bool {
         let is = match self.peek() {
             Some(Token::Sign(there)) => *there == sign,
             Some(Token::Word(there)) => there == sign,
@@ -101,188 +99,188 @@ impl Parser {
         is
     }
 
-    fn expects(&mut self, sign: &str, why: &str) -> Result<(), Fault> {
-        if self.takes(sign) { Ok(()) } else { Err(Fault::new(self.at(), format!("\"{sign}\" {why}"))) }
+    /// Skips the next token, which must be `sign`.
+    fn expect(&mut self, sign: &str) -> Result<(), LocatedError> {
+        if self.skip(sign) { Ok(()) } else { Err(LocatedError::new(self.at(), format!("expected \"{sign}\""))) }
     }
 
-    /// Counts an operator that stands at `at`.
-    fn one_more(&mut self, at: At) -> Result<(), Fault> {
+    /// Counts an operator at the position `at`.
+    fn count_operator(&mut self, at: Position) -> Result<(), LocatedError> {
         self.operators += 1;
-        if self.operators > MOST {
-            return Err(Fault::new(at, format!("an expression has at most {MOST} operators")));
+        if self.operators > MAX_OPERATORS {
+            return Err(LocatedError::new(at, format!("too many operators (at most {MAX_OPERATORS})")));
         }
         Ok(())
     }
 
-    /// Goes one level deeper.
-    fn deeper<T>(&mut self, work: impl FnOnce(&mut Parser) -> Result<T, Fault>) -> Result<T, Fault> {
-        if self.depth == DEEPEST {
-            return Err(Fault::new(self.at(), "this is nested too deep"));
+    /// Parses something nested, one level deeper.
+    fn nested<T>(&mut self, parse: impl FnOnce(&mut Parser) -> Result<T, LocatedError>) -> Result<T, LocatedError> {
+        if self.depth == MAX_DEPTH {
+            return Err(LocatedError::new(self.at(), format!("nested too deeply (at most {MAX_DEPTH} levels)")));
         }
         self.depth += 1;
-        let result = work(self);
+        let result = parse(self);
         self.depth -= 1;
         result
     }
 
-    fn or(&mut self) -> Result<Parsed, Fault> {
+    fn or(&mut self) -> Result<Parsed, LocatedError> {
         self.joined("or", Parser::and, Condition::Or)
     }
 
-    fn and(&mut self) -> Result<Parsed, Fault> {
+    fn and(&mut self) -> Result<Parsed, LocatedError> {
         self.joined("and", Parser::not, Condition::And)
     }
 
     fn joined(
         &mut self,
         word: &str,
-        side: fn(&mut Parser) -> Result<Parsed, Fault>,
+        side: fn(&mut Parser) -> Result<Parsed, LocatedError>,
         join: fn(Box<Condition>, Box<Condition>) -> Condition,
-    ) -> Result<Parsed, Fault> {
+    ) -> Result<Parsed, LocatedError> {
         let mut left = side(self)?;
         loop {
             let here = self.at();
-            if !self.takes(word) {
+            if !self.skip(word) {
                 return Ok(left);
             }
-            self.one_more(here)?;
+            self.count_operator(here)?;
             let (condition, at) = left.condition(here)?;
             let (right, _) = side(self)?.condition(self.at())?;
             left = Parsed::Condition(join(Box::new(condition), Box::new(right)), at);
         }
     }
 
-    fn not(&mut self) -> Result<Parsed, Fault> {
+    fn not(&mut self) -> Result<Parsed, LocatedError> {
         let at = self.at();
-        if !self.takes("not") {
+        if !self.skip("not") {
             return self.comparison();
         }
-        let inner = self.deeper(Parser::not)?;
+        let inner = self.nested(Parser::not)?;
         let (inner, _) = inner.condition(self.at())?;
         Ok(Parsed::Condition(Condition::Not(Box::new(inner)), at))
     }
 
-    fn comparison(&mut self) -> Result<Parsed, Fault> {
-        let begin = self.at();
+    fn comparison(&mut self) -> Result<Parsed, LocatedError> {
+        let start = self.at();
         let left = self.sum()?;
         let at = self.at();
-        if self.takes("in") {
+        if self.skip("in") {
             let value = left.quantity()?;
             let low = self.sum()?.quantity()?;
-            self.expects("..", "is missing here: a range is 9.95..10.05")?;
+            self.expect("..").map_err(|error| error.hint("write a range with two points: 9.95..10.05"))?;
             let high = self.sum()?.quantity()?;
-            let (low, high) = with_the_same_unit(low, high)?;
-            return Ok(Parsed::Condition(Condition::Within(value, low, high, at), begin));
+            let (low, high) = share_unit(low, high)?;
+            return Ok(Parsed::Condition(Condition::Within(value, low, high, at), start));
         }
-        for comparison in COMPARISONS {
-            if self.takes(comparison.as_str()) {
+        for relation in RELATIONS {
+            if self.skip(relation.as_str()) {
                 let left = left.quantity()?;
                 let right = self.sum()?.quantity()?;
-                return Ok(Parsed::Condition(Condition::Compare(left, comparison, right, at), begin));
+                return Ok(Parsed::Condition(Condition::Compare(left, relation, right, at), start));
             }
         }
         Ok(left)
     }
 
-    fn sum(&mut self) -> Result<Parsed, Fault> {
+    fn sum(&mut self) -> Result<Parsed, LocatedError> {
         self.chain(Parser::product, [Operator::Add, Operator::Subtract])
     }
 
-    fn product(&mut self) -> Result<Parsed, Fault> {
+    fn product(&mut self) -> Result<Parsed, LocatedError> {
         self.chain(Parser::sign, [Operator::Multiply, Operator::Divide])
     }
 
     fn chain(
         &mut self,
-        part: fn(&mut Parser) -> Result<Parsed, Fault>,
+        part: fn(&mut Parser) -> Result<Parsed, LocatedError>,
         operators: [Operator; 2],
-    ) -> Result<Parsed, Fault> {
+    ) -> Result<Parsed, LocatedError> {
         let mut left = part(self)?;
         loop {
             let at = self.at();
-            let Some(operator) = operators.into_iter().find(|operator| self.takes(operator.as_str())) else {
+            let Some(operator) = operators.into_iter().find(|operator| self.skip(operator.as_str())) else {
                 return Ok(left);
             };
-            self.one_more(at)?;
+            self.count_operator(at)?;
             let first = left.quantity()?;
             let right = part(self)?.quantity()?;
             left = Parsed::Quantity(Quantity::Arithmetic(Box::new(first), operator, Box::new(right), at));
         }
     }
 
-    fn sign(&mut self) -> Result<Parsed, Fault> {
+    fn sign(&mut self) -> Result<Parsed, LocatedError> {
         let at = self.at();
-        if !self.takes("-") {
-            return self.alone();
+        if !self.skip("-") {
+            return self.primary();
         }
-        let inner = self.deeper(Parser::sign)?.quantity()?;
+        let inner = self.nested(Parser::sign)?.quantity()?;
         Ok(Parsed::Quantity(Quantity::Negative(Box::new(inner), at)))
     }
 
-    fn alone(&mut self) -> Result<Parsed, Fault> {
+    fn primary(&mut self) -> Result<Parsed, LocatedError> {
         let at = self.at();
         let Some(token) = self.peek().cloned() else {
-            return Err(Fault::new(at, "something is missing at the end"));
+            return Err(LocatedError::new(at, "the expression is incomplete"));
         };
         self.next += 1;
         match token {
             Token::Number(number) => Ok(Parsed::Quantity(Quantity::Number(number, self.unit()?, at))),
             Token::Signal(signal) => Ok(Parsed::Quantity(Quantity::Signal(signal))),
             Token::Sign("(") => {
-                let inner = self.deeper(Parser::or)?;
-                self.expects(")", "is missing here")?;
+                let inner = self.nested(Parser::or)?;
+                self.expect(")")?;
                 Ok(match inner {
                     Parsed::Condition(condition, _) => Parsed::Condition(condition, at),
                     quantity @ Parsed::Quantity(_) => quantity,
                 })
             }
             Token::Sign("|") => {
-                let inner = self.deeper(Parser::sum)?.quantity()?;
-                self.expects("|", "is missing here")?;
+                let inner = self.nested(Parser::sum)?.quantity()?;
+                self.expect("|")?;
                 Ok(Parsed::Quantity(Quantity::Absolute(Box::new(inner), at)))
             }
-            Token::Word(word) if !KEYWORDS.contains(&word.as_str()) => self.named(&word, at),
-            other => Err(Fault::new(at, format!("a value is missing before {}", spelled(&other)))),
+            Token::Word(word) if !KEYWORDS.contains(&word.as_str()) => self.function_or_signal(&word, at),
+            other => Err(LocatedError::new(at, format!("expected a value before {}", spelling(&other)))),
         }
     }
 
-    /// A function where a parenthesis follows, else a signal.
-    fn named(&mut self, word: &str, at: At) -> Result<Parsed, Fault> {
-        if !self.takes("(") {
+    /// Parses a function if a parenthesis follows, else a signal.
+    fn function_or_signal(&mut self, word: &str, at: Position) -> Result<Parsed, LocatedError> {
+        if !self.skip("(") {
             if !word.is_ascii() {
-                return Err(Fault::new(at, format!("\"{word}\" is no name of a signal")));
+                return Err(LocatedError::new(at, format!("\"{word}\" is not a valid signal name")));
             }
             let what = Wanted::Signal(word.to_owned());
             return Ok(Parsed::Quantity(Quantity::Signal(SignalName { node: None, what, at })));
         }
         let Some(function) = Function::ALL.into_iter().find(|function| function.as_str() == word) else {
             let names: Vec<&str> = Function::ALL.into_iter().map(Function::as_str).collect();
-            let fault = Fault::new(at, format!("there is no function {word}()"));
-            return Err(fault.hint(format!("there are: {}", names.join(", "))));
+            let error = LocatedError::new(at, format!("unknown function {word}()"));
+            return Err(error.hint(format!("functions: {}", names.join(", "))));
         };
-        let inner = self.deeper(Parser::sum)?.quantity()?;
-        self.expects(")", "is missing here")?;
+        let inner = self.nested(Parser::sum)?.quantity()?;
+        self.expect(")")?;
         Ok(Parsed::Quantity(Quantity::Aggregate(function, Box::new(inner), at)))
     }
 
-    /// The unit behind a number, where there is one.
-    fn unit(&mut self) -> Result<Option<Unit>, Fault> {
+    /// Parses the unit after a number, if there is one.
+    fn unit(&mut self) -> Result<Option<Unit>, LocatedError> {
         let Some(Token::Word(word)) = self.peek() else { return Ok(None) };
         if KEYWORDS.contains(&word.as_str()) {
             return Ok(None);
         }
         let unit = Unit::from_symbol(word).ok_or_else(|| {
-            Fault::new(self.at(), format!("\"{word}\" is not a known unit"))
-                .hint("some that are: bar, mbar, kPa, MPa, psi, degC, degF, K, mV, mA, Hz, ms")
+            LocatedError::new(self.at(), format!("unknown unit \"{word}\""))
+                .hint(format!("common units: {COMMON_UNITS}"))
         })?;
         self.next += 1;
         Ok(Some(unit))
     }
 }
 
-/// `9.95..10.05 bar`: the unit of one end is that of a bare number at the other. A range of numbers that counts
-/// backwards is a mistake.
-fn with_the_same_unit(mut low: Quantity, mut high: Quantity) -> Result<(Quantity, Quantity), Fault> {
+/// In `9.95..10.05 bar` both ends have the unit bar. A range whose first number is the larger one is refused.
+fn share_unit(mut low: Quantity, mut high: Quantity) -> Result<(Quantity, Quantity), LocatedError> {
     let at = high.at();
     if let (Some((first, low)), Some((second, high))) = (literal(&mut low), literal(&mut high)) {
         let unit = (*low).or(*high);
@@ -290,13 +288,13 @@ fn with_the_same_unit(mut low: Quantity, mut high: Quantity) -> Result<(Quantity
             (*low, *high) = (unit, unit);
         }
         if low == high && first > second {
-            return Err(Fault::new(at, format!("the range counts backwards: {second} is less than {first}")));
+            return Err(LocatedError::new(at, format!("the range is reversed: {second} is less than {first}")));
         }
     }
     Ok((low, high))
 }
 
-/// The value and the unit of a number with its sign.
+/// The value and the unit of a number, with its sign.
 fn literal(quantity: &mut Quantity) -> Option<(f64, &mut Option<Unit>)> {
     match quantity {
         Quantity::Number(number, unit, _) => Some((*number, unit)),

@@ -1,35 +1,35 @@
-//! An expression as a tree, and the tree as text.
+//! The syntax tree of an expression, and its text form.
 
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
 use std::fmt::{self, Display};
 
-/// Where something begins in the text, in bytes. It is not part of what an expression is: all are equal.
+/// A position in the text, in bytes. All positions compare as equal, so that trees compare by their meaning.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct At(pub usize);
+pub struct Position(pub usize);
 
-impl PartialEq for At {
-    fn eq(&self, _: &At) -> bool {
+impl PartialEq for Position {
+    fn eq(&self, _: &Position) -> bool {
         true
     }
 }
 
-impl Eq for At {}
+impl Eq for Position {}
 
-/// A signal as it was named.
+/// A signal in an expression.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SignalName {
-    /// Of this node; `None` of every node that is checked.
+    /// The node. `None`: each node that is checked.
     pub node: Option<NodeId>,
-    /// Which one.
+    /// The signal or object.
     pub what: Wanted,
-    /// Where it stands.
-    pub at: At,
+    /// Its position in the text.
+    pub at: Position,
 }
 
 impl SignalName {
-    /// The name without the node, as it stands in a [`crate::measure::sample::Source`].
+    /// The name without the node, as in [`crate::measure::sample::Source`].
     pub fn name(&self) -> String {
         match &self.what {
             Wanted::Signal(name) => name.clone(),
@@ -48,29 +48,29 @@ impl Display for SignalName {
     }
 }
 
-/// What is made of all samples together.
+/// A function of all samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Function {
     /// Arithmetic mean.
     Mean,
     /// Standard deviation (n - 1).
     Noise,
-    /// Least value.
+    /// Lowest value.
     Min,
-    /// Greatest value.
+    /// Highest value.
     Max,
-    /// Samples a second, between the first and the last.
+    /// Samples per second, from the first to the last one.
     Rate,
-    /// The longest time between two samples.
+    /// The longest interval between two samples, in seconds.
     Gap,
-    /// How many samples.
+    /// Number of samples.
     Count,
-    /// How many of them had no valid value.
+    /// Number of samples without a valid value.
     Invalid,
 }
 
 impl Function {
-    /// Every function.
+    /// All functions.
     pub const ALL: [Function; 8] = [
         Function::Mean,
         Function::Noise,
@@ -82,7 +82,7 @@ impl Function {
         Function::Invalid,
     ];
 
-    /// As it is written.
+    /// Its text in an expression.
     pub fn as_str(self) -> &'static str {
         match self {
             Function::Mean => "mean",
@@ -96,13 +96,13 @@ impl Function {
         }
     }
 
-    /// Whether one sample tells nothing about it.
-    pub fn needs_many(self) -> bool {
+    /// Whether it needs more than one sample.
+    pub fn needs_many_samples(self) -> bool {
         matches!(self, Function::Noise | Function::Rate | Function::Gap)
     }
 }
 
-/// The four rules of arithmetic.
+/// An arithmetic operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operator {
     /// `+`
@@ -116,7 +116,7 @@ pub enum Operator {
 }
 
 impl Operator {
-    /// As it is written.
+    /// Its text in an expression.
     pub fn as_str(self) -> &'static str {
         match self {
             Operator::Add => "+",
@@ -126,17 +126,17 @@ impl Operator {
         }
     }
 
-    fn binds(self) -> Binds {
+    fn precedence(self) -> Precedence {
         match self {
-            Operator::Add | Operator::Subtract => Binds::Sum,
-            Operator::Multiply | Operator::Divide => Binds::Product,
+            Operator::Add | Operator::Subtract => Precedence::Sum,
+            Operator::Multiply | Operator::Divide => Precedence::Product,
         }
     }
 }
 
-/// How two quantities are compared.
+/// A comparison operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Comparison {
+pub enum Relation {
     /// `<`
     Less,
     /// `<=`
@@ -151,55 +151,55 @@ pub enum Comparison {
     Unequal,
 }
 
-impl Comparison {
-    /// As it is written.
+impl Relation {
+    /// Its text in an expression.
     pub fn as_str(self) -> &'static str {
         match self {
-            Comparison::Less => "<",
-            Comparison::AtMost => "<=",
-            Comparison::Greater => ">",
-            Comparison::AtLeast => ">=",
-            Comparison::Equal => "==",
-            Comparison::Unequal => "!=",
+            Relation::Less => "<",
+            Relation::AtMost => "<=",
+            Relation::Greater => ">",
+            Relation::AtLeast => ">=",
+            Relation::Equal => "==",
+            Relation::Unequal => "!=",
         }
     }
 }
 
-/// Something that has a value.
+/// An expression with a numeric value.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Quantity {
-    /// `10`, `9.95 bar`: never negative, and finite.
-    Number(f64, Option<Unit>, At),
+    /// `10`, `9.95 bar`: finite, not negative.
+    Number(f64, Option<Unit>, Position),
     /// `pressure`.
     Signal(SignalName),
     /// `-pressure`.
-    Negative(Box<Quantity>, At),
+    Negative(Box<Quantity>, Position),
     /// `|pressure|`.
-    Absolute(Box<Quantity>, At),
-    /// `pressure + 1`; the place is that of the operator.
-    Arithmetic(Box<Quantity>, Operator, Box<Quantity>, At),
+    Absolute(Box<Quantity>, Position),
+    /// `pressure + 1`, with the position of the operator.
+    Arithmetic(Box<Quantity>, Operator, Box<Quantity>, Position),
     /// `mean(pressure)`.
-    Aggregate(Function, Box<Quantity>, At),
+    Aggregate(Function, Box<Quantity>, Position),
 }
 
-/// Something that holds or does not.
+/// An expression that is true or false.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Condition {
-    /// `pressure < 10`; the place is that of the comparison.
-    Compare(Quantity, Comparison, Quantity, At),
-    /// `pressure in 9..10`; the place is that of `in`.
-    Within(Quantity, Quantity, Quantity, At),
-    /// Both hold.
+    /// `pressure < 10`, with the position of the comparison operator.
+    Compare(Quantity, Relation, Quantity, Position),
+    /// `pressure in 9..10`, with the position of `in`.
+    Within(Quantity, Quantity, Quantity, Position),
+    /// Both are true.
     And(Box<Condition>, Box<Condition>),
-    /// One of them holds, or both.
+    /// At least one is true.
     Or(Box<Condition>, Box<Condition>),
-    /// It does not hold.
+    /// The inner condition is false.
     Not(Box<Condition>),
 }
 
-/// How tightly something holds together, the loosest first.
+/// Operator precedence, lowest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Binds {
+pub(super) enum Precedence {
     Or,
     And,
     Not,
@@ -207,12 +207,12 @@ pub(super) enum Binds {
     Sum,
     Product,
     Sign,
-    Alone,
+    Primary,
 }
 
 impl Quantity {
-    /// Where it begins.
-    pub fn at(&self) -> At {
+    /// Its position in the text.
+    pub fn at(&self) -> Position {
         match self {
             Quantity::Number(_, _, at)
             | Quantity::Negative(_, at)
@@ -223,7 +223,7 @@ impl Quantity {
         }
     }
 
-    /// Adds the signals in it to `signals`.
+    /// Adds its signals to `signals`.
     pub fn signals<'a>(&'a self, signals: &mut Vec<&'a SignalName>) {
         match self {
             Quantity::Number(..) => {}
@@ -238,7 +238,7 @@ impl Quantity {
         }
     }
 
-    /// Adds the functions in it to `functions`.
+    /// Adds its functions to `functions`.
     pub fn functions(&self, functions: &mut Vec<Function>) {
         match self {
             Quantity::Number(..) | Quantity::Signal(_) => {}
@@ -251,23 +251,23 @@ impl Quantity {
         }
     }
 
-    /// Whether nothing in it is measured.
+    /// Whether it contains no signal.
     pub fn is_constant(&self) -> bool {
         let mut signals = Vec::new();
         self.signals(&mut signals);
         signals.is_empty()
     }
 
-    fn binds(&self) -> Binds {
+    fn precedence(&self) -> Precedence {
         match self {
-            Quantity::Arithmetic(_, operator, ..) => operator.binds(),
-            Quantity::Negative(..) => Binds::Sign,
-            _ => Binds::Alone,
+            Quantity::Arithmetic(_, operator, ..) => operator.precedence(),
+            Quantity::Negative(..) => Precedence::Sign,
+            _ => Precedence::Primary,
         }
     }
 
-    fn fmt_within(&self, f: &mut fmt::Formatter<'_>, at_least: Binds) -> fmt::Result {
-        if self.binds() < at_least { write!(f, "({self})") } else { self.fmt(f) }
+    fn fmt_within(&self, f: &mut fmt::Formatter<'_>, lowest: Precedence) -> fmt::Result {
+        if self.precedence() < lowest { write!(f, "({self})") } else { self.fmt(f) }
     }
 }
 
@@ -279,14 +279,15 @@ impl Display for Quantity {
             Quantity::Signal(signal) => signal.fmt(f),
             Quantity::Negative(inner, _) => {
                 f.write_str("-")?;
-                inner.fmt_within(f, Binds::Sign)
+                inner.fmt_within(f, Precedence::Sign)
             }
             Quantity::Absolute(inner, _) => write!(f, "|{inner}|"),
             Quantity::Arithmetic(left, operator, right, _) => {
-                left.fmt_within(f, operator.binds())?;
+                left.fmt_within(f, operator.precedence())?;
                 write!(f, " {} ", operator.as_str())?;
-                // What stands on the right of an operator of its own rank was in parentheses.
-                let tighter = if operator.binds() == Binds::Sum { Binds::Product } else { Binds::Sign };
+                // A right operand of the same precedence needs parentheses.
+                let tighter =
+                    if operator.precedence() == Precedence::Sum { Precedence::Product } else { Precedence::Sign };
                 right.fmt_within(f, tighter)
             }
             Quantity::Aggregate(function, inner, _) => write!(f, "{}({inner})", function.as_str()),
@@ -295,61 +296,61 @@ impl Display for Quantity {
 }
 
 impl Condition {
-    /// Adds the signals in it to `signals`.
+    /// Adds its signals to `signals`.
     pub fn signals<'a>(&'a self, signals: &mut Vec<&'a SignalName>) {
         self.quantities(&mut |quantity| quantity.signals(signals));
     }
 
-    /// Adds the functions in it to `functions`.
+    /// Adds its functions to `functions`.
     pub fn functions(&self, functions: &mut Vec<Function>) {
         self.quantities(&mut |quantity| quantity.functions(functions));
     }
 
-    /// Hands every quantity that is compared in it to `take`.
-    pub fn quantities<'a>(&'a self, take: &mut dyn FnMut(&'a Quantity)) {
+    /// Calls `visit` with each quantity that is compared.
+    pub fn quantities<'a>(&'a self, visit: &mut dyn FnMut(&'a Quantity)) {
         match self {
-            Condition::Compare(left, _, right, _) => [left, right].into_iter().for_each(take),
-            Condition::Within(value, low, high, _) => [value, low, high].into_iter().for_each(take),
+            Condition::Compare(left, _, right, _) => [left, right].into_iter().for_each(visit),
+            Condition::Within(value, low, high, _) => [value, low, high].into_iter().for_each(visit),
             Condition::And(left, right) | Condition::Or(left, right) => {
-                left.quantities(take);
-                right.quantities(take);
+                left.quantities(visit);
+                right.quantities(visit);
             }
-            Condition::Not(inner) => inner.quantities(take),
+            Condition::Not(inner) => inner.quantities(visit),
         }
     }
 
-    fn binds(&self) -> Binds {
+    fn precedence(&self) -> Precedence {
         match self {
-            Condition::Or(..) => Binds::Or,
-            Condition::And(..) => Binds::And,
-            Condition::Not(_) => Binds::Not,
-            Condition::Compare(..) | Condition::Within(..) => Binds::Compare,
+            Condition::Or(..) => Precedence::Or,
+            Condition::And(..) => Precedence::And,
+            Condition::Not(_) => Precedence::Not,
+            Condition::Compare(..) | Condition::Within(..) => Precedence::Compare,
         }
     }
 
-    pub(super) fn fmt_within(&self, f: &mut fmt::Formatter<'_>, at_least: Binds) -> fmt::Result {
-        if self.binds() < at_least { write!(f, "({self})") } else { self.fmt(f) }
+    pub(super) fn fmt_within(&self, f: &mut fmt::Formatter<'_>, lowest: Precedence) -> fmt::Result {
+        if self.precedence() < lowest { write!(f, "({self})") } else { self.fmt(f) }
     }
 }
 
 impl Display for Condition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Condition::Compare(left, comparison, right, _) => write!(f, "{left} {} {right}", comparison.as_str()),
+            Condition::Compare(left, relation, right, _) => write!(f, "{left} {} {right}", relation.as_str()),
             Condition::Within(value, low, high, _) => write!(f, "{value} in {low}..{high}"),
             Condition::And(left, right) => {
-                left.fmt_within(f, Binds::And)?;
+                left.fmt_within(f, Precedence::And)?;
                 f.write_str(" and ")?;
-                right.fmt_within(f, Binds::Not)
+                right.fmt_within(f, Precedence::Not)
             }
             Condition::Or(left, right) => {
-                left.fmt_within(f, Binds::Or)?;
+                left.fmt_within(f, Precedence::Or)?;
                 f.write_str(" or ")?;
-                right.fmt_within(f, Binds::And)
+                right.fmt_within(f, Precedence::And)
             }
             Condition::Not(inner) => {
                 f.write_str("not ")?;
-                inner.fmt_within(f, Binds::Not)
+                inner.fmt_within(f, Precedence::Not)
             }
         }
     }

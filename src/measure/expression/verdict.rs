@@ -1,4 +1,4 @@
-//! What comes of expressions.
+//! The results of expressions.
 
 use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
@@ -6,107 +6,138 @@ use crate::device::unit::Unit;
 use crate::measure::sample::Status;
 use std::time::Duration;
 
-/// What it comes to.
+/// The result of one expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ruling {
-    /// It holds.
+pub enum Outcome {
+    /// All samples satisfy the expression.
     Ok,
-    /// It does not hold.
+    /// At least one sample does not satisfy it, or is invalid.
     Fail,
-    /// Nothing was measured that it could be judged by.
+    /// There are not enough samples to decide.
     NoData,
 }
 
-/// The value of a quantity.
+/// A quantity of an expression with its value.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shown {
-    /// As it stands in the expression.
+pub struct QuantityValue {
+    /// The quantity as written in the expression.
     pub name: String,
-    /// Its unit: that of the limit where one was given.
+    /// The unit of the limit if it has one, else the unit of the signal.
     pub unit: Option<Unit>,
-    /// The device's decimal digits, where it is a number as the device sends it.
+    /// The device's decimal digits. `None` if the value was calculated.
     pub digits: Option<u8>,
-    /// Whether it is a number as it was sent, without rounding.
-    pub exact: bool,
-    /// The value; the mean where there are several.
+    /// The value was not calculated or converted.
+    pub is_exact: bool,
+    /// The value. It is the mean if there are several samples.
     pub value: Option<f64>,
-    /// The least and the greatest one, where there are several.
+    /// Lowest and highest value, if there are several samples.
     pub range: Option<(f64, f64)>,
 }
 
-/// A sample that did not satisfy.
+/// A sample that does not satisfy the expression.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Violation {
-    /// When it came.
+    /// When the sample was received.
     pub at: Stamp,
-    /// Since the first sample of all.
+    /// Time since the first sample of the run.
     pub elapsed: Duration,
-    /// The value of each quantity of the verdict; `None` where it has none.
+    /// The value of each quantity of the verdict. `None` if it is invalid or unknown.
     pub values: Vec<Option<f64>>,
-    /// What the device says of it.
+    /// The status that the device reported with this sample.
     pub status: Option<Status>,
 }
 
-/// What came of an expression.
+/// Why there is no decision, or why it failed without a violation.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reason {
+    /// The node or the signal failed. The number is an index into the failures of the report.
+    Failed(usize),
+    /// No sample of this signal was received.
+    NotReceived {
+        /// The node.
+        node: NodeId,
+        /// The name as in [`Source`](crate::measure::sample::Source).
+        signal: String,
+    },
+    /// The signal stopped before the end of the recording.
+    Stopped {
+        /// The node.
+        node: NodeId,
+        /// The name as in [`Source`](crate::measure::sample::Source).
+        signal: String,
+    },
+    /// The node stopped sending before the end of the recording.
+    NodeStopped(NodeId),
+    /// No sample of this node was received.
+    NodeNotReceived(NodeId),
+    /// None of the signals was received.
+    NothingReceived,
+    /// A function needs more samples.
+    TooFewSamples,
+    /// The result of a calculation is not a finite number, for example after a division by zero.
+    NotANumber,
+}
+
+/// The result of one expression, for one node if the expression names no node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    /// The expression as it was written.
+    /// The expression as entered.
     pub text: String,
-    /// The node that its signals without a node are of.
+    /// The node of all signals that have no node in the expression.
     pub node: Option<NodeId>,
-    /// What it comes to.
-    pub ruling: Ruling,
-    /// The values it was judged by.
-    pub values: Vec<Shown>,
-    /// Samples, valid and invalid.
+    /// The result.
+    pub outcome: Outcome,
+    /// The quantities that were compared.
+    pub values: Vec<QuantityValue>,
+    /// Number of samples, valid and invalid.
     pub count: u64,
-    /// Samples that did not satisfy, without the invalid ones.
+    /// Number of valid samples that do not satisfy the expression.
     pub violations: u64,
-    /// Samples without a valid value, where they are not what was asked about.
+    /// Number of samples without a valid value. Samples inside `invalid()` do not count.
     pub invalid: u64,
-    /// The first sample that did not satisfy.
+    /// The first sample that does not satisfy the expression.
     pub first: Option<Violation>,
-    /// Why nothing was measured.
-    pub reason: Option<String>,
+    /// The reason for [`Outcome::NoData`], and for some failures.
+    pub reason: Option<Reason>,
 }
 
 impl Verdict {
-    /// That nothing was measured.
-    pub fn nothing(text: &str, node: Option<NodeId>, reason: impl Into<String>) -> Verdict {
+    /// A verdict without data.
+    pub fn no_data(text: &str, node: Option<NodeId>, reason: Reason) -> Verdict {
         Verdict {
             text: text.to_owned(),
             node,
-            ruling: Ruling::NoData,
+            outcome: Outcome::NoData,
             values: Vec::new(),
             count: 0,
             violations: 0,
             invalid: 0,
             first: None,
-            reason: Some(reason.into()),
+            reason: Some(reason),
         }
     }
 }
 
-/// Why nothing came of a node.
+/// A node or a signal that could not be measured.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Silence {
-    /// Which one.
+pub struct MissingData {
+    /// The node.
     pub node: NodeId,
-    /// Which signal, as it stands in a [`crate::measure::sample::Source`]; `None` for all of them.
+    /// The signal as in [`Source`](crate::measure::sample::Source). `None`: all signals of the node.
     pub signal: Option<String>,
-    /// In words.
-    pub reason: String,
+    /// Why it is missing.
+    pub reason: Reason,
 }
 
-/// How an expression stands while it is measured.
+/// The state of an expression during a measurement.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Standing {
-    /// The expression as it was written.
+pub struct LiveResult {
+    /// The expression as entered.
     pub text: String,
-    /// The node that its signals without a node are of.
+    /// The node of all signals that have no node in the expression.
     pub node: Option<NodeId>,
-    /// Whether it has held until now; `None` before there is anything to judge.
-    pub holds: Option<bool>,
-    /// The values at the moment.
-    pub values: Vec<Shown>,
+    /// All samples until now satisfy the expression. `None` before the first decision.
+    pub is_satisfied: Option<bool>,
+    /// The latest values.
+    pub values: Vec<QuantityValue>,
 }

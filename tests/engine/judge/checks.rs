@@ -2,24 +2,24 @@
 
 use super::*;
 use cangauge::canopen::value::DataType;
-use cangauge::measure::expression::verdict::{Ruling, Verdict};
+use cangauge::measure::expression::verdict::{Outcome, Verdict};
 
 /// Every ruling follows from the rows, or from what the devices answered; and the end from the rulings.
 pub(super) fn checks(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
     let Command::Check { nodes, expected, how, excuse } = &spec.command else { return };
     let verdicts = run.heard.verdicts.clone();
-    let count = |ruling: Ruling| verdicts.iter().filter(|verdict| verdict.ruling == ruling).count();
+    let count = |ruling: Outcome| verdicts.iter().filter(|verdict| verdict.outcome == ruling).count();
     // Who says the same twice gets one verdict.
     let asked: BTreeSet<String> = expected.iter().map(ToString::to_string).collect();
     let complete = *excuse && !verdicts.is_empty() || verdicts.len() == nodes.len() * asked.len();
     let right = match &run.result {
-        Ok(_) => complete && count(Ruling::Ok) == verdicts.len(),
+        Ok(_) => complete && count(Outcome::Ok) == verdicts.len(),
         // Nodes that seem to listen to different SYNC identifiers are not measured.
         Err(failure) if failure.kind == Kind::CheckFailed && spec.lies() && verdicts.is_empty() => {
             failure.message.contains("(1005h)")
         }
-        Err(failure) if failure.kind == Kind::CheckFailed => count(Ruling::Fail) > 0,
-        Err(_) => count(Ruling::Fail) == 0,
+        Err(failure) if failure.kind == Kind::CheckFailed => count(Outcome::Fail) > 0,
+        Err(_) => count(Outcome::Fail) == 0,
     };
     if !right {
         broken.push(("ends as the verdicts say", format!("{:?} after {verdicts:?}", run.result)));
@@ -40,11 +40,11 @@ pub(super) fn checks(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
         let of_node = of_node.filter(|cells| cells[1] == node.to_string() && cells[2] == limits.signal);
         let values: Vec<Option<f64>> = of_node.map(|cells| cells[3].parse().ok()).collect();
         let ruling = match values.as_slice() {
-            [] => Ruling::NoData,
-            values if values.iter().all(|value| value.is_some_and(holds)) => Ruling::Ok,
-            _ => Ruling::Fail,
+            [] => Outcome::NoData,
+            values if values.iter().all(|value| value.is_some_and(holds)) => Outcome::Ok,
+            _ => Outcome::Fail,
         };
-        if verdict.ruling != ruling || verdict.count != values.len() as u64 {
+        if verdict.outcome != ruling || verdict.count != values.len() as u64 {
             broken.push(("judges by every value", format!("{verdict:?} of {values:?}")));
         }
     }
@@ -59,12 +59,12 @@ fn once(
     broken: &mut Vec<Broken>,
 ) {
     let shown = verdict.values.first().and_then(|shown| shown.value);
-    let right = match (verdict.ruling, shown) {
-        (Ruling::Ok, Some(value)) => holds(value),
-        (Ruling::Fail, Some(value)) => !holds(value),
+    let right = match (verdict.outcome, shown) {
+        (Outcome::Ok, Some(value)) => holds(value),
+        (Outcome::Fail, Some(value)) => !holds(value),
         // What has no value satisfies nothing.
-        (Ruling::Fail, None) => true,
-        (Ruling::Ok | Ruling::NoData, _) => verdict.ruling == Ruling::NoData && shown.is_none(),
+        (Outcome::Fail, None) => true,
+        (Outcome::Ok | Outcome::NoData, _) => verdict.outcome == Outcome::NoData && shown.is_none(),
     };
     if !right {
         broken.push(("judges by every value", format!("{verdict:?}")));

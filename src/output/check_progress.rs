@@ -1,67 +1,66 @@
-//! The live lines of a check: the values at the moment against what is expected of them.
+//! Live view of a check: one line per expression with the latest values.
 
 use super::progress::{RATE, bar, style};
 use super::verdict::values;
-use crate::measure::expression::verdict::Standing;
+use crate::measure::expression::verdict::LiveResult;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget};
 use std::io::{self, Write};
 use std::time::Duration;
 
-/// Live lines on stderr.
+/// The live lines on stderr.
 #[derive(Debug)]
-pub struct Limits {
+pub struct CheckProgress {
     multi: MultiProgress,
     lines: Vec<ProgressBar>,
     total: ProgressBar,
     duration: Duration,
 }
 
-impl Limits {
-    /// Live lines for a check of `duration`, hidden unless `show`.
-    pub fn new(show: bool, duration: Duration) -> Limits {
+impl CheckProgress {
+    /// Live lines for a check of `duration`. Hidden unless `show`.
+    pub fn new(show: bool, duration: Duration) -> CheckProgress {
         let target = if show { ProgressDrawTarget::stderr_with_hz(RATE) } else { ProgressDrawTarget::hidden() };
         let multi = MultiProgress::with_draw_target(target);
         let total = bar(&multi, u64::try_from(duration.as_millis()).unwrap_or(u64::MAX));
-        Limits { multi, lines: Vec::new(), total, duration }
+        CheckProgress { multi, lines: Vec::new(), total, duration }
     }
 
-    /// For lines that must not be torn.
+    /// The display, so that other lines on stderr are printed above it.
     pub fn multi(&self) -> MultiProgress {
         self.multi.clone()
     }
 
-    /// Whether anybody sees it.
+    /// Whether nothing is drawn.
     pub fn is_hidden(&self) -> bool {
         self.multi.is_hidden()
     }
 
-    /// Redraws.
-    pub fn show(&mut self, standing: &[Standing], elapsed: Duration) {
-        while self.lines.len() < standing.len() {
+    /// Redraws all lines.
+    pub fn show(&mut self, results: &[LiveResult], elapsed: Duration) {
+        while self.lines.len() < results.len() {
             let line = self.multi.insert_before(&self.total, ProgressBar::new_spinner());
             line.set_style(style("{prefix:<4}  {msg}"));
             self.lines.push(line);
         }
-        for (line, standing) in self.lines.iter().zip(standing) {
-            line.set_prefix(match standing.holds {
+        for (line, result) in self.lines.iter().zip(results) {
+            line.set_prefix(match result.is_satisfied {
                 Some(true) => "ok",
                 Some(false) => "FAIL",
                 None => "-",
             });
-            let node = standing.node.map(|node| format!("{node}  ")).unwrap_or_default();
-            let now: Vec<Option<f64>> = standing.values.iter().map(|shown| shown.value).collect();
-            line.set_message(format!("{node}{}  {}", standing.text, values(&standing.values, &now)));
+            let node = result.node.map(|node| format!("{node}  ")).unwrap_or_default();
+            let latest: Vec<Option<f64>> = result.values.iter().map(|value| value.value).collect();
+            line.set_message(format!("{node}{}  {}", result.text, values(&result.values, &latest)));
         }
         self.total.set_position(u64::try_from(elapsed.as_millis()).unwrap_or(u64::MAX));
         let left = Duration::from_secs(self.duration.saturating_sub(elapsed).as_secs());
         self.total.set_message(format!("{} left", humantime::format_duration(left)));
     }
 
-    /// Removes the lines. After Ctrl-C they stay: the terminal has written `^C` behind them, and where the
-    /// cursor stands now is not known.
+    /// Removes the lines. After Ctrl-C they stay: the terminal printed `^C`, so the cursor position is unknown.
     pub fn finish(&self, interrupted: bool) {
         if interrupted && !self.is_hidden() {
-            // A terminal that takes no more is gone.
+            // If the terminal is closed, there is nothing left to do.
             let _ = writeln!(io::stderr());
         } else {
             let _ = self.multi.clear();
