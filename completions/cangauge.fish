@@ -48,7 +48,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "read" -d 'Read me
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "nmt" -d 'Send NMT commands and tell states'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sdo" -d 'Read and write objects of the object dictionary'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
-complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "check" -d 'Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "lss" -d 'Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device\'s own)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "info" -d 'Tell everything about one device on one page'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "unit" -d 'Tell or set the physical unit of a signal (6131h)'
@@ -440,13 +440,13 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l for -d 'Judge all samples that come in this time' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l for -d 'Check all samples of this time' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sync -d 'Send SYNC at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l poll -d 'Read by SDO at this interval' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l junit -d 'Write the verdicts as JUnit XML, for CI servers: one test case per expression' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l junit -d 'Write the verdicts as JUnit XML for CI servers, one test case per expression and node' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s q -l quiet -d 'Say less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s v -l verbose -d 'Say more on stderr'
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l force -d 'Overwrite a file that exists'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l force -d 'Overwrite an existing file'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
