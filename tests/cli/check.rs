@@ -76,10 +76,8 @@ fn each_node_is_checked() {
          FAIL  127  pressure < 2 bar    3.447379 bar\n\
          ok    -    5.temperature < 60  25.5 degC\n"
     );
-    check(&bench, &["5,127", "temperature < 60"]).fails(
-        2,
-        "cangauge: node 127: no signal \"temperature\" (it has: pressure)\n  temperature < 60\n  ^\n",
-    );
+    check(&bench, &["5,127", "temperature < 60"])
+        .fails(2, "cangauge: node 127: no signal \"temperature\" (it has: pressure)\n  temperature < 60\n  ^\n");
     // With `all`, nodes without the signal are skipped.
     check(&bench, &["all", "temperature < 60"]).prints("ok    temperature < 60  25.5 degC\n");
     check(&bench, &["all", "humidity < 60"]).exit(2);
