@@ -9,7 +9,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtCommand;
 use crate::output::{csv, json, table};
 use crate::tasks::failure::together;
-use crate::tasks::nmt::{By, Change, Report, Seen, Starts, command, probe, startup, states, watch};
+use crate::tasks::nmt::{Change, Proof, Seen, Starts, StateReport, command, probe, startup, states, watch};
 use crate::tasks::{Failure, Kind};
 use clap::{Args, Subcommand, ValueEnum};
 use std::io::{self, Write};
@@ -154,7 +154,7 @@ impl Nmt {
 
 impl Targets {
     /// What is wrong with a node after a command. What cannot be confirmed is a failure only when asked to be.
-    fn judge(&self, kind: NmtCommand, report: &Report, global: &Global) -> Option<Failure> {
+    fn judge(&self, kind: NmtCommand, report: &StateReport, global: &Global) -> Option<Failure> {
         let wanted = kind.target();
         match (report.state, report.by) {
             // A device that starts by itself leaves PRE-OPERATIONAL at once after a reset.
@@ -165,7 +165,7 @@ impl Targets {
                 Some(Failure::of_node(Kind::Unexpected, report.node, message))
             }
             (None, _) => {
-                let (why, hint) = if !report.present {
+                let (why, hint) = if !report.is_present {
                     (
                         "sent, and nothing came back: no heartbeat, no boot-up, no SDO answer",
                         "who is there: cangauge scan".to_owned(),
@@ -181,7 +181,7 @@ impl Targets {
                 let failure = Failure::of_node(Kind::NoAnswer, report.node, why);
                 // A device that is there tells its boot-up, whatever else it tells: silence after a reset, and
                 // silence of a node that was named, are no success.
-                if self.confirm || !report.present || kind.is_reset() {
+                if self.confirm || !report.is_present || kind.is_reset() {
                     return Some(failure.hint(hint));
                 }
                 global.console().note(&failure.message);
@@ -196,7 +196,8 @@ impl StateArgs {
         let reports = global.with_master(|master| {
             let nodes: Vec<NodeId> = open::nodes(master, global, &self.nodes)?;
             let mut reports = states(master, &nodes).or_fail()?;
-            for report in reports.iter_mut().filter(|report| self.probe && report.present && report.state.is_none()) {
+            for report in reports.iter_mut().filter(|report| self.probe && report.is_present && report.state.is_none())
+            {
                 let probed = probe(master, report.node).or_fail()?;
                 if let Some(trouble) = probed.trouble {
                     global.console().warn(&format!("node {}: {trouble}", report.node));
@@ -208,7 +209,7 @@ impl StateArgs {
         print(&reports, global.format).map_err(stdout)?;
         let failures: Vec<Failure> = reports
             .iter()
-            .filter(|report| !report.present)
+            .filter(|report| !report.is_present)
             .map(|report| {
                 Failure::of_node(Kind::NoAnswer, report.node, "no heartbeat and no SDO answer")
                     .hint("who is there: cangauge scan")
@@ -303,7 +304,7 @@ fn print_seen(seen: &Seen, format: Format) -> io::Result<()> {
     out.flush()
 }
 
-fn print(reports: &[Report], format: Format) -> io::Result<()> {
+fn print(reports: &[StateReport], format: Format) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match format {
         Format::Json => reports.iter().try_for_each(|report| json::report(&mut out, report))?,
@@ -319,9 +320,9 @@ fn print(reports: &[Report], format: Format) -> io::Result<()> {
     out.flush()
 }
 
-fn cells(report: &Report, missing: &str) -> Vec<String> {
+fn cells(report: &StateReport, missing: &str) -> Vec<String> {
     let by = match report.by {
-        By::None => "none",
+        Proof::None => "none",
         by => by.as_str(),
     };
     let state = report.state.map_or_else(|| missing.to_owned(), |state| state.to_string());

@@ -4,6 +4,7 @@
 //! - [`read`]: reads values, several nodes in parallel;
 //! - [`write`]: writes an object in the form that the node accepts, and says how it was confirmed;
 //! - [`wait`]: receives frames until a deadline, with one policy for Ctrl-C, link down and the end of a recording;
+//! - [`state`]: NMT states, commands, reset and the restart;
 //! - [`names`]: the objects, types and signals behind names.
 //!
 //! Errors are types ([`Error`]); their texts are in `output`.
@@ -12,6 +13,7 @@ mod error;
 mod facts;
 pub mod names;
 pub mod read;
+pub mod state;
 pub mod survey;
 pub mod wait;
 pub mod write;

@@ -5,7 +5,7 @@ use crate::canopen::id::NodeId;
 use crate::measure::sample::{Number, Source, Status};
 use crate::tasks::autozero::Zeroed;
 use crate::tasks::failure::Place;
-use crate::tasks::nmt::Report;
+use crate::tasks::nmt::StateReport;
 use crate::tasks::scan::Found;
 use crate::tasks::store::Done;
 use crate::tasks::{Failure, Kind};
@@ -115,7 +115,7 @@ pub fn found(out: &mut dyn Write, found: &Found) -> io::Result<()> {
 }
 
 /// A state.
-pub fn report(out: &mut dyn Write, report: &Report) -> io::Result<()> {
+pub fn report(out: &mut dyn Write, report: &StateReport) -> io::Result<()> {
     #[derive(Serialize)]
     struct State<'a> {
         node: u8,

@@ -8,7 +8,7 @@ use cangauge::canopen::id::NodeId;
 use cangauge::canopen::nmt::{NmtCommand, NmtState};
 use cangauge::master::{Master, Timing};
 use cangauge::sim::Bench;
-use cangauge::tasks::nmt::{By, Report, command, states};
+use cangauge::tasks::nmt::{Proof, StateReport, command, states};
 use std::path::Path;
 use std::time::Duration;
 
@@ -54,7 +54,7 @@ fn node() -> NodeId {
 }
 
 /// What comes of a command to a node that obeys this frame and no other.
-fn told(what: NmtCommand, obeys: Option<&str>) -> Report {
+fn told(what: NmtCommand, obeys: Option<&str>) -> StateReport {
     let mut bus = MemoryBus::new(Clock::Virtual);
     let obeys = obeys.map(|text| text.parse().unwrap());
     bus.attach(Slow { obeys, beat: Mono::START + PERIOD, stops: None });
@@ -65,10 +65,10 @@ fn told(what: NmtCommand, obeys: Option<&str>) -> Report {
 #[test]
 fn a_heartbeat_of_the_node_as_it_was_confirms_nothing() {
     for reset in [NmtCommand::ResetNode, NmtCommand::ResetCommunication] {
-        assert_eq!(told(reset, None), Report { node: node(), state: None, by: By::None, present: true });
+        assert_eq!(told(reset, None), StateReport { node: node(), state: None, by: Proof::None, is_present: true });
     }
     let operational = Some(NmtState::Operational);
-    let still = Report { node: node(), state: operational, by: By::Heartbeat, present: true };
+    let still = StateReport { node: node(), state: operational, by: Proof::Heartbeat, is_present: true };
     assert_eq!(told(NmtCommand::Stop, None), still);
 }
 
@@ -81,14 +81,14 @@ fn what_a_heartbeat_tells_while_others_are_asked_counts() {
     // It obeys after the time in which it is waited for; whether the other one has become silent is asked after that.
     let silent = NodeId::new(44).unwrap();
     let reports = command(&mut master, NmtCommand::Stop, &[silent, node()], false).unwrap();
-    assert_eq!((reports[1].state, reports[1].by), (Some(NmtState::Stopped), By::Heartbeat));
+    assert_eq!((reports[1].state, reports[1].by), (Some(NmtState::Stopped), Proof::Heartbeat));
 }
 
 #[test]
 fn heartbeats_from_before_it_obeys_are_waited_over() {
     let report = told(NmtCommand::Stop, Some("000#0205"));
     let stopped = Some(NmtState::Stopped);
-    assert_eq!(report, Report { node: node(), state: stopped, by: By::Heartbeat, present: true });
+    assert_eq!(report, StateReport { node: node(), state: stopped, by: Proof::Heartbeat, is_present: true });
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn who_was_never_there_is_not_stopped() {
     let other = NodeId::new(9).unwrap();
     let mut master = Master::new(&mut bus, Timing::default());
     let reports = command(&mut master, NmtCommand::Stop, &[other], false).unwrap();
-    assert_eq!(reports, [Report { node: other, state: None, by: By::None, present: false }]);
+    assert_eq!(reports, [StateReport { node: other, state: None, by: Proof::None, is_present: false }]);
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! Finds a state out by switching the heartbeat on for a moment.
 
-use super::{By, HEARTBEAT, Report, Watch};
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::Life;
 use crate::canopen::sdo::DownloadSize;
 use crate::canopen::value::DataType;
 use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
 use crate::node::read::read_values;
+use crate::node::state::{HEARTBEAT_TIME, LifeWatch, Proof, StateReport};
 use std::time::Duration;
 
 /// The heartbeat that is set for a moment.
@@ -19,7 +19,7 @@ const DEAF: u32 = 5;
 #[derive(Debug)]
 pub struct Probe {
     /// The state, if it came out.
-    pub report: Report,
+    pub report: StateReport,
     /// What went wrong with setting 1017h or putting it back, in words.
     pub trouble: Option<String>,
 }
@@ -29,20 +29,20 @@ pub struct Probe {
 /// # Errors
 /// What stops everything.
 pub fn probe(master: &mut Master<'_>, node: NodeId) -> Result<Probe, Error> {
-    let unknown = Report { node, state: None, by: By::None, present: true };
+    let unknown = StateReport { node, state: None, by: Proof::None, is_present: true };
     let failed = |trouble: String| Ok(Probe { report: unknown, trouble: Some(trouble) });
-    let before = match read_values(master, &[(node, HEARTBEAT, DataType::Unsigned(2))])?.pop() {
+    let before = match read_values(master, &[(node, HEARTBEAT_TIME, DataType::Unsigned(2))])?.pop() {
         Some(Ok(value)) => value.as_u64().and_then(|time| u16::try_from(time).ok()).unwrap_or(0),
         Some(Err(error)) => return failed(error.to_string()),
         None => return failed("nothing was read".to_owned()),
     };
-    let set = |time: u16| Request::write(node, HEARTBEAT, time.to_le_bytes().to_vec(), DownloadSize::Indicated);
+    let set = |time: u16| Request::write(node, HEARTBEAT_TIME, time.to_le_bytes().to_vec(), DownloadSize::Indicated);
     let milliseconds = u16::try_from(PERIOD.as_millis()).unwrap_or(u16::MAX);
     let begun = master.transfer_one(set(milliseconds));
     if let Ok(Err(error @ SdoError { failure: SdoFailure::Refused(_), .. })) = &begun {
         return failed(error.to_string());
     }
-    let mut watch = Watch::default();
+    let mut watch = LifeWatch::default();
     let waited = match &begun {
         Ok(Ok(_)) => {
             let until = master.now() + PERIOD + master.timing().timeout;
@@ -61,7 +61,7 @@ pub fn probe(master: &mut Master<'_>, node: NodeId) -> Result<Probe, Error> {
         (Err(_), Err(error)) => Some(format!("{error}; 1017h may stay at {milliseconds} ms")),
     };
     let report = match watch.lives.get(&node) {
-        Some(Life::State(state)) => Report { state: Some(*state), by: By::Heartbeat, ..unknown },
+        Some(Life::State(state)) => StateReport { state: Some(*state), by: Proof::Heartbeat, ..unknown },
         _ => unknown,
     };
     Ok(Probe { report, trouble })

@@ -10,8 +10,8 @@ use crate::master::Master;
 use crate::measure::layout::Signal;
 use crate::measure::sample::Sample;
 use crate::node::Node;
+use crate::node::state;
 use crate::tasks::Failure;
-use crate::tasks::nmt;
 use crate::tasks::read::{requests, sample, targets};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -257,7 +257,7 @@ fn state(
 ) -> Result<Option<NmtState>, Failure> {
     let period = values.get(&HEARTBEAT).and_then(Value::as_u64).map(Duration::from_millis);
     match period.filter(|period| !period.is_zero() && *period <= PATIENCE) {
-        Some(period) => Ok(nmt::by_heartbeat(master, device.instrument.id, period)?),
+        Some(period) => Ok(state::by_heartbeat(master, device.instrument.id, period)?),
         None => Ok(None),
     }
 }

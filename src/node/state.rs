@@ -1,0 +1,351 @@
+//! NMT states and commands, confirmed if possible.
+//!
+//! A state is confirmed by a boot-up message, a heartbeat, the answer to node guarding, or SDO. A stopped node has no SDO:
+//! if it answered before and does not answer now, it is stopped. An SDO answer proves only that a node is not stopped.
+
+use super::error::Error;
+use super::read::read_values;
+use super::wait::{Policy, wait};
+use crate::bus::{Mono, Received};
+use crate::canopen::frame::Frame;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::nmt::{Life, NmtCommand, NmtState};
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
+use crate::master::{Error as MasterError, Happening, Master, Request, SdoFailure};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+/// The producer heartbeat time.
+pub const HEARTBEAT_TIME: ObjectId = ObjectId::new(0x1017, 0);
+const GUARD_TIME: ObjectId = ObjectId::new(0x100c, 0);
+const LIFE_TIME_FACTOR: ObjectId = ObjectId::new(0x100d, 0);
+
+/// How long to listen for the guarding requests of another master.
+const OTHER_GUARD_TIMEOUT: Duration = Duration::from_millis(200);
+
+/// The longest wait for a boot-up message. No manual gives a time; a device may write its memory first.
+pub const BOOT_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// What confirmed a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Proof {
+    /// A heartbeat.
+    Heartbeat,
+    /// A boot-up message: the node is in PRE-OPERATIONAL, unless it starts by itself.
+    BootUp,
+    /// The answer to node guarding.
+    Guarding,
+    /// An SDO request that is no longer answered.
+    Sdo,
+    /// Nothing.
+    None,
+}
+
+impl Proof {
+    /// The word of the contract.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Proof::Heartbeat => "heartbeat",
+            Proof::BootUp => "boot-up",
+            Proof::Guarding => "guarding",
+            Proof::Sdo => "sdo",
+            Proof::None => "none",
+        }
+    }
+}
+
+/// The state of a node, and what confirmed it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StateReport {
+    /// The node.
+    pub node: NodeId,
+    /// Its state; `None` if it is unknown.
+    pub state: Option<NmtState>,
+    /// What confirmed it.
+    pub by: Proof,
+    /// Whether the node showed any sign of life.
+    pub is_present: bool,
+}
+
+impl StateReport {
+    /// A node in a known state.
+    pub fn known(node: NodeId, state: NmtState, by: Proof) -> StateReport {
+        StateReport { node, state: Some(state), by, is_present: true }
+    }
+
+    /// A node in an unknown state.
+    pub fn unknown(node: NodeId, is_present: bool) -> StateReport {
+        StateReport { node, state: None, by: Proof::None, is_present }
+    }
+
+    fn of_life(node: NodeId, life: Life) -> StateReport {
+        match life {
+            Life::State(state) => StateReport::known(node, state, Proof::Heartbeat),
+            Life::BootUp => StateReport::known(node, NmtState::PreOperational, Proof::BootUp),
+        }
+    }
+}
+
+/// How the state of a node can be found out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Means {
+    answers_sdo: bool,
+    heartbeat: Option<Duration>,
+    /// 100Ch and 100Dh were read as 0: a guarding request does not start life guarding.
+    may_guard: bool,
+}
+
+impl Means {
+    /// Whether a heartbeat may come. 1017h of a stopped node cannot be read.
+    fn may_send_heartbeat(&self) -> bool {
+        self.heartbeat.is_some() || !self.answers_sdo
+    }
+}
+
+/// Heartbeats, boot-ups and guarding requests received while waiting.
+#[derive(Default)]
+pub struct LifeWatch {
+    /// The last sign of life of each node.
+    pub lives: BTreeMap<NodeId, Life>,
+    guarded_by_others: BTreeSet<NodeId>,
+}
+
+impl LifeWatch {
+    /// Handles a received frame.
+    pub fn on_frame(&mut self, received: &Received) {
+        if let Some((node, life)) = Life::parse(&received.frame) {
+            self.lives.insert(node, life);
+        } else if let (Some(node), true) = (received.frame.id().heartbeat_node(), received.frame.is_remote()) {
+            self.guarded_by_others.insert(node);
+        }
+    }
+
+    /// The state that the last heartbeat of a node showed.
+    pub fn state(&self, node: NodeId) -> Option<NmtState> {
+        match self.lives.get(&node) {
+            Some(Life::State(state)) => Some(*state),
+            Some(Life::BootUp) | None => None,
+        }
+    }
+
+    /// Receives until `is_enough` or `until`.
+    ///
+    /// # Errors
+    /// Bus errors and Ctrl-C.
+    pub fn wait(
+        &mut self,
+        master: &mut Master<'_>,
+        until: Mono,
+        is_enough: &dyn Fn(&LifeWatch) -> bool,
+    ) -> Result<(), MasterError> {
+        if is_enough(self) {
+            return Ok(());
+        }
+        wait(master, until, Policy::Command, |_, event| {
+            if let Happening::Frame(received) = event {
+                self.on_frame(&received);
+                if is_enough(self) {
+                    return ControlFlow::Break(());
+                }
+            }
+            ControlFlow::Continue(())
+        })?;
+        Ok(())
+    }
+}
+
+/// Finds out how the state of each node can be found out. A node without an answer may be stopped: that is no error.
+fn means(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId, Means>, MasterError> {
+    let mut found: BTreeMap<NodeId, Means> = BTreeMap::new();
+    // The heartbeat time first: a node that does not answer is not asked for the others.
+    let items: Vec<_> = nodes.iter().map(|&node| (node, HEARTBEAT_TIME, DataType::Unsigned(2))).collect();
+    for (&node, value) in nodes.iter().zip(read_values(master, &items)?) {
+        let mut means = Means { answers_sdo: true, ..Means::default() };
+        match value {
+            Ok(value) => means.heartbeat = value.as_u64().filter(|&time| time > 0).map(Duration::from_millis),
+            Err(error) => means.answers_sdo = !matches!(error.failure, SdoFailure::NoAnswer { .. }),
+        }
+        found.insert(node, means);
+    }
+    let answering: Vec<NodeId> = nodes.iter().copied().filter(|node| found[node].answers_sdo).collect();
+    let guarding = [(GUARD_TIME, DataType::Unsigned(2)), (LIFE_TIME_FACTOR, DataType::Unsigned(1))];
+    let items: Vec<_> = answering
+        .iter()
+        .flat_map(|&node| guarding.iter().map(move |&(object, data_type)| (node, object, data_type)))
+        .collect();
+    let values = read_values(master, &items)?;
+    for (node, values) in answering.iter().zip(values.chunks(guarding.len())) {
+        if let Some(means) = found.get_mut(node) {
+            means.may_guard = values.iter().all(|value| value.as_ref().is_ok_and(|value| value.as_u64() == Some(0)));
+        }
+    }
+    Ok(found)
+}
+
+/// The states of nodes. One report for each node, in their order.
+///
+/// # Errors
+/// Bus errors and Ctrl-C. A node without a sign of life has `is_present: false`.
+pub fn states(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<Vec<StateReport>, MasterError> {
+    let mut watch = LifeWatch::default();
+    let means = means(master, nodes)?;
+    let timeout = master.timing().timeout;
+    let longest = nodes.iter().filter_map(|node| means[node].heartbeat).max();
+    let expected: Vec<NodeId> = nodes.iter().copied().filter(|node| means[node].may_send_heartbeat()).collect();
+    let wait = if expected.is_empty() { Duration::ZERO } else { longest.unwrap_or_default() + timeout };
+    let until = master.now() + wait;
+    watch.wait(master, until, &|watch| expected.iter().all(|node| watch.lives.contains_key(node)))?;
+    let guarded = guard(master, nodes, &means, &mut watch)?;
+    let report = |&node: &NodeId| match (guarded.get(&node), watch.lives.get(&node)) {
+        (Some(&state), _) => StateReport::known(node, state, Proof::Guarding),
+        (None, Some(&life)) => StateReport::of_life(node, life),
+        (None, None) => StateReport::unknown(node, means[&node].answers_sdo),
+    };
+    Ok(nodes.iter().map(report).collect())
+}
+
+/// The state of one node; `None` if it is unknown.
+///
+/// # Errors
+/// Bus errors and Ctrl-C.
+pub fn state(master: &mut Master<'_>, node: NodeId) -> Result<Option<NmtState>, MasterError> {
+    Ok(states(master, &[node])?.first().and_then(|report| report.state))
+}
+
+/// The state that the next heartbeat of a node shows. `period` is its heartbeat time (1017h). Sends nothing.
+///
+/// # Errors
+/// Bus errors and Ctrl-C.
+pub fn by_heartbeat(master: &mut Master<'_>, node: NodeId, period: Duration) -> Result<Option<NmtState>, MasterError> {
+    let mut watch = LifeWatch::default();
+    let until = master.now() + period + master.timing().timeout;
+    watch.wait(master, until, &|watch| watch.state(node).is_some())?;
+    Ok(watch.state(node))
+}
+
+/// Uses node guarding for the nodes for which it is harmless: no heartbeat, no life guarding, no other guarding master.
+fn guard(
+    master: &mut Master<'_>,
+    nodes: &[NodeId],
+    means: &BTreeMap<NodeId, Means>,
+    watch: &mut LifeWatch,
+) -> Result<BTreeMap<NodeId, NmtState>, MasterError> {
+    let may_guard = |node: &NodeId| means[node].may_guard && means[node].heartbeat.is_none();
+    let asked: Vec<NodeId> = nodes.iter().copied().filter(may_guard).collect();
+    let mut states = BTreeMap::new();
+    if asked.is_empty() {
+        return Ok(states);
+    }
+    // With two masters, each would get an answer with the toggle bit that the other one expects.
+    let until = master.now() + OTHER_GUARD_TIMEOUT.min(master.timing().timeout);
+    let is_known = |watch: &LifeWatch, node| watch.guarded_by_others.contains(node) && watch.lives.contains_key(node);
+    watch.wait(master, until, &|watch| asked.iter().all(|node| is_known(watch, node)))?;
+    let asked: Vec<NodeId> = asked.into_iter().filter(|node| !watch.guarded_by_others.contains(node)).collect();
+    for node in &asked {
+        watch.lives.remove(node);
+        if let Ok(request) = Frame::remote(CanId::heartbeat(*node), 1) {
+            master.send(request);
+        }
+    }
+    let until = master.now() + master.timing().timeout;
+    watch.wait(master, until, &|watch| asked.iter().all(|node| watch.lives.contains_key(node)))?;
+    states.extend(asked.into_iter().filter_map(|node| Some((node, watch.state(node)?))));
+    Ok(states)
+}
+
+/// Sends a command to each of the nodes, or once to all nodes with `broadcast`, and finds out the resulting states.
+///
+/// # Errors
+/// Bus errors and Ctrl-C.
+pub fn command(
+    master: &mut Master<'_>,
+    command: NmtCommand,
+    nodes: &[NodeId],
+    broadcast: bool,
+) -> Result<Vec<StateReport>, MasterError> {
+    let mut watch = LifeWatch::default();
+    let before = means(master, nodes)?;
+    if broadcast {
+        master.send(command.frame(None));
+    } else {
+        nodes.iter().for_each(|&node| master.send(command.frame(Some(node))));
+    }
+    if command.is_reset() {
+        after_reset(master, nodes, &before, &mut watch)
+    } else {
+        after_change(master, command, nodes, &before, &mut watch)
+    }
+}
+
+/// Waits for the boot-up messages after a reset.
+fn after_reset(
+    master: &mut Master<'_>,
+    nodes: &[NodeId],
+    before: &BTreeMap<NodeId, Means>,
+    watch: &mut LifeWatch,
+) -> Result<Vec<StateReport>, MasterError> {
+    let until = master.now() + BOOT_TIMEOUT.max(master.timing().timeout);
+    let has_booted = |watch: &LifeWatch, node| watch.lives.get(node) == Some(&Life::BootUp);
+    watch.wait(master, until, &|watch| nodes.iter().all(|node| has_booted(watch, node)))?;
+    let report = |&node: &NodeId| match watch.lives.get(&node) {
+        Some(Life::BootUp) => StateReport::of_life(node, Life::BootUp),
+        // A heartbeat without a boot-up comes from a node that did not restart.
+        Some(Life::State(_)) => StateReport::unknown(node, true),
+        None => StateReport::unknown(node, before[&node].answers_sdo),
+    };
+    Ok(nodes.iter().map(report).collect())
+}
+
+/// Finds out the states after start, stop or enter PRE-OPERATIONAL.
+fn after_change(
+    master: &mut Master<'_>,
+    command: NmtCommand,
+    nodes: &[NodeId],
+    before: &BTreeMap<NodeId, Means>,
+    watch: &mut LifeWatch,
+) -> Result<Vec<StateReport>, MasterError> {
+    let sent = master.now();
+    let target = Life::State(command.target());
+    let expected: Vec<NodeId> = nodes.iter().copied().filter(|node| before[node].may_send_heartbeat()).collect();
+    if !expected.is_empty() {
+        let longest = nodes.iter().filter_map(|node| before[node].heartbeat).max().unwrap_or_default();
+        let until = sent + longest + master.timing().timeout;
+        watch.wait(master, until, &|watch| expected.iter().all(|node| watch.lives.get(node) == Some(&target)))?;
+    }
+    let guarded = guard(master, nodes, before, watch)?;
+    let is_open = |node: &NodeId| !watch.lives.contains_key(node) && !guarded.contains_key(node);
+    let silent: Vec<NodeId> = nodes.iter().copied().filter(is_open).collect();
+    let requests = silent.iter().map(|&node| Request::read(node, HEARTBEAT_TIME)).collect();
+    // Heartbeats that come meanwhile count as well.
+    let answers = master.transfer(requests, &mut |received| watch.on_frame(received))?;
+    let has_no_answer = |answer: &Result<_, crate::master::SdoError>| {
+        answer.as_ref().is_err_and(|error| matches!(error.failure, SdoFailure::NoAnswer { .. }))
+    };
+    let without_sdo: BTreeSet<NodeId> =
+        silent.iter().zip(&answers).filter(|(_, answer)| has_no_answer(answer)).map(|(&node, _)| node).collect();
+    let report = |&node: &NodeId| {
+        if let Some(&state) = guarded.get(&node) {
+            return StateReport::known(node, state, Proof::Guarding);
+        }
+        if let Some(&life) = watch.lives.get(&node) {
+            return StateReport::of_life(node, life);
+        }
+        let (answered, lost) = (before[&node].answers_sdo, without_sdo.contains(&node));
+        if command == NmtCommand::Stop && answered && lost {
+            return StateReport::known(node, NmtState::Stopped, Proof::Sdo);
+        }
+        StateReport::unknown(node, answered || !lost)
+    };
+    Ok(nodes.iter().map(report).collect())
+}
+
+/// Resets a node and waits for its boot-up message.
+///
+/// # Errors
+/// [`Error::NoBootUp`]; bus errors and Ctrl-C.
+pub fn reset(master: &mut Master<'_>, node: NodeId) -> Result<(), Error> {
+    let reports = command(master, NmtCommand::ResetNode, &[node], false)?;
+    if reports.iter().any(|report| report.by == Proof::BootUp) { Ok(()) } else { Err(Error::NoBootUp(node)) }
+}
