@@ -2,7 +2,7 @@
 //!
 //! `UPDATE_GENERATED=1 cargo test --test generated` writes them anew.
 
-use cangauge::cli::Cli;
+use cangauge::cli::{Cli, program};
 use clap::{Command, CommandFactory};
 use clap_complete::Shell;
 use clap_mangen::Man;
@@ -30,7 +30,7 @@ fn completions() -> Files {
 }
 
 fn man() -> Files {
-    let mut root = Cli::command().disable_help_subcommand(true);
+    let mut root = program().disable_help_subcommand(true);
     root.build();
     let mut pages = Files::new();
     let mut waiting = vec![root];
@@ -110,7 +110,7 @@ fn check(folder: &str, wanted: &Files) {
 
 #[test]
 fn the_command_line_is_sound() {
-    Cli::command().debug_assert();
+    program().debug_assert();
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod host;
 use super::args::{BusSpec, Duration, InterfaceName, Rate};
 use super::exit::{IntoFailure, stdout};
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::output::interfaces::{self, Interface};
 use crate::tasks::detect::{By, Detection, How, Tried, detect};
 use crate::tasks::{Failure, Kind};
@@ -74,6 +75,11 @@ struct Detect {
 }
 
 impl BusCommand {
+    /// Nothing: other cangauges may use every node.
+    pub(super) fn claim(&self) -> Claim {
+        Claim::Nothing
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         match &self.action {
             Action::List => {
@@ -81,7 +87,7 @@ impl BusCommand {
                 if all.is_empty() {
                     global.console().note("there is no CAN interface here");
                 }
-                print(&all, global.format).map_err(stdout)
+                global.print(&all)
             }
             Action::Up(up) => {
                 let rate = up.rate.map(|rate| rate.0);
@@ -99,21 +105,9 @@ impl BusCommand {
 
 /// What was done is a note; as data only where a program asks for it.
 fn done(after: &Interface, said: &str, global: &Global) -> anyhow::Result<()> {
-    if global.format != Format::Text {
-        print(std::slice::from_ref(after), global.format).map_err(stdout)?;
-    }
+    global.print_data(std::slice::from_ref(after))?;
     global.console().note(said);
     Ok(())
-}
-
-fn print(all: &[Interface], format: Format) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    match format {
-        Format::Json => interfaces::json(&mut out, all),
-        Format::Csv => interfaces::csv(&mut out, all),
-        Format::Text => interfaces::text(&mut out, all),
-    }?;
-    out.flush()
 }
 
 impl Detect {

@@ -1,7 +1,8 @@
 //! `cangauge completions`.
 
-use super::Cli;
 use super::exit::stdout;
+use super::{Cli, Global};
+use crate::bus::claim::Claim;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 use std::io::{self, Write};
@@ -15,7 +16,12 @@ pub(crate) struct Completions {
 }
 
 impl Completions {
-    pub(super) fn run(&self) -> anyhow::Result<()> {
+    /// Nothing: other cangauges may use every node.
+    pub(super) fn claim(&self) -> Claim {
+        Claim::Nothing
+    }
+
+    pub(super) fn run(&self, _: &Global) -> anyhow::Result<()> {
         // Into memory first: the generator panics on a closed pipe.
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut Cli::command(), "cangauge", &mut script);

@@ -81,7 +81,7 @@ impl Filter {
             ));
         }
         if change.before != change.now {
-            console.note(&format!("node {node}: kept after power off only when it is stored: cangauge store {node}"));
+            console.note(&format!("node {node}: lost at power-off unless stored: cangauge store {node}"));
         }
         Ok(())
     }

@@ -75,8 +75,7 @@ impl Limits {
             ));
         }
         if !wanted.is_empty() {
-            console
-                .note(&format!("node {0}: kept after power off only when it is stored: cangauge store {0}", self.node));
+            console.note(&format!("node {0}: lost at power-off unless stored: cangauge store {0}", self.node));
         }
         Ok(())
     }

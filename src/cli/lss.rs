@@ -5,6 +5,7 @@ mod assign;
 use super::args::Duration;
 use super::exit::stdout;
 use super::{Format, Global, open};
+use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::catalog::Model;
 use crate::master::Master;
@@ -98,6 +99,11 @@ impl FromStr for Everybody {
 }
 
 impl LssCommand {
+    /// LSS has no addresses of its own: the command needs the bus alone.
+    pub(super) fn claim(&self) -> Claim {
+        Claim::Bus
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         match &self.action {
             Action::Scan => run_scan(global),

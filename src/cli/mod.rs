@@ -31,12 +31,17 @@ mod unit;
 use crate::bus::claim::{Claim, Claims};
 use crate::master::{Master, Timing};
 use crate::output::console::Console;
+pub(crate) use crate::output::report::Format;
+use crate::output::report::{Report, Stream, render};
 use anstream::ColorChoice;
 use args::{BusSpec, Duration, Override};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use exit::IntoFailure;
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
+
+/// The line about the global options in the help of each command.
+const GLOBAL_OPTIONS: &str = "Global options: see cangauge --help";
 
 const EXAMPLES: &str = "\
 Examples, on the simulated bus; leave `-b sim` out where one CAN interface is up:
@@ -127,65 +132,72 @@ pub struct Global {
 // No doc comments on the variants: clap would spread each over lines of its own in every help text.
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Format {
-    Text,
-    Json,
-    Csv,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum When {
     Auto,
     Always,
     Never,
 }
 
-/// What to do. The first line of each command's own help, which is made up only when it is chosen, stands
-/// here again.
-#[derive(Debug, Subcommand)]
-#[command(defer = true)]
-pub(crate) enum Command {
-    /// List every node that answers, with its state, identity and recognised device
-    Scan(scan::Scan),
-    /// Read measured values now, scaled, with unit and status
-    Read(read::Read),
-    /// Send NMT commands and tell states
-    Nmt(nmt::Nmt),
-    /// Read and write objects of the object dictionary
-    Sdo(sdo::Sdo),
-    /// Record measurements as CSV or JSON Lines
-    Log(log::Log),
-    /// Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data
-    Check(check::Check),
-    /// Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device's own)
-    Lss(lss::LssCommand),
-    /// Tell everything about one device on one page
-    Info(info::Info),
-    /// Tell or set the physical unit of a signal (6131h)
-    Unit(unit::Unit),
-    /// Tell or set the filter of a signal: type (61A0h) and constant (61A1h)
-    Filter(filter::Filter),
-    /// Tell or set what makes a TPDO of a signal go out by itself: delta, limits, hysteresis (x133h to x136h)
-    Limits(limits::Limits),
-    /// Tell the lowest and highest value that the device has measured, or reset them
-    Minmax(minmax::Minmax),
-    /// Tell the errors of a device: register (1001h) and history (1003h) in words, or clear the history
-    Errors(errors::Errors),
-    /// List CAN interfaces, switch them on and off, find the bit rate of a bus
-    Bus(bus::BusCommand),
-    /// Show, change and watch what the nodes' transmit PDOs carry
-    Pdo(pdo::Pdo),
-    /// Make the present reading of a channel zero (6125h), with checks before and after
-    Autozero(autozero::Autozero),
-    /// Let devices keep their settings beyond power off (1010h)
-    Store(store::Store),
-    /// Give devices their settings as delivered (1011h); node-ID and bit rate stay
-    Restore(store::Restore),
-    /// Simulate devices on a bus until Ctrl-C
-    Sim(sim::Sim),
-    /// Print the completions for a shell
-    Completions(completions::Completions),
+/// Registers the commands: variant, type of the arguments, name, aliases. Each type has a `claim` (what the command
+/// keeps other cangauges from) and a `run`. Its doc comment is the help text.
+macro_rules! commands {
+    ($($variant:ident($arguments:ty): $name:literal $(| $alias:literal)*;)+) => {
+        // The doc comment of the type is the help of the command.
+        #[allow(missing_docs)]
+        #[derive(Debug, Subcommand)]
+        pub(crate) enum Command {
+            $(
+                #[command(name = $name)]
+                $(#[command(visible_alias = $alias)])*
+                $variant($arguments),
+            )+
+        }
+
+        impl Command {
+            /// The nodes that the command keeps other cangauges from using.
+            fn claim(&self) -> Claim {
+                match self {
+                    $(Command::$variant(command) => command.claim(),)+
+                }
+            }
+
+            fn run(&self, global: &Global) -> anyhow::Result<()> {
+                match self {
+                    $(Command::$variant(command) => command.run(global),)+
+                }
+            }
+        }
+
+        /// Names of a command, and the function that adds its arguments. One command can be built without the others.
+        const ARGUMENTS: &[(&[&str], Augment)] = &[$((&[$name $(, $alias)*], <$arguments>::augment_args)),+];
+    };
 }
+
+commands! {
+    Scan(scan::Scan): "scan" | "ls";
+    Read(read::Read): "read";
+    Nmt(nmt::Nmt): "nmt";
+    Sdo(sdo::Sdo): "sdo";
+    Log(log::Log): "log";
+    Check(check::Check): "check";
+    Lss(lss::LssCommand): "lss";
+    Info(info::Info): "info" | "status";
+    Unit(unit::Unit): "unit";
+    Filter(filter::Filter): "filter";
+    Limits(limits::Limits): "limits";
+    Minmax(minmax::Minmax): "minmax";
+    Errors(errors::Errors): "errors";
+    Bus(bus::BusCommand): "bus";
+    Pdo(pdo::Pdo): "pdo";
+    Autozero(autozero::Autozero): "autozero" | "zero";
+    Store(store::Store): "store";
+    Restore(store::Restore): "restore";
+    Sim(sim::Sim): "sim";
+    Completions(completions::Completions): "completions";
+}
+
+/// Adds the arguments of a command.
+type Augment = fn(clap::Command) -> clap::Command;
 
 impl Global {
     /// stderr as these options want it.
@@ -220,6 +232,22 @@ impl Global {
         }
     }
 
+    /// Prints reports to stdout in the chosen format.
+    pub(crate) fn print<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
+        render(reports, self.format, &mut io::stdout().lock()).map_err(exit::stdout)
+    }
+
+    /// Prints reports if the format is for programs. A note on stderr tells people.
+    pub(crate) fn print_data<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
+        if self.format == Format::Text { Ok(()) } else { self.print(reports) }
+    }
+
+    /// Prints reports one by one as they arrive.
+    #[allow(dead_code)]
+    pub(crate) fn stream<R: Report>(&self) -> anyhow::Result<Stream<R, io::Stdout>> {
+        Stream::new(self.format, io::stdout()).map_err(exit::stdout)
+    }
+
     /// Runs `work` with a master on the bus.
     pub(crate) fn with_master<T>(&self, work: impl FnOnce(&mut Master<'_>) -> anyhow::Result<T>) -> anyhow::Result<T> {
         self.with_claims(|master, _| work(master))
@@ -250,79 +278,21 @@ impl Global {
 /// Why it was not done; [`exit::report`] turns it into words and an exit code.
 pub fn run(cli: &Cli) -> anyhow::Result<()> {
     let global = Global { claim: cli.command.claim(), ..cli.global.clone() };
-    match &cli.command {
-        Command::Scan(command) => command.run(&global),
-        Command::Read(command) => command.run(&global),
-        Command::Nmt(command) => command.run(&global),
-        Command::Sdo(command) => command.run(&global),
-        Command::Log(command) => command.run(&global),
-        Command::Check(command) => command.run(&global),
-        Command::Lss(command) => command.run(&global),
-        Command::Info(command) => command.run(&global),
-        Command::Unit(command) => command.run(&global),
-        Command::Filter(command) => command.run(&global),
-        Command::Limits(command) => command.run(&global),
-        Command::Minmax(command) => command.run(&global),
-        Command::Errors(command) => command.run(&global),
-        Command::Bus(command) => command.run(&global),
-        Command::Pdo(command) => command.run(&global),
-        Command::Autozero(command) => command.run(&global),
-        Command::Store(command) => command.run(&global),
-        Command::Restore(command) => command.run(&global),
-        Command::Sim(command) => command.run(&global),
-        Command::Completions(command) => command.run(),
-    }
+    cli.command.run(&global)
 }
 
-/// Gives a command its arguments.
-type Augment = fn(clap::Command) -> clap::Command;
-
-/// The commands by name: one is made up without the others.
-const ARGUMENTS: [(&str, Augment); 20] = [
-    ("scan", scan::Scan::augment_args),
-    ("read", read::Read::augment_args),
-    ("nmt", nmt::Nmt::augment_args),
-    ("sdo", sdo::Sdo::augment_args),
-    ("log", log::Log::augment_args),
-    ("check", check::Check::augment_args),
-    ("lss", lss::LssCommand::augment_args),
-    ("info", info::Info::augment_args),
-    ("unit", unit::Unit::augment_args),
-    ("filter", filter::Filter::augment_args),
-    ("limits", limits::Limits::augment_args),
-    ("minmax", minmax::Minmax::augment_args),
-    ("errors", errors::Errors::augment_args),
-    ("bus", bus::BusCommand::augment_args),
-    ("pdo", pdo::Pdo::augment_args),
-    ("autozero", autozero::Autozero::augment_args),
-    ("store", store::Store::augment_args),
-    ("restore", store::Restore::augment_args),
-    ("sim", sim::Sim::augment_args),
-    ("completions", completions::Completions::augment_args),
-];
-
-impl Command {
-    /// What it does not share with another cangauge while it runs.
-    fn claim(&self) -> Claim {
-        match self {
-            Command::Scan(command) => command.claim(),
-            Command::Read(command) => command.claim(),
-            Command::Nmt(command) => command.claim(),
-            Command::Sdo(command) => command.claim(),
-            Command::Log(command) => command.claim(),
-            Command::Check(command) => command.claim(),
-            Command::Lss(_) => Claim::Bus,
-            Command::Info(command) => command.claim(),
-            Command::Unit(command) => command.claim(),
-            Command::Filter(command) => command.claim(),
-            Command::Limits(command) => command.claim(),
-            Command::Minmax(command) => command.claim(),
-            Command::Errors(command) => command.claim(),
-            Command::Pdo(command) => command.claim(),
-            Command::Autozero(command) => command.claim(),
-            Command::Store(command) => command.claim(),
-            Command::Restore(command) => command.claim(),
-            Command::Bus(_) | Command::Sim(_) | Command::Completions(_) => Claim::Nothing,
-        }
+/// The program with its commands. The global options are described only in the help of the program itself; the other
+/// help texts name them in one line.
+pub fn program() -> clap::Command {
+    fn with_hidden_globals(command: clap::Command) -> clap::Command {
+        let globals = Global::augment_args(clap::Command::new("globals"));
+        let hidden = globals.get_arguments().map(|argument| argument.clone().hide(true));
+        let notes = command.get_after_help().map(|notes| format!("{notes}\n\n")).unwrap_or_default();
+        let names: Vec<String> = command.get_subcommands().map(|command| command.get_name().to_owned()).collect();
+        let command = command.args(hidden).after_help(notes + GLOBAL_OPTIONS);
+        names.into_iter().fold(command, |command, name| command.mut_subcommand(name, with_hidden_globals))
     }
+    let program = Cli::command();
+    let names: Vec<String> = program.get_subcommands().map(|command| command.get_name().to_owned()).collect();
+    names.into_iter().fold(program, |program, name| program.mut_subcommand(name, with_hidden_globals))
 }

@@ -3,6 +3,7 @@
 use super::args::BusSpec;
 use super::exit::IntoFailure;
 use super::{Global, open};
+use crate::bus::claim::Claim;
 use crate::bus::memory::Station;
 use crate::sim;
 use crate::tasks::{Failure, Kind};
@@ -21,6 +22,11 @@ pub(crate) struct Sim {
 }
 
 impl Sim {
+    /// Nothing: other cangauges may use every node.
+    pub(super) fn claim(&self) -> Claim {
+        Claim::Nothing
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let bench = open::bench(&self.devices.join(","))?;
         if let Some(BusSpec::Sim(_)) = global.bus {

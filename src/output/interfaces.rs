@@ -1,82 +1,76 @@
-//! CAN interfaces, and what came of looking for a bit rate.
+//! CAN interfaces, and the result of a bit rate detection.
 
+use super::csv;
 use super::json::line;
-use super::table::Align;
-use super::{csv, table};
+use super::report::{Cell, Column, Report};
 use crate::tasks::detect::{By, Detection, How};
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// An interface; what nothing tells is missing.
-#[derive(Clone, Debug, Default, Serialize)]
+/// A CAN interface. What is unknown is `None`.
+#[derive(Clone, Debug, Default)]
 pub struct Interface {
-    /// Its name.
+    /// The name.
     pub interface: String,
-    /// Whether it is switched on.
+    /// Whether it is up.
     pub up: bool,
     /// The driver of its hardware.
     pub driver: Option<String>,
-    /// What it is to the kernel: `can`, `vcan`.
+    /// The kind of link: `can`, `vcan`.
     pub kind: Option<String>,
     /// In bit/s.
     pub bit_rate: Option<u32>,
-    /// Where in a bit it is sampled, 0 to 1.
+    /// Position of the sample point within a bit, 0 to 1.
     pub sample_point: Option<f64>,
     /// The controller's state.
     pub state: Option<&'static str>,
-    /// Whether it only listens.
+    /// Whether it is in listen-only mode.
     pub listen_only: Option<bool>,
-    /// After how many milliseconds it is restarted after bus-off; 0: never.
+    /// Restart delay after bus-off in milliseconds; 0: no restart.
     pub restart_ms: Option<u32>,
-    /// Error counter of sending.
+    /// Transmit error counter.
     pub tx_errors: Option<u16>,
-    /// Error counter of receiving.
+    /// Receive error counter.
     pub rx_errors: Option<u16>,
-    /// The only bit rates that it has, in bit/s.
+    /// The only bit rates that it supports, in bit/s.
     pub bit_rates: Option<Vec<u32>>,
 }
 
-const HEAD: [&str; 8] = ["INTERFACE", "LINK", "BIT_RATE", "STATE", "MODE", "TX_ERRORS", "RX_ERRORS", "DRIVER"];
+impl Report for Interface {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("interface"),
+        Column::new("up").heading("LINK"),
+        Column::new("bit_rate").right(),
+        Column::new("state"),
+        Column::new("listen_only").heading("MODE"),
+        Column::new("tx_errors").right(),
+        Column::new("rx_errors").right(),
+        Column::new("driver"),
+        Column::new("kind").data_only(),
+        Column::new("sample_point").data_only(),
+        Column::new("restart_ms").data_only(),
+        Column::new("bit_rates").data_only(),
+    ];
 
-impl Interface {
-    fn row(&self, missing: &str) -> Vec<String> {
-        let mode = |listens| if listens { "listen-only" } else { "normal" };
-        [
-            Some(self.interface.clone()),
-            Some(if self.up { "up" } else { "down" }.to_owned()),
-            self.bit_rate.map(|rate| rate.to_string()),
-            self.state.map(str::to_owned),
-            self.listen_only.map(|listens| mode(listens).to_owned()),
-            self.tx_errors.map(|count| count.to_string()),
-            self.rx_errors.map(|count| count.to_string()),
-            self.driver.clone().or_else(|| self.kind.clone()),
+    fn cells(&self) -> Vec<Cell> {
+        let mode = |listen_only| if listen_only { "listen-only" } else { "normal" };
+        let driver = Cell::from(self.driver.as_ref());
+        vec![
+            self.interface.as_str().into(),
+            Cell::from(self.up).shown_as(if self.up { "up" } else { "down" }),
+            self.bit_rate.into(),
+            self.state.into(),
+            self.listen_only.map(|listen_only| Cell::from(listen_only).shown_as(mode(listen_only))).into(),
+            self.tx_errors.into(),
+            self.rx_errors.into(),
+            // A virtual interface has no driver.
+            if driver == Cell::Null { driver.shown_as(Cell::from(self.kind.as_ref()).shown()) } else { driver },
+            self.kind.as_ref().into(),
+            self.sample_point.map(|point| Cell::Real(point, 3)).into(),
+            self.restart_ms.into(),
+            self.bit_rates.as_ref().map(|rates| Cell::list(rates.iter().copied())).into(),
         ]
-        .map(|cell| cell.unwrap_or_else(|| missing.to_owned()))
-        .to_vec()
     }
-}
-
-/// Interfaces as JSON Lines.
-pub fn json(out: &mut dyn Write, interfaces: &[Interface]) -> io::Result<()> {
-    interfaces.iter().try_for_each(|interface| line(out, interface))
-}
-
-/// Interfaces as CSV.
-pub fn csv(out: &mut dyn Write, interfaces: &[Interface]) -> io::Result<()> {
-    let head = HEAD.map(str::to_ascii_lowercase);
-    csv::write(out, &head.each_ref().map(String::as_str), interfaces.iter().map(|interface| interface.row("")))
-}
-
-/// Interfaces as a table; nothing where there are none.
-pub fn text(out: &mut dyn Write, interfaces: &[Interface]) -> io::Result<()> {
-    if interfaces.is_empty() {
-        return Ok(());
-    }
-    let mut rows = vec![HEAD.map(str::to_owned).to_vec()];
-    rows.extend(interfaces.iter().map(|interface| interface.row("-")));
-    let mut align = [Align::Left; HEAD.len()];
-    (align[2], align[5], align[6]) = (Align::Right, Align::Right, Align::Right);
-    table::write(out, &align, &rows)
 }
 
 /// What a detection found, as one object.

@@ -1,13 +1,15 @@
-//! The settings of a device as JSON Lines.
+//! The settings of a device.
 
 use super::json::{JsonNumber, line};
+use super::report::{Cell, Column, Report};
+use super::table::{self, Align};
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::Quantity;
 use crate::tasks::settings::errors::{Errors, PastError};
 use crate::tasks::settings::filter::FilterOf;
 use crate::tasks::settings::limits::{Limit, Limits};
-use crate::tasks::settings::minmax::Extremes;
-use crate::tasks::settings::unit::{UnitChange, UnitOf};
+use crate::tasks::settings::minmax::{Extremes, MinMax};
+use crate::tasks::settings::unit::{UnitChange, UnitOf, list};
 use serde::Serialize;
 use std::io::{self, Write};
 
@@ -19,67 +21,97 @@ fn unit_name(quantity: Option<Quantity>) -> Option<String> {
     quantity?.unit.map(|unit| unit.to_string()).filter(|unit| !unit.is_empty())
 }
 
-/// The unit of a signal.
-pub fn unit(out: &mut dyn Write, node: NodeId, unit: &UnitOf) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Unit<'a> {
-        node: u8,
-        signal: &'a str,
-        unit: String,
-        code: String,
-        takes: Vec<String>,
-        fixed: bool,
+impl Report for UnitOf {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("node").right(),
+        Column::new("signal"),
+        Column::new("unit"),
+        Column::new("code").data_only(),
+        Column::new("takes").json_only(),
+        Column::new("fixed").json_only(),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let takes = Cell::list(self.takes.iter().copied());
+        vec![
+            self.node.into(),
+            self.signal.as_str().into(),
+            self.unit.into(),
+            Cell::hex(self.unit.0, 8),
+            takes,
+            self.fixed.into(),
+        ]
     }
-    line(
-        out,
-        &Unit {
-            node: node.get(),
-            signal: &unit.signal,
-            unit: unit.unit.to_string(),
-            code: format!("0x{:08X}", unit.unit.0),
-            takes: unit.takes.iter().map(ToString::to_string).collect(),
-            fixed: unit.fixed,
-        },
-    )
+
+    /// The unit of a single signal is printed alone.
+    fn text(units: &[UnitOf], out: &mut dyn Write) -> io::Result<()> {
+        if let [only] = units {
+            return writeln!(out, "{}", only.unit);
+        }
+        let choice = |unit: &UnitOf| match (unit.fixed, unit.takes.as_slice()) {
+            (true, _) => "(fixed)".to_owned(),
+            (false, []) => String::new(),
+            (false, takes) => format!("(takes {})", list(takes)),
+        };
+        let row = |unit: &UnitOf| vec![unit.signal.clone(), unit.unit.to_string(), choice(unit)];
+        table::write(out, &[Align::Left; 3], &units.iter().map(row).collect::<Vec<_>>())
+    }
 }
 
-/// A unit that was set, with what it rescaled.
-pub fn unit_change(out: &mut dyn Write, node: NodeId, change: &UnitChange) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Rescaled<'a> {
-        object: String,
-        name: &'a str,
-        before: JsonNumber,
-        after: JsonNumber,
-        stale: bool,
+impl Report for UnitChange {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("node"),
+        Column::new("signal"),
+        Column::new("before").json_only(),
+        Column::new("after").json_only(),
+        Column::new("unit_before").csv_only(),
+        Column::new("unit_after").csv_only(),
+        Column::new("code").json_only(),
+        Column::nested(
+            "rescaled",
+            &[
+                Column::new("object"),
+                Column::new("name"),
+                Column::new("before"),
+                Column::new("after"),
+                Column::new("stale"),
+            ],
+        ),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let rescaled = self.rescaled.iter().map(|item| {
+            let [before, after] = [item.before, item.after].map(|quantity| quantity.map(|quantity| quantity.number));
+            vec![item.object.into(), item.name.as_str().into(), before.into(), after.into(), item.stale.into()]
+        });
+        let (before, after) = (Cell::from(self.before), Cell::from(self.now.unit));
+        vec![
+            self.now.node.into(),
+            self.now.signal.as_str().into(),
+            before.clone(),
+            after.clone(),
+            before,
+            after,
+            Cell::hex(self.now.unit.0, 8),
+            Cell::Rows(rescaled.collect()),
+        ]
     }
-    #[derive(Serialize)]
-    struct Change<'a> {
-        node: u8,
-        signal: &'a str,
-        before: String,
-        unit: String,
-        code: String,
-        rescaled: Vec<Rescaled<'a>>,
+
+    /// `pressure  psi -> bar`, and each rescaled value below it.
+    fn text(changes: &[UnitChange], out: &mut dyn Write) -> io::Result<()> {
+        let row = |name: &str, before: String, after: String| vec![name.to_owned(), before, "->".to_owned(), after];
+        let mut rows = Vec::new();
+        for change in changes {
+            rows.push(row(&change.now.signal, change.before.to_string(), change.now.unit.to_string()));
+            rows.extend(change.rescaled.iter().map(|item| row(&item.name, shown(item.before), shown(item.after))));
+        }
+        table::write(out, &[Align::Left; 4], &rows)
     }
-    let rescaled = change.rescaled.iter().map(|item| Rescaled {
-        object: item.object.to_string(),
-        name: &item.name,
-        before: number(item.before),
-        after: number(item.after),
-        stale: item.stale,
-    });
-    line(
-        out,
-        &Change {
-            node: node.get(),
-            signal: &change.now.signal,
-            before: change.before.to_string(),
-            unit: change.now.unit.to_string(),
-            code: format!("0x{:08X}", change.now.unit.0),
-            rescaled: rescaled.collect(),
-        },
-    )
+}
+
+/// A quantity with its unit; `-` if it is unknown.
+fn shown(quantity: Option<Quantity>) -> String {
+    quantity.map_or_else(|| "-".to_owned(), |quantity| quantity.to_string())
 }
 
 /// The filter of a signal; after a change with whether the damping showed.
@@ -129,26 +161,39 @@ pub fn limits(out: &mut dyn Write, node: NodeId, limits: &Limits) -> io::Result<
     )
 }
 
-/// The lowest and highest value of a signal; after a reset with those before.
-pub fn extremes(out: &mut dyn Write, node: NodeId, now: &Extremes, before: Option<&Extremes>) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Json<'a> {
-        node: u8,
-        signal: &'a str,
-        min: JsonNumber,
-        max: JsonNumber,
-        unit: Option<String>,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        before: Option<Before>,
+impl Report for MinMax {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("node"),
+        Column::new("signal"),
+        Column::new("min"),
+        Column::new("max"),
+        Column::new("unit"),
+        Column::new("before").json_only(),
+        Column::new("before_min").csv_only(),
+        Column::new("before_max").csv_only(),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let number = |quantity: Option<Quantity>| Cell::from(quantity.map(|quantity| quantity.number));
+        let ends = |extremes: &Extremes| [number(extremes.lowest), number(extremes.highest)];
+        let [min, max] = ends(&self.now);
+        let before = self.before.as_ref().map(ends);
+        let object = before.clone().map_or(Cell::Null, |[min, max]| Cell::Object(vec![("min", min), ("max", max)]));
+        let [before_min, before_max] = before.unwrap_or([Cell::Null, Cell::Null]);
+        let unit = self.now.lowest.and_then(|quantity| quantity.unit);
+        let signal = self.now.signal.as_str().into();
+        vec![self.now.node.into(), signal, min, max, unit.into(), object, before_min, before_max]
     }
-    #[derive(Serialize)]
-    struct Before {
-        min: JsonNumber,
-        max: JsonNumber,
+
+    /// After a reset the previous values: they are worth more than the new ones.
+    fn text(all: &[MinMax], out: &mut dyn Write) -> io::Result<()> {
+        let row = |report: &MinMax| {
+            let extremes = report.before.as_ref().unwrap_or(&report.now);
+            let [lowest, highest] = [extremes.lowest, extremes.highest].map(shown);
+            vec![extremes.signal.clone(), format!("min {lowest}"), format!("max {highest}")]
+        };
+        table::write(out, &[Align::Left; 3], &all.iter().map(row).collect::<Vec<_>>())
     }
-    let before = before.map(|before| Before { min: number(before.lowest), max: number(before.highest) });
-    let (min, max) = (number(now.lowest), number(now.highest));
-    line(out, &Json { node: node.get(), signal: &now.signal, min, max, unit: unit_name(now.lowest), before })
 }
 
 /// An entry of the error history.

@@ -21,7 +21,7 @@ fn channel(number: u8, base: f64) -> String {
     format!("[[device.channel]]\nchannel = {number}\nbase = {base:?}\namplitude = 0.0\nnoise = 0.0\n")
 }
 
-const STORE: &str = "kept after power off only when it is stored: cangauge store";
+const STORE: &str = "lost at power-off unless stored: cangauge store";
 
 #[test]
 fn the_unit_of_one_signal_is_bare() {
@@ -91,7 +91,7 @@ fn table_19_with_its_60h() {
     fs::write(bench.path("dps60.toml"), text).expect("written");
     let done = bench.run("unit 127 bar --device dps60.toml -f json").exit(0);
     let change = &done.json()[0];
-    assert_eq!((&change["before"], &change["unit"]), (&json!("psi"), &json!("bar")));
+    assert_eq!((&change["before"], &change["after"]), (&json!("psi"), &json!("bar")));
     let pressure = change["rescaled"].as_array().expect("a list").iter().find(|item| item["object"] == "0x6130:1");
     let pressure = pressure.expect("the process value");
     assert_eq!((&pressure["before"], &pressure["after"]), (&json!(50.0), &json!(3.447)));
@@ -123,7 +123,7 @@ fn units_that_a_device_does_not_take_are_refused_with_those_that_it_takes() {
     bench.run("unit 5 pressure furlong").exit(2);
     bench.run("unit 5 pressure bar psi").exit(2);
     let done = bench.run("unit 127 psi").exit(0);
-    assert_eq!(done.stderr, "node 127: pressure was in psi already\n");
+    assert_eq!(done.stderr, "node 127: pressure is already in psi\n");
     assert!(!written(&done, "67F"));
     // By its raw code, and by an EDS that knows no choice: the device decides.
     bench.run("unit 5 pressure 0x00AB0000").exit(0);

@@ -2,15 +2,27 @@
 //! 2020h and 2021h), by the names that descriptions give them.
 
 use super::{Device, Quantity};
+use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::master::Master;
 use crate::measure::layout::Signal;
 use crate::tasks::{Failure, Kind};
 
+/// The lowest and highest value of a signal, and those before a reset.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MinMax {
+    /// The values now.
+    pub now: Extremes,
+    /// The values before the reset; `None` if nothing was reset.
+    pub before: Option<Extremes>,
+}
+
 /// The lowest and highest value of a signal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extremes {
+    /// The node.
+    pub node: NodeId,
     /// `pressure`, `temperature` …
     pub signal: String,
     /// The lowest value since power on or the last reset.
@@ -23,7 +35,12 @@ pub struct Extremes {
 ///
 /// # Errors
 /// Devices that keep none as far as is known, silence.
-pub fn show(master: &mut Master<'_>, device: &Device) -> Result<Vec<Extremes>, Failure> {
+pub fn show(master: &mut Master<'_>, device: &Device) -> Result<Vec<MinMax>, Failure> {
+    let all = present(master, device)?;
+    Ok(all.into_iter().map(|now| MinMax { now, before: None }).collect())
+}
+
+fn present(master: &mut Master<'_>, device: &Device) -> Result<Vec<Extremes>, Failure> {
     let mut all = Vec::new();
     for signal in &device.instrument.signals {
         let objects = ["minimum-pv", "maximum-pv"].map(|name| device.of_signal(signal, name));
@@ -45,7 +62,8 @@ fn extremes(
 ) -> Result<Extremes, Failure> {
     let values = device.read_each(master, &objects)?;
     let quantity = |value: Option<&Option<Value>>| device.quantity(signal, value?.as_ref()?);
-    Ok(Extremes { signal: signal.name.clone(), lowest: quantity(values.first()), highest: quantity(values.get(1)) })
+    let (lowest, highest) = (quantity(values.first()), quantity(values.get(1)));
+    Ok(Extremes { node: device.node(), signal: signal.name.clone(), lowest, highest })
 }
 
 /// Resets minimum and maximum of every signal that has them; the values before and after. The signature is
@@ -53,8 +71,8 @@ fn extremes(
 ///
 /// # Errors
 /// Devices of which no object is known that does it, refusals, silence, values that stay.
-pub fn reset(master: &mut Master<'_>, device: &Device) -> Result<Vec<(Extremes, Extremes)>, Failure> {
-    let before = show(master, device)?;
+pub fn reset(master: &mut Master<'_>, device: &Device) -> Result<Vec<MinMax>, Failure> {
+    let before = present(master, device)?;
     let mut all = Vec::new();
     for old in before {
         let signal = device.signal(Some(&old.signal))?;
@@ -80,7 +98,7 @@ pub fn reset(master: &mut Master<'_>, device: &Device) -> Result<Vec<(Extremes, 
                 return Err(Failure { object: Some(object), ..failure });
             }
         }
-        all.push((old, now));
+        all.push(MinMax { now, before: Some(old) });
     }
     Ok(all)
 }
@@ -107,6 +125,7 @@ mod tests {
     #[test]
     fn a_reset_shows_in_a_range_that_became_narrower_at_one_end() {
         let range = |lowest, highest| Extremes {
+            node: NodeId::MIN,
             signal: "pressure".to_owned(),
             lowest: Some(Quantity { number: Number::Real64(lowest), unit: None }),
             highest: Some(Quantity { number: Number::Real64(highest), unit: None }),

@@ -1,6 +1,7 @@
 //! The physical unit of a signal (6131h), and what a new one rescales.
 
 use super::{Device, Quantity};
+use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::device::unit::Unit;
@@ -12,6 +13,8 @@ use crate::tasks::{Failure, Kind};
 /// The unit of a signal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnitOf {
+    /// The node.
+    pub node: NodeId,
     /// `pressure`, `ch1` …
     pub signal: String,
     /// As the device tells it.
@@ -93,6 +96,7 @@ fn unit_of(device: &Device, signal: &Signal) -> Option<UnitOf> {
     let object = ObjectId::new(0x6131, signal.channel);
     let allowed = device.described(object).map_or(&[][..], |entry| &entry.allow);
     Some(UnitOf {
+        node: device.node(),
         signal: signal.name.clone(),
         unit: signal.unit?,
         takes: allowed.iter().map(|code| Unit(code.low)).collect(),
