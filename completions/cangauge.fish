@@ -49,7 +49,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "read" -d 'Read me
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "nmt" -d 'Send NMT commands and tell states'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sdo" -d 'Read and write objects of the object dictionary'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
-complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "check" -d 'Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "lss" -d 'Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device\'s own)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "info" -d 'Tell everything about one device on one page'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "status" -d 'Tell everything about one device on one page'
@@ -448,10 +448,10 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s q -l quiet -d 
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l for -d 'Judge all samples that come in this time' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l for -d 'Check all samples of this time' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sync -d 'Send SYNC at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l poll -d 'Read by SDO at this interval' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l junit -d 'Write the verdicts as JUnit XML, for CI servers: one test case per expression' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l junit -d 'Write the verdicts as JUnit XML for CI servers, one test case per expression and node' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l retries -d 'How often a request that got no answer is repeated [default: 1]' -r
@@ -467,7 +467,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l color -d 'Colour on stderr; auto: on a terminal, and without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l force -d 'Overwrite a file that exists'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l force -d 'Overwrite an existing file'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s q -l quiet -d 'Say less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s v -l verbose -d 'Say more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s h -l help -d 'Print help (see more with \'--help\')'
@@ -1165,7 +1165,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "nmt" -d 'Send NMT commands and tell states'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "check" -d 'Check measurements against limits: exit code 0 if all hold, 1 if not, 3 without data'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "lss" -d 'Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device\'s own)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "info" -d 'Tell everything about one device on one page'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "unit" -d 'Show or set the physical unit of a signal (6131h)'
