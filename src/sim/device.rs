@@ -476,14 +476,18 @@ impl Station for Device {
             Phase::Unconfigured => self.thinking.front().map(|(due, _)| *due),
             Phase::Retiming { switch, until, .. } => Some(switch.unwrap_or(until)),
             Phase::Running(_) => {
-                let own = [
-                    self.heartbeat,
-                    self.sdo.deadline(),
-                    self.overload_look,
-                    self.memory.emergencies.next_wake(),
-                    self.thinking.front().map(|(due, _)| *due),
-                ];
-                own.into_iter().flatten().chain(self.tpdos.iter().filter_map(Tpdo::next_wake)).min()
+                let mut next = self.heartbeat;
+                let mut add = |moment: Option<Mono>| {
+                    if let Some(moment) = moment {
+                        next = Some(next.map_or(moment, |next| next.min(moment)));
+                    }
+                };
+                add(self.sdo.deadline());
+                add(self.overload_look);
+                add(self.memory.emergencies.next_wake());
+                add(self.thinking.front().map(|(due, _)| *due));
+                self.tpdos.iter().for_each(|tpdo| add(tpdo.next_wake()));
+                next
             }
         }
     }

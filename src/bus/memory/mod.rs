@@ -65,6 +65,19 @@ struct Place {
     station: Box<dyn Station>,
     out: Outbox,
     controller: Controller,
+    /// The result of [`Station::next_wake`], or an earlier moment. It is updated after each call of the station:
+    /// to ask 127 stations at every step would take most of the time.
+    next_wake: Option<Mono>,
+}
+
+impl Place {
+    fn update(&mut self) {
+        self.next_wake = self.station.next_wake();
+    }
+
+    fn is_due(&self, moment: Mono) -> bool {
+        self.next_wake.is_some_and(|due| due <= moment)
+    }
 }
 
 impl MemoryBus {
@@ -118,9 +131,11 @@ impl MemoryBus {
 
     /// Connects a station and switches its power on.
     pub fn attach(&mut self, station: impl Station) {
-        let mut place = Place { station: Box::new(station), out: Outbox::default(), controller: Controller::default() };
+        let (out, controller) = (Outbox::default(), Controller::default());
+        let mut place = Place { station: Box::new(station), out, controller, next_wake: None };
         place.station.told_bit_rate(self.bit_rate);
         place.station.power_on(self.now, &mut place.out);
+        place.update();
         self.places.push(place);
     }
 
@@ -130,6 +145,7 @@ impl MemoryBus {
             place.out.clear();
             place.controller = Controller::default();
             place.station.power_on(self.now, &mut place.out);
+            place.update();
         }
     }
 
@@ -144,6 +160,8 @@ impl MemoryBus {
     /// The stations of one kind, to be changed.
     pub fn stations_mut<S: Station>(&mut self) -> impl Iterator<Item = &mut S> {
         self.places.iter_mut().filter_map(|place| {
+            // The caller may change when the station wants to be woken.
+            place.next_wake = Some(Mono::START);
             let station: &mut dyn Any = &mut *place.station;
             station.downcast_mut()
         })
@@ -160,9 +178,13 @@ impl MemoryBus {
             Wire::Busy(transmission) => Some(transmission.complete),
             Wire::Free(from) => self.contenders().map(|(ready, ..)| ready.max(*from)).min(),
         };
-        let wakes = self.places.iter().filter_map(|place| place.station.next_wake());
-        let interrupt = self.interrupts.first().copied();
-        wakes.chain(wire).chain(interrupt).min().map(|moment| moment.max(self.now))
+        let mut next = wire.into_iter().chain(self.interrupts.first().copied()).min();
+        for place in &self.places {
+            if let Some(due) = place.next_wake {
+                next = Some(next.map_or(due, |next| next.min(due)));
+            }
+        }
+        next.map(|moment| moment.max(self.now))
     }
 
     /// Plays everything that happens up to and including `limit`, at most until the program has something
@@ -186,14 +208,16 @@ impl MemoryBus {
             }
             return true;
         }
-        let mut woken = false;
-        for place in &mut self.places {
-            if place.station.next_wake().is_some_and(|due| due <= moment) {
+        let mut any_due = false;
+        for place in self.places.iter_mut().filter(|place| place.is_due(moment)) {
+            any_due = true;
+            place.update();
+            if place.is_due(moment) {
                 place.station.wake(moment, &mut place.out);
-                woken = true;
+                place.update();
             }
         }
-        if !woken {
+        if !any_due {
             self.begin();
         }
         true
@@ -237,7 +261,10 @@ impl BitRateControl for MemoryBus {
         self.controller = Controller::default();
         self.bit_rate = bit_rate.max(1);
         self.mode = mode;
-        self.places.iter_mut().for_each(|place| place.station.told_bit_rate(bit_rate));
+        for place in &mut self.places {
+            place.station.told_bit_rate(bit_rate);
+            place.update();
+        }
         Ok(())
     }
 

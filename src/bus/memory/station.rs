@@ -20,7 +20,8 @@ pub trait Station: Any + Send {
     fn wake(&mut self, now: Mono, out: &mut Outbox);
 
     /// When the station wants to be woken next, if nothing else happens before. After [`Station::wake`] at
-    /// `now` this must be later than `now`, or time would stand still.
+    /// `now` this must be later than `now`, or time would stand still. It changes only in the other functions of
+    /// this trait, and while the station is lent by [`super::MemoryBus::stations_mut`].
     fn next_wake(&self) -> Option<Mono>;
 
     /// A frame from this station's outbox has left it and is complete on the wire.

@@ -48,9 +48,10 @@ impl MemoryBus {
         let is_out = self.mode == Mode::ListenOnly || self.controller.level() == Level::Off;
         let program = self.queue.front().filter(|_| !is_out);
         let program = program.map(|frame| (ready(&self.controller), Sender::Program, *frame));
-        let stations = self.places.iter().enumerate().filter(|(_, place)| place.station.tuning() != Tuning::Off);
-        let stations = stations.filter_map(move |(index, place)| {
-            Some((ready(&place.controller), Sender::Station(index), *place.out.front()?))
+        let stations = self.places.iter().enumerate().filter_map(move |(index, place)| {
+            let frame = *place.out.front()?;
+            let is_on = place.station.tuning() != Tuning::Off;
+            is_on.then(|| (ready(&place.controller), Sender::Station(index), frame))
         });
         program.into_iter().chain(stations)
     }
@@ -170,8 +171,10 @@ impl MemoryBus {
             if transmission.has(Sender::Station(index)) {
                 place.controller.transmitted(Outcome::Delivered);
                 place.station.sent(self.now, frame);
+                place.update();
             } else if *hears == Some(true) {
                 place.station.receive(self.now, frame, &mut place.out);
+                place.update();
             }
         }
     }
