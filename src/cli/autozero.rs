@@ -88,7 +88,7 @@ impl Autozero {
             zeroed.notes.iter().for_each(|note| global.console().note(&format!("node {node}: {note}")));
         }
         if self.nodes == Nodes::All {
-            each.excuse(global, |failure| failure.kind == Kind::Usage);
+            each.excuse(global, |failure| failure.kind() == Kind::Usage);
         }
         each.end()
     }

@@ -81,7 +81,7 @@ impl Check {
         let report = match self.measure(global) {
             // A CI server needs the report if nothing was measured, too.
             Err(error) if file.is_some() => {
-                let failure = error.downcast_ref::<Failure>().filter(|failure| failure.kind != Kind::Usage);
+                let failure = error.downcast_ref::<Failure>().filter(|failure| failure.kind() != Kind::Usage);
                 if let (Some(failure), Some(mut file)) = (failure, file) {
                     let report = CheckReport::not_measured(&self.expressions, failure.clone());
                     file.write(junit::document(&report).as_bytes())?;
@@ -138,7 +138,7 @@ impl Check {
             let claims = self.poll.is_none().then(|| std::mem::take(claims));
             let mut view = View { progress, console, started: None, claims };
             let report = check(master, &options, &mut view);
-            let interrupted = report.as_ref().is_err_and(|failure| failure.kind == Kind::Interrupted);
+            let interrupted = report.as_ref().is_err_and(|failure| failure.kind() == Kind::Interrupted);
             view.progress.finish(interrupted);
             Ok(report?)
         })

@@ -1,23 +1,24 @@
-//! Commands that change one node after the other.
+//! Commands that work on one node after the other.
 
 use super::Global;
 use super::args::Nodes;
-use super::exit::Several;
+use super::exit::several;
 use super::open;
 use crate::canopen::id::NodeId;
 use crate::master::Master;
 use crate::node::Overrides;
-use crate::tasks::failure::together;
+use crate::output::failure::ErrorMessage;
 use crate::tasks::{Failure, Kind};
 
-/// What became of every node that was reached.
+/// The results of all nodes.
 pub(super) struct Each<T> {
     asked: usize,
+    /// The nodes that succeeded, in the order in which they were named.
     pub(super) done: Vec<(NodeId, T)>,
     failures: Vec<Failure>,
 }
 
-/// Does `work` with every node, one after the other. A bus that fails and the wish to stop end it.
+/// Runs `work` on every node, one after the other. A bus failure or Ctrl-C ends it.
 pub(super) fn each<T>(
     global: &Global,
     nodes: &Nodes,
@@ -32,7 +33,7 @@ pub(super) fn each<T>(
             match result {
                 Ok(done) => each.done.push((node, done)),
                 Err(failure) => {
-                    let ends = matches!(failure.kind, Kind::Interrupted | Kind::Bus);
+                    let ends = matches!(failure.kind(), Kind::Interrupted | Kind::Bus);
                     each.failures.push(failure);
                     if ends {
                         break;
@@ -45,25 +46,23 @@ pub(super) fn each<T>(
 }
 
 impl<T> Each<T> {
-    /// Takes the failures out that a request for everybody excuses: who cannot do it was not meant, unless nobody
-    /// can.
+    /// Turns failures that `all` tolerates into notes, if at least one node succeeded: `all` does not mean the
+    /// nodes that lack the feature.
     pub(super) fn excuse(&mut self, global: &Global, excused: impl Fn(&Failure) -> bool) {
         if self.done.is_empty() {
             return;
         }
         let (without, failed): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.failures).into_iter().partition(|failure| excused(failure));
-        without.iter().for_each(|failure| global.console().note(&failure.message));
+        without.iter().for_each(|failure| global.console().note(&ErrorMessage::from(failure).message));
         self.failures = failed;
     }
 
-    /// What all of it comes to. Where it was ended, that is what it comes to.
+    /// The result of the command.
+    ///
+    /// # Errors
+    /// The failures, with the exit code for several nodes.
     pub(super) fn end(self) -> anyhow::Result<()> {
-        let ended = self.failures.last().filter(|failure| matches!(failure.kind, Kind::Interrupted | Kind::Bus));
-        if let Some(kind) = ended.map(|failure| failure.kind) {
-            let failures = self.failures.into_iter().map(|failure| Failure { kind, ..failure }).collect();
-            return Err(Several(failures).into());
-        }
-        together(self.asked, self.failures).map_err(|failures| Several(failures).into())
+        Ok(several(self.asked, self.failures)?)
     }
 }

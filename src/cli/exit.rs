@@ -1,10 +1,11 @@
-//! From errors to words and exit codes. The one place where that happens.
+//! Exit codes. This is the only place that turns errors into an exit code.
 
 use super::Cli;
 use crate::bus::BusError;
 use crate::master::{Error, SdoError};
 use crate::measure::expression::ExpressionError;
 use crate::output::console::Console;
+use crate::output::failure::ErrorMessage;
 use crate::tasks::{Failure, Kind};
 use anstream::ColorChoice;
 use clap::CommandFactory;
@@ -12,25 +13,60 @@ use clap::error::{ContextKind, ErrorKind};
 use std::ffi::OsString;
 use std::io;
 
-/// Several nodes that failed; the first one's kind is that of all.
+/// Several failures, each with its own kind, and the kind that decides the exit code of the process.
 #[derive(Debug, thiserror::Error)]
-#[error("{} nodes failed", .0.len())]
-pub(super) struct Several(pub(super) Vec<Failure>);
+#[error("{} failures", .failures.len())]
+pub(super) struct Several {
+    /// Decides the exit code.
+    pub(super) kind: Kind,
+    /// In the order in which they are printed.
+    pub(super) failures: Vec<Failure>,
+}
 
-/// A local file that fails.
+/// The result of a command for several nodes: success if no node failed.
+///
+/// # Errors
+/// The failures, with the kind of [`combined`].
+pub(super) fn several(asked: usize, failures: Vec<Failure>) -> Result<(), Several> {
+    let kinds: Vec<Kind> = failures.iter().map(Failure::kind).collect();
+    match combined(asked, &kinds) {
+        None => Ok(()),
+        Some(kind) => Err(Several { kind, failures }),
+    }
+}
+
+/// The kind that decides the exit code if `kinds` are the failures of `asked` nodes. `None` without a failure.
+///
+/// A bus failure and Ctrl-C end the command at once, so they decide alone. Otherwise: `partial` if some nodes
+/// succeeded, the common kind if all failed alike, else `unexpected`.
+fn combined(asked: usize, kinds: &[Kind]) -> Option<Kind> {
+    let first = *kinds.first()?;
+    if let Some(&end) = kinds.iter().find(|kind| matches!(kind, Kind::Interrupted | Kind::Bus)) {
+        return Some(end);
+    }
+    Some(if kinds.len() < asked {
+        Kind::Partial
+    } else if kinds.iter().all(|&kind| kind == first) {
+        first
+    } else {
+        Kind::Unexpected
+    })
+}
+
+/// A local file that could not be opened, read or written.
 #[derive(Debug, thiserror::Error)]
 #[error("{what}: {source}")]
 pub(super) struct FileError {
-    /// What was being done.
+    /// What was to be done: `open run.csv`.
     pub(super) what: String,
-    /// What the operating system says.
+    /// The error of the operating system.
     pub(super) source: io::Error,
 }
 
-/// Ends without a word and with success: whoever read our output has had enough.
+/// The output pipe was closed. The command ends without a message and with success.
 #[derive(Debug, thiserror::Error)]
-#[error("the reader has gone")]
-struct ReaderGone;
+#[error("the output pipe was closed")]
+struct ClosedPipe;
 
 /// The exit code of a kind. These numbers never change.
 fn code(kind: Kind) -> u8 {
@@ -47,11 +83,11 @@ fn code(kind: Kind) -> u8 {
     }
 }
 
-/// What the parser says, in the contract's form: help and version as they are, and an error on one line
-/// with a hint. `words` are those of the command line. Returns the exit code.
+/// Prints what the argument parser returned and returns the exit code: help and version unchanged, an error on one
+/// line with a hint. `words` are the words of the command line.
 pub fn usage(error: &clap::Error, words: impl Iterator<Item = OsString>) -> u8 {
     if !error.use_stderr() || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        // A reader of the help that has gone has seen enough.
+        // If the pipe is closed, the reader has seen enough of the help.
         let _ = error.print();
         return if error.use_stderr() { code(Kind::Usage) } else { 0 };
     }
@@ -67,9 +103,9 @@ pub fn usage(error: &clap::Error, words: impl Iterator<Item = OsString>) -> u8 {
         (None, None) => help_for(&words),
     };
     let message = wrong_value(error).unwrap_or_else(|| one_line(first));
-    let mut failure = Failure::new(Kind::Usage, message);
+    let mut failure = ErrorMessage::usage(message);
     if let Some(error) = std::error::Error::source(error).and_then(|error| error.downcast_ref::<ExpressionError>()) {
-        failure = error.clone().into();
+        failure = (&Failure::from(error.clone())).into();
     }
     failure.hint.get_or_insert(hint);
     let console =
@@ -82,7 +118,7 @@ fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// What a value is wrong for says its own parser best; a parser that does not name the value is helped out.
+/// The message of the value's own parser, with the value if the parser does not name it.
 fn wrong_value(error: &clap::Error) -> Option<String> {
     let inner = std::error::Error::source(error)?.to_string();
     let (argument, value) = (error.get(ContextKind::InvalidArg)?, error.get(ContextKind::InvalidValue)?);
@@ -90,13 +126,13 @@ fn wrong_value(error: &clap::Error) -> Option<String> {
     Some(if named { inner } else { format!("\"{value}\" for {argument}: {inner}") })
 }
 
-/// Parsing has failed, so the option has to be looked for by hand.
+/// Whether the errors are to be JSON. Parsing has failed, so this function searches the words for the option.
 fn wants_json(words: &[String]) -> bool {
     let apart = words.windows(2).any(|pair| matches!(pair[0].as_str(), "-f" | "--format") && pair[1] == "json");
     apart || words.iter().any(|word| word == "-fjson" || word == "--format=json")
 }
 
-/// The command line that shows the help of the command that was begun.
+/// The command line that shows the help of the command in `words`.
 fn help_for(words: &[String]) -> String {
     let mut root = Cli::command();
     root.build();
@@ -121,48 +157,52 @@ fn help_for(words: &[String]) -> String {
     line + " --help"
 }
 
-/// Says what went wrong and returns the exit code.
+/// Prints an error and returns the exit code of the process.
 pub fn report(cli: &Cli, error: &anyhow::Error) -> u8 {
-    let failures = failures(error);
     let console = cli.global.console();
-    let exit = failures.first().map_or(0, |failure| code(failure.kind));
-    for failure in failures {
-        console.fail(&failure, exit);
+    let messages = messages(error);
+    for message in &messages {
+        console.fail(message, code(message.kind));
     }
-    exit
+    let decides = error.downcast_ref::<Several>().map(|several| several.kind);
+    decides.or(messages.first().map(|message| message.kind)).map_or(0, code)
 }
 
-/// What failed: nothing when only the reader of stdout has gone.
-fn failures(error: &anyhow::Error) -> Vec<Failure> {
-    if error.is::<ReaderGone>() {
+/// What there is to print: nothing if only the output pipe was closed.
+fn messages(error: &anyhow::Error) -> Vec<ErrorMessage> {
+    if error.is::<ClosedPipe>() {
         return Vec::new();
     }
-    if let Some(Several(failures)) = error.downcast_ref::<Several>() {
-        return failures.clone();
+    if let Some(several) = error.downcast_ref::<Several>() {
+        return several.failures.iter().map(ErrorMessage::from).collect();
     }
-    if let Some(failure) = error.downcast_ref::<Failure>() {
-        return vec![failure.clone()];
-    }
-    let failure = if let Some(error) = error.downcast_ref::<FileError>() {
-        Failure::new(Kind::Io, error.to_string())
-    } else if let Some(error) = error.downcast_ref::<io::Error>() {
-        Failure::new(Kind::Io, error.to_string())
-    } else {
-        Failure::new(Kind::Unexpected, format!("{error:#}"))
-    };
-    vec![failure]
+    vec![message(error)]
 }
 
-/// An error of writing to stdout: a closed pipe is a quiet success.
+fn message(error: &anyhow::Error) -> ErrorMessage {
+    if let Some(failure) = error.downcast_ref::<Failure>() {
+        failure.into()
+    } else if let Some(message) = error.downcast_ref::<ErrorMessage>() {
+        message.clone()
+    } else if let Some(error) = error.downcast_ref::<FileError>() {
+        ErrorMessage::new(Kind::Io, error.to_string())
+    } else if let Some(error) = error.downcast_ref::<io::Error>() {
+        ErrorMessage::new(Kind::Io, error.to_string())
+    } else {
+        ErrorMessage::new(Kind::Unexpected, format!("{error:#}"))
+    }
+}
+
+/// An error of writing to stdout. A closed pipe ends the command with success.
 pub(super) fn stdout(error: io::Error) -> anyhow::Error {
     if error.kind() == io::ErrorKind::BrokenPipe {
-        ReaderGone.into()
+        ClosedPipe.into()
     } else {
         FileError { what: "write to stdout".to_owned(), source: error }.into()
     }
 }
 
-/// Errors of the layers below, as the contract's kinds.
+/// Turns errors of the layers below into a [`Failure`].
 pub(super) trait IntoFailure<T> {
     /// The same result with its error as a [`Failure`].
     fn or_fail(self) -> Result<T, Failure>;
@@ -183,5 +223,20 @@ impl<T> IntoFailure<T> for Result<T, SdoError> {
 impl<T> IntoFailure<T> for Result<T, BusError> {
     fn or_fail(self) -> Result<T, Failure> {
         self.map_err(Failure::from)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exit_code_of_several_nodes() {
+        assert_eq!(combined(2, &[]), None);
+        assert_eq!(combined(2, &[Kind::NoAnswer]), Some(Kind::Partial));
+        assert_eq!(combined(2, &[Kind::NoAnswer, Kind::NoAnswer]), Some(Kind::NoAnswer));
+        assert_eq!(combined(2, &[Kind::NoAnswer, Kind::Refused]), Some(Kind::Unexpected));
+        assert_eq!(combined(1, &[Kind::Refused]), Some(Kind::Refused));
+        assert_eq!(combined(3, &[Kind::Refused, Kind::Bus]), Some(Kind::Bus));
     }
 }

@@ -155,7 +155,7 @@ impl Log {
             };
             let interrupted = match &outcome {
                 Ok(outcome) => outcome.interrupted,
-                Err(failure) => failure.kind == Kind::Interrupted,
+                Err(failure) => failure.kind() == Kind::Interrupted,
             };
             screen.progress.finish(interrupted);
             Ok((outcome, verdicts, screen))
@@ -204,11 +204,14 @@ impl Log {
         let late = (written.lost > 0).then(|| too_slow(rows(written.lost), &opened.rows));
         let late = late.or((written.events_lost > 0).then(|| too_slow("events".to_owned(), &opened.events)));
         let failures = match unmet {
-            Some(unmet) if unmet.kind == Kind::CheckFailed => [Some(unmet), late, lost],
+            Some(unmet) if unmet.kind() == Kind::CheckFailed => [Some(unmet), late, lost],
             unmet => [late, lost, unmet],
         };
         let failures: Vec<Failure> = failures.into_iter().flatten().collect();
-        if failures.is_empty() { Ok(()) } else { Err(Several(failures).into()) }
+        match failures.first().map(Failure::kind) {
+            None => Ok(()),
+            Some(kind) => Err(Several { kind, failures }.into()),
+        }
     }
 
     fn lost(&self, outcome: &RecordingReport) -> Option<Failure> {

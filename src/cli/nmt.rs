@@ -1,14 +1,14 @@
 //! `cangauge nmt`.
 
 use super::args::{Duration, Nodes};
-use super::exit::{IntoFailure, Several, stdout};
+use super::exit::{IntoFailure, several, stdout};
 use super::{Format, Global, open};
 use crate::bus::claim::Claim;
 use crate::bus::time::spoken;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtCommand;
+use crate::output::failure::ErrorMessage;
 use crate::output::{csv, json, table};
-use crate::tasks::failure::together;
 use crate::tasks::nmt::{Change, Proof, Seen, Starts, StateReport, command, probe, startup, states, watch};
 use crate::tasks::{Failure, Kind};
 use clap::{Args, Subcommand, ValueEnum};
@@ -137,7 +137,7 @@ impl Nmt {
                 // The broadcast goes out whoever is there; who is there decides what can be confirmed.
                 Nodes::All => match open::nodes(master, global, &Nodes::All) {
                     Err(error)
-                        if error.downcast_ref::<Failure>().is_some_and(|failure| failure.kind == Kind::NoAnswer) =>
+                        if error.downcast_ref::<Failure>().is_some_and(|failure| failure.kind() == Kind::NoAnswer) =>
                     {
                         Vec::new()
                     }
@@ -148,7 +148,7 @@ impl Nmt {
         })?;
         print(&reports, global.format).map_err(stdout)?;
         let failures = reports.iter().filter_map(|report| targets.judge(kind, report, global)).collect();
-        together(reports.len(), failures).map_err(|failures| Several(failures).into())
+        Ok(several(reports.len(), failures)?)
     }
 }
 
@@ -184,7 +184,7 @@ impl Targets {
                 if self.confirm || !report.is_present || kind.is_reset() {
                     return Some(failure.hint(hint));
                 }
-                global.console().note(&failure.message);
+                global.console().note(&ErrorMessage::from(&failure).message);
                 None
             }
         }
@@ -215,7 +215,7 @@ impl StateArgs {
                     .hint("who is there: cangauge scan")
             })
             .collect();
-        together(reports.len(), failures).map_err(|failures| Several(failures).into())
+        Ok(several(reports.len(), failures)?)
     }
 }
 

@@ -1,7 +1,7 @@
 //! `cangauge read`.
 
 use super::args::{Nodes, SignalArg};
-use super::exit::{IntoFailure, Several, stdout};
+use super::exit::{IntoFailure, several, stdout};
 use super::{Format, Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -9,8 +9,8 @@ use crate::device::unit::Unit;
 use crate::master::Master;
 use crate::measure::decode::Wanted;
 use crate::measure::sample::{Number, Sample, Status};
+use crate::output::failure::ErrorMessage;
 use crate::output::{csv, json, table, text};
-use crate::tasks::failure::together;
 use crate::tasks::read::{Target, read};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
@@ -74,17 +74,17 @@ impl Read {
         }
         // Everybody was meant who has it; that somebody has it not is no failure, unless nobody has.
         if self.nodes == Nodes::All && !shown.is_empty() {
-            let (without, failed) = failures.into_iter().partition(|failure| failure.kind == Kind::Usage);
+            let (without, failed) = failures.into_iter().partition(|failure| failure.kind() == Kind::Usage);
             failures = failed;
             let without: Vec<Failure> = without;
-            without.iter().for_each(|failure| global.console().note(&failure.message));
+            without.iter().for_each(|failure| global.console().note(&ErrorMessage::from(failure).message));
         }
         let bare = asked == 1 && wanted.len() == 1;
         let invalid = print(&shown, global.format, bare).map_err(stdout)?;
         if let Some(failure) = invalid {
             failures.push(failure);
         }
-        together(asked, failures).map_err(|failures| Several(failures).into())
+        Ok(several(asked, failures)?)
     }
 
     fn show(&self, target: Target, sample: &Sample) -> Result<Shown, Failure> {

@@ -1,13 +1,13 @@
 //! `cangauge scan`.
 
 use super::args::Nodes;
-use super::exit::{IntoFailure, Several, stdout};
+use super::exit::{IntoFailure, several, stdout};
 use super::{Format, Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::{csv, json, table, text};
 use crate::tasks::scan::{Found, listen, scan};
-use crate::tasks::{Failure, Kind, failure::together};
+use crate::tasks::{Failure, Kind};
 use clap::Args;
 use std::io::{self, Write};
 use std::time::Duration;
@@ -64,7 +64,7 @@ impl Scan {
         print(&found, global.format).map_err(stdout)?;
         self.say(&found, took, global);
         let failures: Vec<Failure> = found.iter().filter_map(|found| found.failure.clone()).collect();
-        together(found.len(), failures).map_err(|failures| Several(failures).into())
+        Ok(several(found.len(), failures)?)
     }
 
     fn say(&self, found: &[Found], took: Duration, global: &Global) {

@@ -1,7 +1,7 @@
 //! stderr: errors, hints, warnings and notes.
 
-use super::{json, text};
-use crate::tasks::Failure;
+use super::failure::ErrorMessage;
+use super::text;
 use anstream::ColorChoice;
 use anstyle::{AnsiColor, Style};
 use indicatif::MultiProgress;
@@ -57,11 +57,11 @@ impl Console {
     }
 
     /// A failure with its hint; as JSON on one line.
-    pub fn fail(&self, failure: &Failure, exit: u8) {
+    pub fn fail(&self, failure: &ErrorMessage, exit: u8) {
         if self.json {
             let mut out = Vec::new();
             // Writing to memory cannot fail.
-            let _ = json::failure(&mut out, failure, exit);
+            let _ = failure.json(&mut out, exit);
             let _ = io::stderr().write_all(&out);
             return;
         }

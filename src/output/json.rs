@@ -4,11 +4,9 @@ use super::text::steers;
 use crate::canopen::id::NodeId;
 use crate::measure::sample::{Number, Source, Status};
 use crate::tasks::autozero::Zeroed;
-use crate::tasks::failure::Place;
 use crate::tasks::nmt::StateReport;
 use crate::tasks::scan::Found;
 use crate::tasks::store::Done;
-use crate::tasks::{Failure, Kind};
 use serde::Serialize;
 use serde_json::ser::Formatter;
 use std::io::{self, Write};
@@ -35,52 +33,6 @@ impl Formatter for Safe {
         }
         Ok(())
     }
-}
-
-/// The name of a kind of failure in the contract.
-pub fn kind_name(kind: Kind) -> &'static str {
-    match kind {
-        Kind::CheckFailed => "check-failed",
-        Kind::Usage => "usage",
-        Kind::NoAnswer => "no-answer",
-        Kind::Refused => "refused",
-        Kind::Bus => "bus",
-        Kind::Unexpected => "unexpected",
-        Kind::Partial => "partial",
-        Kind::Io => "io",
-        Kind::Interrupted => "interrupted",
-    }
-}
-
-/// A failure, for stderr.
-pub fn failure(out: &mut dyn Write, failure: &Failure, exit: u8) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Error<'a> {
-        error: Inner<'a>,
-    }
-    #[derive(Serialize)]
-    struct Inner<'a> {
-        kind: &'a str,
-        exit: u8,
-        message: &'a str,
-        node: Option<u8>,
-        object: Option<String>,
-        abort: Option<String>,
-        hint: Option<&'a str>,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        column: Option<usize>,
-    }
-    let inner = Inner {
-        kind: kind_name(failure.kind),
-        exit,
-        message: &failure.message,
-        node: failure.node.map(NodeId::get),
-        object: failure.object.map(|object| object.to_string()),
-        abort: failure.abort.map(|abort| format!("0x{:08X}", abort.0)),
-        hint: failure.hint.as_deref(),
-        column: failure.place.as_ref().map(Place::column),
-    };
-    line(out, &Error { error: inner })
 }
 
 /// A node that a scan found.

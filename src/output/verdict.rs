@@ -1,5 +1,6 @@
 //! Verdicts as text, JSON Lines and CSV.
 
+use super::failure::ErrorMessage;
 use super::table::{Align, write};
 use super::text::{grouped, significant};
 use crate::canopen::id::NodeId;
@@ -73,7 +74,7 @@ pub fn findings(verdict: &Verdict, failures: &[Failure]) -> String {
 pub fn reason_text(reason: &Reason, failures: &[Failure]) -> String {
     match reason {
         Reason::Failed(at) => {
-            failures.get(*at).map_or_else(|| "not measured".to_owned(), |failure| failure.message.clone())
+            failures.get(*at).map_or_else(|| "not measured".to_owned(), |failure| ErrorMessage::of(failure).message)
         }
         Reason::NotReceived { node, signal } => format!("node {node}: {signal} was not received"),
         Reason::Stopped { node, signal } => format!("node {node}: {signal} stopped before the end"),

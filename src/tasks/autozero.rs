@@ -5,8 +5,11 @@
 //! the readings may be 0.5 % apart; a limit that is named instead also bounds what offsets add up to.
 
 mod channel;
+mod failure;
 mod safety;
 mod samples;
+
+pub use failure::AutozeroFailure;
 
 pub use safety::Limit;
 
@@ -107,7 +110,7 @@ pub fn autozero(
     overrides: &Overrides,
     options: &Options,
 ) -> Result<Zeroed, Failure> {
-    let unchanged = |failure: Failure| match failure.kind {
+    let unchanged = |failure: Failure| match failure.kind() {
         Kind::Interrupted => failure.knowing(node, "nothing was changed"),
         _ => failure,
     };
@@ -389,7 +392,7 @@ fn group(master: &mut Master<'_>, device: &Node, channel: &Channel, stores: bool
         None if !stores => Ok(Group::All),
         None => match store::plan(master, device, Group::Application) {
             Ok(_) => Ok(Group::Application),
-            Err(failure) if failure.kind == Kind::Refused => Ok(Group::All),
+            Err(failure) if failure.kind() == Kind::Refused => Ok(Group::All),
             Err(failure) => Err(failure),
         },
     }

@@ -1,5 +1,9 @@
 //! Checks measurements against expressions: one reading by SDO, or all samples of a recording.
 
+mod failure;
+
+pub use failure::CheckFailure;
+
 use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
 use crate::master::{Error, Master};
@@ -81,7 +85,7 @@ pub fn all_satisfied(verdicts: &[Verdict], failures: &[Failure]) -> Result<(), F
         return Ok(());
     }
     Err(match failures {
-        [first, others @ ..] if others.iter().all(|other| other.kind == first.kind) => first.clone(),
+        [first, others @ ..] if others.iter().all(|other| other.kind() == first.kind()) => first.clone(),
         _ => Failure::new(Kind::NoAnswer, format!("no data for {without} of {all} {word}")),
     })
 }

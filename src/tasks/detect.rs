@@ -1,5 +1,9 @@
 //! Finds the bit rate of a running bus: by listening, or on a bench with one device by asking.
 
+mod failure;
+
+pub use failure::DetectFailure;
+
 use super::{Failure, Kind};
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mode};
 use crate::canopen::id::NodeId;
@@ -109,10 +113,7 @@ pub fn detect(
             Err(Failure::new(Kind::Bus, heard))
         }
         (Ok(_), Err(error)) => Err(Failure::new(Kind::Bus, format!("{} is not as it was: {error}", bus.name()))),
-        (Err(failure), Err(error)) => {
-            let message = format!("{}; and {} is not as it was: {error}", failure.message, bus.name());
-            Err(Failure { message, ..failure })
-        }
+        (Err(failure), Err(error)) => Err(failure.and(format!("{} is not as it was: {error}", bus.name()))),
     }
 }
 

@@ -1,104 +1,304 @@
-//! Why a task did not do what was asked: the cause, whom it concerns, and what to try next.
+//! Why a task failed: the node, the object, the cause, and what the task changed before it failed.
+//!
+//! These types contain no text for people. [`crate::output::failure`] turns them into a message and a hint.
 
-use crate::bus::BusError;
+pub use crate::bus::BusError;
+pub use crate::master::{LssError, Operation, SdoError, SdoFailure};
+pub use crate::measure::expression::ExpressionError;
+
+use super::note::Effect;
+use super::{autozero, check, detect, log, lss, nmt, pdo, read, scan, sdo, settings, store};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::Service;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
-use crate::master::{Error, LssError, SdoError, SdoFailure};
-use crate::measure::expression::ExpressionError;
+use crate::master::Error;
 use crate::node;
 use std::fmt;
+use std::sync::Arc;
 
-/// The kinds of failure that scripts tell apart.
+/// The kinds of failure that scripts can distinguish. Each has one exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
-    /// The answer is no, or a safety check stopped the command before anything was changed.
+    /// The answer is no, or a safety check stopped the command before it changed anything.
     CheckFailed,
-    /// Wrong arguments or files; nothing was sent.
+    /// The arguments or a file are wrong; nothing was changed.
     Usage,
     /// A device did not answer in time.
     NoAnswer,
-    /// A device said no.
+    /// A device rejected the request, or lacks the requested feature.
     Refused,
-    /// The interface or the connection fails.
+    /// The interface or the connection failed.
     Bus,
-    /// An answer that breaks the protocol, or a device that is not in the state asked for.
+    /// An answer violates the protocol, or the device is not in the requested state.
     Unexpected,
-    /// Some nodes succeeded and some failed.
+    /// Of several nodes, some succeeded and some failed.
     Partial,
-    /// A local file fails.
+    /// A local file could not be opened, read or written.
     Io,
     /// Ctrl-C before there was a result.
     Interrupted,
 }
 
-/// Why something was not done.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Why a task failed.
+#[derive(Clone, Debug)]
 pub struct Failure {
+    /// The node that it concerns; `None` if it concerns none or several.
+    pub node: Option<NodeId>,
+    /// The object that was read or written.
+    pub object: Option<ObjectId>,
+    /// What went wrong.
+    pub cause: Cause,
+    /// What was changed before, and what state was left behind; in the order in which it happened.
+    pub effects: Vec<Effect>,
+}
+
+/// What went wrong. Each area of `tasks` has an enum of its own.
+#[derive(Clone, Debug)]
+pub enum Cause {
+    /// The bus failed.
+    Bus(Arc<BusError>),
+    /// An SDO transfer failed.
+    Sdo(Box<SdoError>),
+    /// An LSS service failed.
+    LssService(Arc<LssError>),
+    /// Reading or writing a node failed.
+    Node(Arc<node::Error>),
+    /// The user stopped the command (Ctrl-C, SIGTERM, SIGHUP).
+    Interrupted,
+    /// An expression of `check` or `log --expect` is wrong.
+    Expression(Box<ExpressionError>),
+    /// Measured values could not be read.
+    Read(read::ReadFailure),
+    /// A scan did not find or identify nodes.
+    Scan(scan::ScanFailure),
+    /// An object could not be named, read or written.
+    Object(sdo::ObjectFailure),
+    /// An NMT state was not reached or not confirmed.
+    Nmt(nmt::NmtFailure),
+    /// Settings were not stored or restored.
+    Store(store::StoreFailure),
+    /// A TPDO could not be shown or changed.
+    Pdo(pdo::PdoFailure),
+    /// A setting could not be shown or changed.
+    Settings(settings::SettingsFailure),
+    /// Nothing was recorded, or a recording ended early.
+    Log(log::LogFailure),
+    /// A check failed or had no data.
+    Check(check::CheckFailure),
+    /// A node-ID or a bit rate was not set.
+    Lss(lss::LssFailure),
+    /// The bit rate of a bus was not found.
+    Detect(detect::DetectFailure),
+    /// A channel was not set to zero.
+    Autozero(autozero::AutozeroFailure),
+    /// Text of a task that has no typed causes yet.
+    Text(Box<TextCause>),
+}
+
+/// A cause as text, until every task has typed causes.
+#[derive(Clone, Debug)]
+pub struct TextCause {
     /// Which kind.
     pub kind: Kind,
-    /// What happened, in one line, with node and object in front.
+    /// What happened, in one line, without the node in front.
     pub message: String,
-    /// Whom it concerns.
-    pub node: Option<NodeId>,
-    /// Which object was asked for.
-    pub object: Option<ObjectId>,
-    /// The device's own reason.
+    /// The code with which the device rejected the request.
     pub abort: Option<AbortCode>,
-    /// What to type next.
-    pub hint: Option<String>,
-    /// The place in what was typed.
-    pub place: Option<Place>,
 }
 
-/// A character of something that was typed.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
-    /// What was typed.
-    pub text: String,
-    /// The characters before it.
-    pub before: String,
-}
-
-impl Place {
-    /// The character, counted from 1.
-    pub fn column(&self) -> usize {
-        self.before.chars().count() + 1
+impl Cause {
+    /// The kind, which decides the exit code.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Cause::Bus(error) => match **error {
+                BusError::File { .. } => Kind::Io,
+                _ => Kind::Bus,
+            },
+            Cause::Sdo(error) => match error.failure {
+                SdoFailure::Refused(_) => Kind::Refused,
+                SdoFailure::NoAnswer { .. } => Kind::NoAnswer,
+                SdoFailure::Violation(..)
+                | SdoFailure::NotANumber
+                | SdoFailure::Ambiguous
+                | SdoFailure::Fit(_)
+                | SdoFailure::Disturbed => Kind::Unexpected,
+                SdoFailure::Cancelled => Kind::Interrupted,
+            },
+            Cause::LssService(error) => lss_kind(error),
+            Cause::Node(error) => node_kind(error),
+            Cause::Interrupted => Kind::Interrupted,
+            Cause::Expression(_) => Kind::Usage,
+            Cause::Read(cause) => cause.kind(),
+            Cause::Scan(cause) => cause.kind(),
+            Cause::Object(cause) => cause.kind(),
+            Cause::Nmt(cause) => cause.kind(),
+            Cause::Store(cause) => cause.kind(),
+            Cause::Pdo(cause) => cause.kind(),
+            Cause::Settings(cause) => cause.kind(),
+            Cause::Log(cause) => cause.kind(),
+            Cause::Check(cause) => cause.kind(),
+            Cause::Lss(cause) => cause.kind(),
+            Cause::Detect(cause) => cause.kind(),
+            Cause::Autozero(cause) => cause.kind(),
+            Cause::Text(text) => text.kind,
+        }
     }
+
+    /// The abort code, if the device rejected an SDO request.
+    pub fn abort(&self) -> Option<AbortCode> {
+        match self {
+            Cause::Sdo(error) => match error.failure {
+                SdoFailure::Refused(code) => Some(code),
+                _ => None,
+            },
+            Cause::Text(text) => text.abort,
+            _ => None,
+        }
+    }
+}
+
+fn node_kind(error: &node::Error) -> Kind {
+    use node::Error as Cannot;
+    match error {
+        Cannot::Bus(_) => Kind::Bus,
+        Cannot::Interrupted => Kind::Interrupted,
+        Cannot::Sdo(_) | Cannot::Unknown(_) | Cannot::NotKept { .. } | Cannot::Restarted(_) => Kind::Unexpected,
+        Cannot::Width { .. } | Cannot::Value { .. } | Cannot::TypeUnknown { .. } | Cannot::Name(_) => Kind::Usage,
+        Cannot::NoBootUp(_) => Kind::NoAnswer,
+    }
+}
+
+fn lss_kind(error: &LssError) -> Kind {
+    match error {
+        LssError::Master(Error::Bus(BusError::File { .. })) => Kind::Io,
+        LssError::Master(Error::Bus(_)) => Kind::Bus,
+        LssError::Master(Error::Interrupted) => Kind::Interrupted,
+        LssError::Refused { .. } => Kind::Refused,
+        LssError::NoAnswer { .. } => Kind::NoAnswer,
+        LssError::Several { service, .. } if changes_slave(*service) => Kind::Unexpected,
+        LssError::Several { .. } => Kind::CheckFailed,
+        LssError::Master(Error::Sdo(_))
+        | LssError::Violation { .. }
+        | LssError::Disturbed(_)
+        | LssError::Fastscan(_)
+        | LssError::Mistaken { .. } => Kind::Unexpected,
+    }
+}
+
+/// Whether the service changes every slave that answers it.
+fn changes_slave(service: Service) -> bool {
+    matches!(service, Service::ConfigureNodeId | Service::ConfigureBitTiming | Service::Store)
 }
 
 impl Failure {
-    /// A failure that concerns no node in particular.
-    pub fn new(kind: Kind, message: impl Into<String>) -> Failure {
-        Failure { kind, message: message.into(), node: None, object: None, abort: None, hint: None, place: None }
+    /// A failure that concerns no single node.
+    pub fn general(cause: impl Into<Cause>) -> Failure {
+        Failure { node: None, object: None, cause: cause.into(), effects: Vec::new() }
     }
 
     /// A failure of one node.
-    pub fn of_node(kind: Kind, node: NodeId, message: impl fmt::Display) -> Failure {
-        Failure { node: Some(node), ..Failure::new(kind, format!("node {node}: {message}")) }
+    pub fn at(node: NodeId, cause: impl Into<Cause>) -> Failure {
+        Failure { node: Some(node), ..Failure::general(cause) }
     }
 
-    /// The same, with what is known of `node` all the same: what was changed before, or may have been.
-    pub fn knowing(mut self, node: NodeId, known: impl fmt::Display) -> Failure {
-        self.message = match self.node {
-            Some(_) => format!("{}; {known}", self.message),
-            None => format!("node {node}: {}; {known}", self.message),
-        };
-        self.node = Some(node);
+    /// The same failure with the object that was read or written.
+    #[must_use]
+    pub fn of_object(mut self, object: ObjectId) -> Failure {
+        self.object = Some(object);
         self
     }
 
-    /// The same with a hint.
+    /// The same failure with one more effect on `node`.
+    #[must_use]
+    pub fn with(mut self, node: NodeId, effect: impl Into<Effect>) -> Failure {
+        self.node.get_or_insert(node);
+        self.effects.push(effect.into());
+        self
+    }
+
+    /// The kind, which decides the exit code.
+    pub fn kind(&self) -> Kind {
+        self.cause.kind()
+    }
+
+    /// The abort code, if the device rejected an SDO request.
+    pub fn abort(&self) -> Option<AbortCode> {
+        self.cause.abort()
+    }
+}
+
+/// Two failures are equal if all their parts are. Errors of the operating system cannot be compared, so the debug form
+/// of the cause is.
+impl PartialEq for Failure {
+    fn eq(&self, other: &Failure) -> bool {
+        let same_place = (self.node, self.object) == (other.node, other.object);
+        same_place && self.effects == other.effects && format!("{:?}", self.cause) == format!("{:?}", other.cause)
+    }
+}
+
+/// What tasks without typed causes use. These functions disappear with [`Cause::Text`].
+impl Failure {
+    /// A failure that concerns no single node, as text.
+    pub fn new(kind: Kind, message: impl Into<String>) -> Failure {
+        Failure::general(Cause::Text(Box::new(TextCause { kind, message: message.into(), abort: None })))
+    }
+
+    /// A failure of one node, as text.
+    pub fn of_node(kind: Kind, node: NodeId, message: impl fmt::Display) -> Failure {
+        Failure { node: Some(node), ..Failure::new(kind, message.to_string()) }
+    }
+
+    /// The same failure with the device's reason, for a cause that is text.
+    #[must_use]
+    pub fn with_abort(mut self, code: Option<AbortCode>) -> Failure {
+        if let Cause::Text(text) = &mut self.cause {
+            text.abort = code;
+        }
+        self
+    }
+
+    /// The same failure with an effect as text.
+    #[must_use]
+    pub fn knowing(self, node: NodeId, known: impl fmt::Display) -> Failure {
+        self.with(node, Effect::Text(known.to_string()))
+    }
+
+    /// The same failure with an effect as text that concerns no single node.
+    #[must_use]
+    pub fn and(mut self, known: impl fmt::Display) -> Failure {
+        self.effects.push(Effect::Text(known.to_string()));
+        self
+    }
+
+    /// The same failure with a hint as text, which replaces the hint of the cause.
+    #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Failure {
-        self.hint = Some(hint.into());
+        self.effects.push(Effect::Hint(hint.into()));
         self
     }
 }
 
+/// For logs and tests. People read the text of [`crate::output::failure`].
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.message)
+        let is_named = matches!(&self.cause, Cause::Text(text) if text.message.starts_with("node"));
+        if let Some(node) = self.node.filter(|_| !is_named) {
+            write!(f, "node {node}: ")?;
+        }
+        match &self.cause {
+            Cause::Bus(error) => error.fmt(f),
+            Cause::Sdo(error) => error.fmt(f),
+            Cause::LssService(error) => error.fmt(f),
+            Cause::Text(text) => f.write_str(&text.message),
+            cause => fmt::Debug::fmt(cause, f),
+        }?;
+        for effect in &self.effects {
+            if let Effect::Text(text) = effect {
+                write!(f, "; {text}")?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -106,59 +306,19 @@ impl std::error::Error for Failure {}
 
 impl From<SdoError> for Failure {
     fn from(error: SdoError) -> Failure {
-        let (kind, abort, hint) = match error.failure {
-            SdoFailure::Refused(code) => (Kind::Refused, Some(code), None),
-            SdoFailure::NoAnswer { begun: false, .. } => {
-                (Kind::NoAnswer, None, Some("who is there: cangauge scan".to_owned()))
-            }
-            SdoFailure::NoAnswer { begun: true, .. } => (Kind::NoAnswer, None, None),
-            SdoFailure::Violation(..) | SdoFailure::NotANumber | SdoFailure::Ambiguous => {
-                (Kind::Unexpected, None, None)
-            }
-            SdoFailure::Fit(_) => {
-                let hint = format!("its bytes: cangauge sdo read {} {} --type hex", error.node, error.object);
-                (Kind::Unexpected, None, Some(hint))
-            }
-            SdoFailure::Disturbed => {
-                (Kind::Unexpected, None, Some("stop the other program for a moment, or try again".to_owned()))
-            }
-            SdoFailure::Cancelled => (Kind::Interrupted, None, None),
-        };
-        let object = Some(error.object);
-        Failure { object, abort, hint, ..Failure::of_node(kind, error.node, &error) }
+        Failure::at(error.node, Cause::Sdo(Box::new(error.clone()))).of_object(error.object)
     }
 }
 
 impl From<ExpressionError> for Failure {
     fn from(error: ExpressionError) -> Failure {
-        let place = Place { before: error.before().to_owned(), text: error.text };
-        Failure { hint: error.hint, place: Some(place), ..Failure::new(Kind::Usage, error.message) }
+        Failure::general(Cause::Expression(Box::new(error)))
     }
 }
 
 impl From<BusError> for Failure {
     fn from(error: BusError) -> Failure {
-        let kind = match &error {
-            BusError::File { .. } => Kind::Io,
-            _ => Kind::Bus,
-        };
-        let hint = match &error {
-            BusError::QueueFull => Some(
-                "nobody acknowledges: check the sensor's power, the bit rate, the wiring and the 120 ohm terminators; \
-                 or somebody fills the bus: candump shows who"
-                    .to_owned(),
-            ),
-            BusError::Down(name) => {
-                Some(format!("bring it up: sudo ip link set {name} up type can bitrate 250000 (the sensors' bit rate)"))
-            }
-            BusError::NoInterface(_) | BusError::NotCan(_) => {
-                Some("see what is there: cangauge bus list; without hardware: --bus sim".to_owned())
-            }
-            BusError::ReceiveOnly(_) => Some("what listens only can do it: log, scan --passive, nmt watch".to_owned()),
-            BusError::Unsupported(_) => Some("without it: --bus sim".to_owned()),
-            _ => None,
-        };
-        Failure { hint, ..Failure::new(kind, error.to_string()) }
+        Failure::general(Cause::Bus(Arc::new(error)))
     }
 }
 
@@ -167,139 +327,34 @@ impl From<Error> for Failure {
         match error {
             Error::Bus(error) => error.into(),
             Error::Sdo(error) => error.into(),
-            Error::Interrupted => Failure::new(Kind::Interrupted, "interrupted"),
+            Error::Interrupted => Failure::general(Cause::Interrupted),
         }
     }
 }
 
 impl From<node::Error> for Failure {
     fn from(error: node::Error) -> Failure {
-        let of_object = |kind, node, object: ObjectId, message: String| Failure {
-            object: Some(object),
-            ..Failure::of_node(kind, node, message)
+        use node::Error as Cannot;
+        let (node, object) = match error {
+            Cannot::Bus(error) => return error.into(),
+            Cannot::Interrupted => return Error::Interrupted.into(),
+            Cannot::Sdo(error) | Cannot::Unknown(error) => return error.into(),
+            Cannot::NotKept { node, object, .. }
+            | Cannot::Width { node, object, .. }
+            | Cannot::Value { node, object, .. }
+            | Cannot::TypeUnknown { node, object } => (node, Some(object)),
+            Cannot::Name(ref error) => (error.node, None),
+            Cannot::Restarted(node) | Cannot::NoBootUp(node) => (node, None),
         };
-        match error {
-            node::Error::Bus(error) => error.into(),
-            node::Error::Interrupted => Error::Interrupted.into(),
-            node::Error::Sdo(error) | node::Error::Unknown(error) => error.into(),
-            node::Error::NotKept { node, object, found, .. } => {
-                of_object(Kind::Unexpected, node, object, format!("{object} was acknowledged and reads {found}"))
-            }
-            node::Error::Width { node, object, width, given } => {
-                let message = format!(
-                    "write {object}: the object has {width} bytes, the value {given}, and the device accepts no size"
-                );
-                of_object(Kind::Usage, node, object, message)
-            }
-            node::Error::Value { node, object, error } => {
-                of_object(Kind::Usage, node, object, format!("write {object}: {error}"))
-            }
-            node::Error::TypeUnknown { node, object } => {
-                of_object(Kind::Usage, node, object, format!("write {object}: its type is unknown"))
-                    .hint(format!("state it: cangauge sdo write {node} {object} VALUE --type u32 (or i16, r32, vs)"))
-            }
-            node::Error::Name(error) => {
-                let source = error.title.unwrap_or_else(|| "the standard".to_owned());
-                let message = format!("{source} has no object \"{}\"", error.name);
-                let failure = Failure::of_node(Kind::Usage, error.node, message);
-                if error.nearest.is_empty() {
-                    failure
-                } else {
-                    failure.hint(format!("nearest: {}", error.nearest.join(", ")))
-                }
-            }
-            node::Error::Restarted(node) => Failure::of_node(Kind::Unexpected, node, "it has restarted"),
-            node::Error::NoBootUp(node) => Failure::of_node(Kind::NoAnswer, node, "no boot-up came after the reset"),
-        }
+        Failure { object, ..Failure::at(node, Cause::Node(Arc::new(error))) }
     }
 }
 
 impl From<LssError> for Failure {
     fn from(error: LssError) -> Failure {
-        const BY_NAME: &str = "name the one you mean, by its node-ID or as VENDOR:PRODUCT:REVISION:SERIAL, or connect \
-                               it alone";
-        let message = error.to_string();
-        let (kind, hint) = match error {
-            LssError::Master(error) => return error.into(),
-            LssError::Refused { service, .. } => (Kind::Refused, refusal_hint(service)),
-            LssError::NoAnswer { service, .. } => (Kind::NoAnswer, silence_hint(service)),
-            LssError::Several { service, .. } if changes(service) => (Kind::Unexpected, Some(BY_NAME)),
-            LssError::Several { .. } => (Kind::CheckFailed, Some(BY_NAME)),
-            LssError::Violation { .. } => (Kind::Unexpected, None),
-            LssError::Disturbed(_) => (Kind::Unexpected, Some("stop the other program, or try again")),
-            LssError::Fastscan(_) | LssError::Mistaken { .. } => {
-                (Kind::Unexpected, Some("connect one device without a node-ID after the other"))
-            }
-        };
-        Failure { hint: hint.map(str::to_owned), ..Failure::new(kind, message) }
-    }
-}
-
-/// Whether more than one slave that answers means that more than one has been changed.
-fn changes(service: Service) -> bool {
-    matches!(service, Service::ConfigureNodeId | Service::ConfigureBitTiming | Service::Store)
-}
-
-fn refusal_hint(service: Service) -> Option<&'static str> {
-    match service {
-        Service::ConfigureBitTiming => Some("the device's own table of bit rates is in its manual: --table-index N"),
-        Service::Store => Some("some devices store it through objects: --via sdo"),
-        _ => None,
-    }
-}
-
-fn silence_hint(service: Service) -> Option<&'static str> {
-    match service {
-        Service::SwitchSelective => Some(
-            "no slave has this address, or it knows no LSS in its present state: see who is there with \
-             cangauge lss scan, or stop it first: cangauge nmt stop NODE",
-        ),
-        Service::Store => Some("whether it stored is not known: read it again after power off and on"),
-        Service::Inquire(_) | Service::InquireNodeId => {
-            Some("not every device knows this service; its identity by SDO: cangauge scan")
+        match error {
+            LssError::Master(error) => error.into(),
+            error => Failure::general(Cause::LssService(Arc::new(error))),
         }
-        _ => None,
-    }
-}
-
-/// What several nodes end with together: nothing if all succeeded, the common kind if all failed alike,
-/// `partial` if some succeeded, else `unexpected` (several that failed each in its own way).
-pub fn together(asked: usize, failures: Vec<Failure>) -> Result<(), Vec<Failure>> {
-    if failures.is_empty() { Ok(()) } else { Err(combine(asked, failures)) }
-}
-
-fn combine(asked: usize, mut failures: Vec<Failure>) -> Vec<Failure> {
-    let kinds: Vec<Kind> = failures.iter().map(|failure| failure.kind).collect();
-    let common = if failures.len() < asked {
-        Kind::Partial
-    } else if kinds.windows(2).all(|pair| pair[0] == pair[1]) {
-        kinds[0]
-    } else {
-        Kind::Unexpected
-    };
-    for failure in &mut failures {
-        failure.kind = common;
-    }
-    failures
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn failure(kind: Kind) -> Failure {
-        Failure::new(kind, "")
-    }
-
-    #[test]
-    fn several_nodes_together() {
-        let kinds = |asked, kinds: &[Kind]| {
-            together(asked, kinds.iter().map(|&kind| failure(kind)).collect()).map_err(|failures| failures[0].kind)
-        };
-        assert_eq!(kinds(2, &[]), Ok(()));
-        assert_eq!(kinds(2, &[Kind::NoAnswer]), Err(Kind::Partial));
-        assert_eq!(kinds(2, &[Kind::NoAnswer, Kind::NoAnswer]), Err(Kind::NoAnswer));
-        assert_eq!(kinds(2, &[Kind::NoAnswer, Kind::Refused]), Err(Kind::Unexpected));
-        assert_eq!(kinds(1, &[Kind::Refused]), Err(Kind::Refused));
     }
 }

@@ -6,6 +6,7 @@
 mod changes;
 mod checks;
 mod events;
+mod failure;
 mod heartbeats;
 mod interval;
 mod passive;
@@ -16,6 +17,8 @@ mod remark;
 mod rereads;
 mod silence;
 mod states;
+
+pub use failure::LogFailure;
 
 use crate::bus::{Fault, Filters, ReceiveBuffer, Stamp, TimestampSource};
 use crate::canopen::emcy::Emergency;

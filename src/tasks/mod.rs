@@ -9,6 +9,7 @@ mod kept;
 pub mod log;
 pub mod lss;
 pub mod nmt;
+pub mod note;
 pub mod pdo;
 pub mod read;
 pub mod restore;
@@ -19,3 +20,4 @@ mod signature;
 pub mod store;
 
 pub use failure::{Failure, Kind};
+pub use note::{Effect, Fact, Note};

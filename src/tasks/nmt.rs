@@ -1,10 +1,12 @@
 //! NMT commands and states.
 
+mod failure;
 mod probe;
 mod startup;
 mod watch;
 
 pub use crate::node::state::{Proof, StateReport, command, states};
+pub use failure::NmtFailure;
 pub use probe::{Probe, probe};
 pub use startup::{Starts, StartupReport, startup};
 pub use watch::{Change, Seen, watch};

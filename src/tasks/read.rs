@@ -1,5 +1,9 @@
 //! Reads measured values by SDO, once.
 
+mod failure;
+
+pub use failure::ReadFailure;
+
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};

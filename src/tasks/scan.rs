@@ -1,5 +1,9 @@
 //! Finds who is on the bus.
 
+mod failure;
+
+pub use failure::ScanFailure;
+
 use crate::bus::{Filters, Mono, Received};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::{CanId, NodeId};

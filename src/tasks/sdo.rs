@@ -1,5 +1,9 @@
 //! Reads and writes objects: types from the standard, a description, or the object itself.
 
+mod failure;
+
+pub use failure::ObjectFailure;
+
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, DownloadSize, Note, Uploaded};

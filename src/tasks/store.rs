@@ -1,5 +1,9 @@
 //! Lets a device keep its settings beyond power off: "save" written to 1010h.
 
+mod failure;
+
+pub use failure::StoreFailure;
+
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
@@ -226,7 +230,7 @@ pub(super) fn check_capability(
                 }
                 _ => format!("what it can {verb} cannot be read ({object}: {code})"),
             };
-            let failure = Failure { abort: Some(code), ..refused(what) };
+            let failure = refused(what).with_abort(Some(code));
             Err(match group {
                 Group::All => failure,
                 _ => failure.hint(format!("everything together: cangauge {verb} {node}")),

@@ -10,6 +10,7 @@ use cangauge::bus::memory::MemoryBus;
 use cangauge::canopen::id::NodeId;
 use cangauge::master::{Master, Timing};
 use cangauge::node::Overrides;
+use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Bench, Device};
 use cangauge::tasks::lss::{Job, Note, Rate, Report, Via, assign};
 use cangauge::tasks::{Failure, Kind};
@@ -44,9 +45,9 @@ struct Done {
 
 impl Done {
     #[track_caller]
-    fn failure(&self) -> (Kind, &str) {
+    fn failure(&self) -> (Kind, String) {
         let failure = self.result.as_ref().expect_err("it succeeded");
-        (failure.kind, &failure.message)
+        (failure.kind(), ErrorMessage::of(failure).message)
     }
 
     fn warns(&self, of: &str) -> bool {

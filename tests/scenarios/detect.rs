@@ -106,7 +106,7 @@ fn interrupted_at_any_moment_the_old_rate_is_back() {
         let moment = Mono::at(end * part / 16);
         let mut bus = devices();
         bus.interrupt_at(moment);
-        assert_eq!(run(&mut bus, true).unwrap_err().kind, Kind::Interrupted, "{moment:?}");
+        assert_eq!(run(&mut bus, true).unwrap_err().kind(), Kind::Interrupted, "{moment:?}");
         assert_put_back(&mut bus);
     }
 }
@@ -116,6 +116,6 @@ fn where_the_rate_may_not_be_set_nothing_is_sent() {
     let text = "clock = \"virtual\"\nretime = false\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
     let mut bus = Bench::from_toml(text, Path::new("")).unwrap().open().unwrap();
     let failure = run(&mut bus, true).unwrap_err();
-    assert_eq!(failure.kind, Kind::Bus);
+    assert_eq!(failure.kind(), Kind::Bus);
     assert_eq!(bus.now().mono, Mono::START);
 }

@@ -9,6 +9,7 @@ use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::DownloadSize;
 use cangauge::master::{Error, Master, Request, Timing};
+use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, Setup};
 use cangauge::tasks::Kind;
 use cangauge::tasks::scan::{Found, scan};
@@ -81,8 +82,8 @@ fn a_queue_that_never_empties_is_a_fault_of_the_bus_after_a_while() {
     let mut faulty = Faulty::new(bus(&[1]), plan);
     let begun = faulty.now().mono;
     let failure = cangauge::tasks::Failure::from(scan_all(&mut faulty).unwrap_err());
-    assert_eq!(failure.kind, Kind::Bus);
-    assert!(failure.hint.unwrap().contains("terminators"));
+    assert_eq!(failure.kind(), Kind::Bus);
+    assert!(ErrorMessage::of(&failure).hint.unwrap().contains("terminators"));
     let took = faulty.now().mono.since(begun);
     assert!((Duration::from_secs(1)..Duration::from_secs(2)).contains(&took), "{took:?}");
 }

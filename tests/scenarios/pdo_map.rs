@@ -10,6 +10,7 @@ use cangauge::canopen::pdo::TpdoNumber;
 use cangauge::device::catalog::by_name;
 use cangauge::device::scalar::Scalar;
 use cangauge::master::{Master, Timing};
+use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, Setup, State};
 use cangauge::tasks::pdo::{Item, Mapped, Send, Wish, map};
 use cangauge::tasks::{Failure, Kind};
@@ -305,17 +306,17 @@ fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Held, well: 
     match &result {
         Ok(_) => assert_eq!(&held, new, "{what}"),
         Err(failure) => {
-            let message = &failure.message;
+            let message = &ErrorMessage::of(&failure).message;
             let said_to_be_half = message.contains("left half changed") || message.contains("was changed is not known");
             if said_to_be_half {
                 assert!(matches!(mishap, Mishap::Gone | Mishap::Stubborn(_)), "it could have been mended: {what}");
-                let hint = failure.hint.as_deref().unwrap_or_default();
+                let hint = ErrorMessage::of(&failure).hint.unwrap_or_default();
                 assert!(hint.starts_with("when it answers again: cangauge "), "{what}");
             } else {
                 assert_eq!(&held, old, "{what}");
             }
             if matches!(mishap, Mishap::Interrupt | Mishap::InterruptTwice) {
-                assert_eq!(failure.kind, Kind::Interrupted, "{what}");
+                assert_eq!(failure.kind(), Kind::Interrupted, "{what}");
             }
         }
     }
@@ -339,7 +340,7 @@ fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Held, well: 
         let says = |remark: &String| words.iter().any(|words| remark.contains(words));
         let told = match &result {
             Ok(mapped) => mapped.warnings.iter().any(says),
-            Err(failure) => says(&failure.message),
+            Err(failure) => says(&ErrorMessage::of(&failure).message),
         };
         assert!(told || state == Some(before), "{state:?}: {what}");
     }

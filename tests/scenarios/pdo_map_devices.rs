@@ -7,6 +7,7 @@ use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::pdo::TpdoNumber;
 use cangauge::device::catalog::Model;
 use cangauge::master::{Master, Timing};
+use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, Setup, State};
 use cangauge::tasks::pdo::{Item, Mapped, Send, Wish, map};
 use cangauge::tasks::{Failure, Kind};
@@ -124,7 +125,7 @@ fn a_device_that_takes_no_bit_31_is_mapped_without_it() {
     // Of a device whose description says that it takes bit 31, a refusal is one.
     let mut bench = Bench::new(description("", &refuses_31));
     let failure = bench.map(&wish(&["ch1", "ch1.status"]), true).unwrap_err();
-    assert_eq!((failure.kind, bench.number("1A00:0")), (Kind::Refused, 1));
+    assert_eq!((failure.kind(), bench.number("1A00:0")), (Kind::Refused, 1));
     assert_eq!(bench.state(), Some(State::Operational));
 }
 
@@ -140,14 +141,14 @@ fn a_fixed_mapping_is_as_wanted_or_cannot_be() {
         let mut bench = Bench::new(description("", &fixed));
         assert_eq!(bench.map(&wish(&["0x6130:1"]), described).unwrap().writes, 0);
         let failure = bench.map(&wish(&["0x6130:1", "0x6150:1"]), described).unwrap_err();
-        assert_eq!(failure.kind, Kind::Refused);
+        assert_eq!(failure.kind(), Kind::Refused);
         if described {
             let message = "node 9: the mapping of TPDO1 is fixed (0x6130:1/32): nothing was changed";
-            assert_eq!(failure.message, message);
+            assert_eq!(ErrorMessage::of(&failure).message, message);
         } else {
             let message = "node 9: write 0x1A00:0 (0 entries): refused by the device (0x06010002, the object is \
                            read-only): TPDO1 has its old mapping and parameters";
-            assert_eq!(failure.message, message);
+            assert_eq!(ErrorMessage::of(&failure).message, message);
         }
         assert_eq!(bench.number("1800:1"), 0x4000_0189);
         // What is not fixed can be set all the same.
@@ -169,7 +170,10 @@ fn the_inhibit_time_is_written_while_the_pdo_is_off() {
 fn a_tpdo_without_an_identifier_is_not_switched_on() {
     let mut bench = Bench::new(description("", &parameters("default = 0x80000000")));
     let failure = bench.map(&wish(&["ch1.status"]), false).unwrap_err();
-    assert_eq!((failure.kind, failure.message.as_str()), (Kind::Usage, "node 9: TPDO1 has no identifier yet (0x000)"));
+    assert_eq!(
+        (failure.kind(), ErrorMessage::of(&failure).message.as_str()),
+        (Kind::Usage, "node 9: TPDO1 has no identifier yet (0x000)")
+    );
     assert_eq!((bench.number("1A00:1"), bench.number("1800:1")), (0x6130_0120, 0x8000_0000));
     // Parameters alone leave it off; with an identifier of its own it comes on.
     bench.map(&Wish { event_timer_ms: Some(20), ..wish(&[]) }, false).unwrap();
@@ -184,12 +188,18 @@ fn the_device_is_asked_for_a_width_that_nothing_tells() {
     bench.map(&wish(&["0x2000", "ch1"]), false).unwrap();
     assert_eq!((bench.number("1A00:1"), bench.number("1A00:2")), (0x2000_0010, 0x6130_0120));
     let failure = bench.map(&wish(&["0x3000"]), false).unwrap_err();
-    assert_eq!(failure.message, "node 9: read 0x3000:0: refused by the device (0x06020000, the object does not exist)");
+    assert_eq!(
+        ErrorMessage::of(&failure).message,
+        "node 9: read 0x3000:0: refused by the device (0x06020000, the object does not exist)"
+    );
     let failure = bench.map(&wish(&["ch1", "0x2000", "0x2000", "ch1.status"]), false).unwrap_err();
     assert_eq!(
-        (failure.kind, failure.message.as_str()),
+        (failure.kind(), ErrorMessage::of(&failure).message.as_str()),
         (Kind::Usage, "node 9: that makes 9 bytes; a PDO carries 8 bytes at most")
     );
     let failure = bench.map(&wish(&["ch2"]), false).unwrap_err();
-    assert_eq!((failure.kind, failure.message.as_str()), (Kind::Usage, "node 9: it has no object or signal \"ch2\""));
+    assert_eq!(
+        (failure.kind(), ErrorMessage::of(&failure).message.as_str()),
+        (Kind::Usage, "node 9: it has no object or signal \"ch2\"")
+    );
 }

@@ -10,6 +10,7 @@ use cangauge::canopen::value::{DataType, Value};
 use cangauge::device::catalog;
 use cangauge::device::unit::Unit;
 use cangauge::master::{Master, Timing};
+use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, Direction, Overload, Setup};
 use cangauge::tasks::settings::filter::{FilterType, Wanted};
 use cangauge::tasks::settings::limits::Limit;
@@ -119,7 +120,7 @@ fn each(make: impl Fn(u64) -> FaultPlan, mut judge: impl FnMut(&Deed, FaultPlan)
 #[test]
 fn undisturbed_they_all_succeed() {
     for deed in &DEEDS {
-        assert_eq!(run(deed, FaultPlan::default(), 0), Ok(()), "{}", deed.name);
+        run(deed, FaultPlan::default(), 0).expect(deed.name);
     }
 }
 
@@ -136,7 +137,7 @@ fn without_repeats_silence_is_no_success() {
         |number| FaultPlan { lose: [number].into(), ..FaultPlan::default() },
         |deed, plan| {
             if let Err(failure) = run(deed, plan, 0) {
-                assert_eq!(failure.kind, Kind::NoAnswer, "{}: {failure}", deed.name);
+                assert_eq!(failure.kind(), Kind::NoAnswer, "{}: {failure}", deed.name);
                 failed += 1;
             }
         },
@@ -151,7 +152,7 @@ fn doubled_and_late_frames_are_no_answers_to_something_else() {
         |deed, plan| {
             // The acknowledge of a write that comes twice is taken for a wrong answer to the reading behind it.
             if let Err(failure) = run(deed, plan, 1) {
-                assert_eq!(failure.kind, Kind::Unexpected, "{}: {failure}", deed.name);
+                assert_eq!(failure.kind(), Kind::Unexpected, "{}: {failure}", deed.name);
             }
         },
     );
@@ -161,7 +162,7 @@ fn doubled_and_late_frames_are_no_answers_to_something_else() {
             if let Err(failure) = run(deed, plan, 1)
                 && !in_the_name(&failure)
             {
-                assert_eq!(failure.kind, Kind::NoAnswer, "{}: {failure}", deed.name);
+                assert_eq!(failure.kind(), Kind::NoAnswer, "{}: {failure}", deed.name);
             }
         },
     );
@@ -179,7 +180,7 @@ fn the_signature_of_a_reset_is_sent_once_and_its_silence_is_looked_into() {
         }
         minmax::reset(&mut master, &device)
     };
-    assert_eq!(reset(FaultPlan::default()).map(|all| all.len()), Ok(2));
+    assert_eq!(reset(FaultPlan::default()).unwrap().len(), 2);
     let mut lost = 0;
     for number in 40..110 {
         // The answer is lost: what the device reads then shows that it has been reset.
@@ -188,8 +189,8 @@ fn the_signature_of_a_reset_is_sent_once_and_its_silence_is_looked_into() {
         }
         // The request is lost: nothing has been reset, and that is no success.
         if let Err(failure) = reset(FaultPlan { lose_sent: [number].into(), ..FaultPlan::default() }) {
-            assert_eq!(failure.kind, Kind::NoAnswer, "request {number}: {failure}");
-            assert!(in_the_name(&failure) || failure.message.contains("write 0x2022"), "{failure}");
+            assert_eq!(failure.kind(), Kind::NoAnswer, "request {number}: {failure}");
+            assert!(in_the_name(&failure) || ErrorMessage::of(&failure).message.contains("write 0x2022"), "{failure}");
             lost += u32::from(!in_the_name(&failure));
         }
     }
@@ -238,8 +239,8 @@ fn an_acknowledge_is_no_proof() {
         let mut master = Master::new(&mut bus, Timing::default());
         let mut device = settings::Device::open(&mut master, node(), &BTreeMap::new()).expect("it answers");
         let failure = deed(&mut master, &mut device).expect_err("nothing is kept");
-        assert_eq!(failure.kind, Kind::Unexpected, "{failure}");
-        failure.message
+        assert_eq!(failure.kind(), Kind::Unexpected, "{failure}");
+        ErrorMessage::of(&failure).message
     };
     assert_eq!(
         refused(|master, device| unit::set(master, device, None, PSI).map(|_| ())),

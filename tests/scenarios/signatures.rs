@@ -9,6 +9,7 @@ use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::master::{Master, Timing};
+use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Bench, Device, State};
 use cangauge::tasks::autozero::{Limit, Options, Zeroed, autozero};
 use cangauge::tasks::store::{self, Done, Group, Verified};
@@ -203,14 +204,14 @@ fn a_zero_that_is_told_is_there_and_one_that_is_denied_is_not() {
                     acted_without_answer += usize::from(silent && mishap == Mishap::LoseItsAnswer);
                 }
                 Err(failure) => {
-                    let nothing = failure.message.contains("nothing was changed");
+                    let nothing = ErrorMessage::of(&failure).message.contains("nothing was changed");
                     assert!(!nothing || went == 0, "{place}");
                     assert!(nothing || went == 1 || mishap != Mishap::Interrupt, "{place}");
                     assert!(!nothing || holds == [0; 4], "{place}");
-                    if went > 0 && failure.message.contains("the offset is as before") {
+                    if went > 0 && ErrorMessage::of(&failure).message.contains("the offset is as before") {
                         assert_eq!(holds, [0; 4], "{place}");
                     }
-                    assert_eq!(failure.kind == Kind::Interrupted, mishap == Mishap::Interrupt, "{place}");
+                    assert_eq!(failure.kind() == Kind::Interrupted, mishap == Mishap::Interrupt, "{place}");
                 }
             }
         }
@@ -286,7 +287,7 @@ fn what_is_told_as_stored_outlasts_a_reset() {
                 }
                 Err(failure) => {
                     let told = ["whether it was stored is not known", "is not proven"];
-                    let told = told.iter().any(|told| failure.message.contains(told));
+                    let told = told.iter().any(|told| ErrorMessage::of(&failure).message.contains(told));
                     assert_eq!(told, bus.count("73617665") == 1, "{place}");
                 }
             }
@@ -307,14 +308,14 @@ fn a_signature_that_is_acknowledged_and_does_nothing() {
     load(&mut bus).expect("restored");
     let at = bus.sent.iter().position(|frame| frame.ends_with("6C6F6164")).expect("\"load\"");
     let failure = load(&mut Unlucky::of("mh4", RUNS, Some((at, Mishap::Pretend)))).expect_err("nothing was restored");
-    assert_eq!(failure.kind, Kind::Unexpected);
-    assert!(failure.message.contains("restored and reset, but not as delivered"), "{failure}");
+    assert_eq!(failure.kind(), Kind::Unexpected);
+    assert!(ErrorMessage::of(&failure).message.contains("restored and reset, but not as delivered"), "{failure}");
     let mut bus = Unlucky::of("mh4", STILL, None);
     zero(&mut bus, false).expect("zero");
     let at = bus.sent.iter().position(|frame| frame.ends_with("7A65726F")).expect("\"zero\"");
     let failure = zero(&mut Unlucky::of("mh4", STILL, Some((at, Mishap::Pretend))), false).expect_err("no zero");
-    assert_eq!(failure.kind, Kind::Unexpected);
-    assert!(failure.message.contains("it took the signature, and nothing has changed"), "{failure}");
+    assert_eq!(failure.kind(), Kind::Unexpected);
+    assert!(ErrorMessage::of(&failure).message.contains("it took the signature, and nothing has changed"), "{failure}");
 }
 
 #[test]
@@ -333,7 +334,7 @@ fn what_is_told_as_restored_is_as_delivered() {
             }
             Err(failure) => {
                 let told = ["the defaults is not known", "in force is not proven"];
-                let told = told.iter().any(|told| failure.message.contains(told));
+                let told = told.iter().any(|told| ErrorMessage::of(&failure).message.contains(told));
                 assert_eq!(told, bus.count("6C6F6164") == 1, "{place}");
             }
         }
@@ -354,8 +355,8 @@ fn a_refusal_is_told_in_the_words_of_the_device_and_only_its_form_is_tried_again
     ] {
         let mut bus = Unlucky::of("d20", "", Some((place(true), Mishap::Refuse(code))));
         let failure = save(&mut bus, true).expect_err("refused");
-        assert_eq!((failure.kind, failure.abort.map(|abort| abort.0)), (Kind::Refused, Some(code)));
-        assert!(failure.message.contains(words), "{failure}");
+        assert_eq!((failure.kind(), failure.abort().map(|abort| abort.0)), (Kind::Refused, Some(code)));
+        assert!(ErrorMessage::of(&failure).message.contains(words), "{failure}");
         assert_eq!((bus.count("73617665"), bus.count("000#8105")), (1, 0), "neither repeated nor reset");
     }
     // A device that takes the size, or its absence, amiss has not acted.

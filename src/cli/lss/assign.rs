@@ -3,10 +3,9 @@
 use super::{Descriptions, say};
 use crate::canopen::id::NodeId;
 use crate::cli::args::{BusSpec, Nodes, Rate as BitRate};
-use crate::cli::exit::{Several, stdout};
+use crate::cli::exit::{several, stdout};
 use crate::cli::{Format, Global};
 use crate::output::json_lss;
-use crate::tasks::failure::together;
 use crate::tasks::host::by_hand;
 use crate::tasks::lss::{Job, PlannedRate, Rate, Report, Target, Via, assign, check_rate, check_store};
 use crate::tasks::{Failure, Kind};
@@ -197,7 +196,7 @@ impl Options {
             Ok(())
         })?;
         let done = wanted.len() > 1 && failures.len() < wanted.len();
-        together(if done { wanted.len() } else { 1 }, failures).map_err(|failures| Several(failures).into())
+        Ok(several(if done { wanted.len() } else { 1 }, failures)?)
     }
 }
 

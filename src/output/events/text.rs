@@ -5,6 +5,7 @@ use crate::bus::time::spoken;
 use crate::bus::{Fault, ReceiveBuffer};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
+use crate::output::failure::ErrorMessage;
 use crate::tasks::log::{Change, Note, Remark, TpdoChange, silence_text};
 
 /// The text of a recording's event.
@@ -31,7 +32,8 @@ pub fn words(note: &Note) -> Words {
             of_node(*node, "changed", Warning, text)
         }
         Note::Unreadable(node, why) => {
-            let text = format!("{}: node {node} is not recorded until it can be read again", why.message);
+            let text =
+                format!("{}: node {node} is not recorded until it can be read again", ErrorMessage::of(why).message);
             of_node(*node, "unreadable", Warning, text)
         }
         Note::HeartbeatLost(node, since) => {
@@ -110,7 +112,9 @@ pub fn remark_text(remark: &Remark) -> String {
                 listed(nodes)
             ),
         },
-        Remark::StatesNotRestored(failure) => format!("the nodes' states were not restored: {}", failure.message),
+        Remark::StatesNotRestored(failure) => {
+            format!("the nodes' states were not restored: {}", ErrorMessage::of(failure).message)
+        }
         Remark::SyncsOmittedWhileDown(count) => format!("{count} SYNC omitted: the interface was down"),
         Remark::SyncsOmittedTooSlow(count) => format!("{count} SYNC omitted: the program was stopped or too slow"),
         Remark::SmallReceiveBuffer(buffer) => format!("frames were dropped: {}", buffer_text(*buffer)),

@@ -92,7 +92,7 @@ fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
         }) => {
             let message = format!("it has no autozero of channel {} (no {object})", signal.channel);
             let failure = Failure::of_node(Kind::Refused, node, message);
-            return Err(Failure { abort: Some(code), object: Some(object), ..failure });
+            return Err(failure.of_object(object).with_abort(Some(code)));
         }
         // Write-only, as it should be.
         Ok(_) | Err(SdoError { failure: SdoFailure::Refused(_), .. }) => {}

@@ -208,7 +208,7 @@ fn rates_and_modes_that_the_interface_has_not() {
 
     let mut deaf = Wire { listens: false, ..Wire::at(100_000) };
     let failure = run(&mut deaf, false).unwrap_err();
-    assert_eq!((failure.kind, failure.message.as_str()), (Kind::Bus, "can9 cannot only listen"));
+    assert_eq!((failure.kind(), failure.to_string().as_str()), (Kind::Bus, "can9 cannot only listen"));
     assert_eq!(deaf.log, ["back"]);
     assert_eq!(run(&mut deaf, true).unwrap().found, Some((100_000, By::Frames)));
 }
@@ -218,8 +218,9 @@ fn without_the_right_nothing_is_touched() {
     let refusal: fn() -> BusError = || BusError::Permission("set the bit rate of can9".into());
     let mut wire = Wire { refusal: Some(refusal), ..Wire::at(100_000) };
     let failure = run(&mut wire, true).unwrap_err();
-    assert_eq!(failure.message, "no permission to set the bit rate of can9");
-    assert_eq!(failure.hint.as_deref(), Some("by hand: sudo cangauge bus detect can9"));
+    assert_eq!(failure.to_string(), "no permission to set the bit rate of can9");
+    let hint = crate::tasks::Effect::Hint("by hand: sudo cangauge bus detect can9".to_owned());
+    assert_eq!(failure.effects, [hint]);
     assert!(wire.log.is_empty());
 }
 
@@ -229,7 +230,7 @@ fn interrupted_at_any_moment_it_is_put_back() {
     for millis in (0..27_000).step_by(1900) {
         let mut wire = Wire { heartbeat: false, answers: false, ..Wire::at(83_333) };
         wire.interrupt = Some(Mono::at(Duration::from_millis(millis)));
-        assert_eq!(run(&mut wire, true).unwrap_err().kind, Kind::Interrupted, "{millis} ms");
+        assert_eq!(run(&mut wire, true).unwrap_err().kind(), Kind::Interrupted, "{millis} ms");
         assert_eq!(wire.log.last().map(String::as_str), Some("back"));
         assert_eq!(wire.log.iter().filter(|line| *line == "back").count(), 1);
     }

@@ -7,6 +7,7 @@
 mod assign;
 mod cob_ids;
 mod confirm;
+mod failure;
 mod find;
 mod objects;
 mod only;
@@ -17,6 +18,8 @@ mod session;
 mod single;
 mod subject;
 mod ways;
+
+pub use failure::LssFailure;
 
 pub use assign::{Job, Report, assign};
 pub use cob_ids::{CobIds, Stale};

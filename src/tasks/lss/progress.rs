@@ -74,12 +74,11 @@ impl Done {
 
     /// The failure together with what has been done, and how to go on.
     pub(super) fn explain(&self, failure: Failure, subject: &Subject) -> Failure {
-        let Failure { message, hint, .. } = &failure;
         if self.is_untouched() {
-            let rest = if message.ends_with("nothing was changed") { "" } else { ": nothing was changed" };
-            return Failure { message: format!("{message}{rest}"), ..failure };
+            let is_told = failure.to_string().ends_with("nothing was changed");
+            return if is_told { failure } else { failure.and("nothing was changed") };
         }
-        let way_on = match (self.stored, failure.kind) {
+        let way_on = match (self.stored, failure.kind()) {
             (Stage::Done, _) => "power it off and on, and see what it has become: cangauge scan".to_owned(),
             (Stage::Sent, _) => format!(
                 "whether it lasts shows only after power off and on: cangauge scan; or do it again: cangauge lss store {}",
@@ -90,8 +89,8 @@ impl Done {
             }
             _ => "power off and on undoes what is not stored; then do it again".to_owned(),
         };
-        let hint =
-            Some(hint.clone().filter(|_| self.stored == Stage::No && failure.kind == Kind::Refused).unwrap_or(way_on));
-        Failure { message: format!("{message}; {}", self.spoken()), hint, ..failure }
+        let has_hint = self.stored == Stage::No && failure.kind() == Kind::Refused;
+        let failure = failure.and(self.spoken());
+        if has_hint { failure } else { failure.hint(way_on) }
     }
 }

@@ -176,16 +176,14 @@ impl<'a> Retiming<'a> {
         if master.bus().bit_rate() != Some(self.old)
             && let Err(error) = set(master, self.old)
         {
-            let message =
-                format!("{}; and this side could not be set back to {old}: {}", failure.message, error.message);
-            return Failure { message, ..failure }.hint(by_hand(master.bus().name(), Some(self.old)));
+            let failure = failure.and(format!("this side could not be set back to {old}: {error}"));
+            return failure.hint(by_hand(master.bus().name(), Some(self.old)));
         }
         // Until then it may be at the old rate and on its way to the new one. A second Ctrl-C ends the waiting.
         let _ = wait(master, begun + DELAY * 2 + MARGIN);
         if !matches!(is_there(master, subject, subject.node), Ok(true)) {
-            let message = format!("{}; this side is back at {old}", failure.message);
             let hint = format!("nothing was stored: power off and on brings the device back to {old}");
-            return Failure { message, ..failure }.hint(hint);
+            return failure.and(format!("this side is back at {old}")).hint(hint);
         }
         // It has stayed. What waits in it would come with the next reset.
         let description = subject.model.as_ref().map(|model| &model.description);
@@ -200,8 +198,8 @@ impl<'a> Retiming<'a> {
         if let (true, Some((_, stage))) = (undone, &mut done.rate) {
             *stage = Stage::Undone;
         }
-        let message = format!("{}: it answers at {old} still, and this side is back there", failure.message);
-        Failure { message, ..failure }.hint(format!("whether it has {new} at all, its manual tells"))
+        let failure = failure.and(format!("it answers at {old} still, and this side is back there"));
+        failure.hint(format!("whether it has {new} at all, its manual tells"))
     }
 
     /// The way of devices that have to store before the new rate is in force.
@@ -225,7 +223,7 @@ impl<'a> Retiming<'a> {
         }
         let back = match set(master, self.old) {
             Ok(()) => format!("this side is back at {}", spoken_rate(self.old)),
-            Err(error) => format!("this side is at {new}: {}", error.message),
+            Err(error) => format!("this side is at {new}: {error}"),
         };
         done.retimed = false;
         let message = format!("stored and reset, and it does not answer at {new}; {back}");
@@ -303,7 +301,7 @@ fn is_there(master: &mut Master<'_>, subject: &Subject, node: Option<NodeId>) ->
             Ok(true) => return Ok(true),
             Ok(false) => {}
             // Nobody acknowledges at this rate, or the interface is not up yet.
-            Err(failure) if matches!(failure.kind, Kind::Bus | Kind::NoAnswer) => {}
+            Err(failure) if matches!(failure.kind(), Kind::Bus | Kind::NoAnswer) => {}
             Err(failure) => return Err(failure),
         }
         let now = master.now();

@@ -48,9 +48,8 @@ pub(super) fn configured<T>(
     let left = lss.leave();
     let done = done?;
     left.map_err(|error| {
-        let failure = subject.lss_failure(error);
-        let message = format!("{}; the device may still be in configuration state", failure.message);
-        Failure { message, ..failure }.hint("power off and on brings it out")
+        let failure = subject.lss_failure(error).and("the device may still be in configuration state");
+        failure.hint("power off and on brings it out")
     })?;
     Ok(Session { done, booted: lss.boot_ups().keys().copied().collect(), before: None })
 }
@@ -60,10 +59,7 @@ impl Subject {
     pub(super) fn lss_failure(&self, error: LssError) -> Failure {
         match error {
             LssError::Master(error) => error.into(),
-            error => {
-                let failure = Failure::from(error);
-                Failure { message: format!("{}: {}", self.name(), failure.message), node: self.node, ..failure }
-            }
+            error => Failure { node: self.node, ..Failure::from(error) },
         }
     }
 }
@@ -138,7 +134,7 @@ pub(super) fn prepared<T>(
         entered = subject.reach != Reach::Global;
         work(lss)
     });
-    let silent = matches!(&first, Err(failure) if failure.kind == Kind::NoAnswer) && !entered;
+    let silent = matches!(&first, Err(failure) if failure.kind() == Kind::NoAnswer) && !entered;
     let (done, before) = if silent && way.retry_stopped && subject.alone {
         tell(Note::Step(format!("{}: silent; once more in STOPPED", subject.name())));
         let stopped = prepare(master, subject, Some(AssignState::Stopped))?;

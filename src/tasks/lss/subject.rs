@@ -215,7 +215,7 @@ fn told(master: &mut Master<'_>, subject: &Subject) -> Result<Result<Option<Opti
     });
     let told = match asked {
         Ok(session) => session.done,
-        Err(failure) if failure.kind == Kind::NoAnswer => return Ok(Err(failure)),
+        Err(failure) if failure.kind() == Kind::NoAnswer => return Ok(Err(failure)),
         Err(failure) => return Err(failure),
     };
     match told {

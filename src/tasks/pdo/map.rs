@@ -93,7 +93,7 @@ fn storing(master: &mut Master<'_>, instrument: &Node, number: TpdoNumber) -> Re
         return Err(failure.hint("leave --store out, and set it after every power on"));
     }
     match store::plan(master, instrument, Group::Communication) {
-        Err(failure) if failure.kind == Kind::Refused => store::plan(master, instrument, Group::All),
+        Err(failure) if failure.kind() == Kind::Refused => store::plan(master, instrument, Group::All),
         plan => plan,
     }
 }

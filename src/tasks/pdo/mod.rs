@@ -6,6 +6,7 @@
 
 mod change;
 mod device;
+mod failure;
 mod identifiers;
 mod map;
 mod mend;
@@ -16,6 +17,8 @@ mod settings;
 mod show;
 mod watch;
 mod wish;
+
+pub use failure::PdoFailure;
 
 pub use map::{Mapped, map};
 pub use settings::Settings;

@@ -50,16 +50,20 @@ impl Change<'_, '_, '_> {
         let failure = |kind| Failure::of_node(kind, node, &message);
         match trouble {
             Trouble::Refused(error) => {
-                let Failure { object, abort, .. } = Failure::from(error.clone());
-                let hint = match abort {
+                let cause = Failure::from(error.clone());
+                let hint = match cause.abort() {
                     Some(AbortCode::NOT_MAPPABLE) => self.mappable(),
                     _ => None,
                 };
-                Failure { object, abort, hint, ..failure(Kind::Refused) }
+                let failure = Failure { object: cause.object, ..failure(Kind::Refused) }.with_abort(cause.abort());
+                match hint {
+                    Some(hint) => failure.hint(hint),
+                    None => failure,
+                }
             }
             Trouble::Lost(error) => {
-                let Failure { kind, object, .. } = Failure::from(error.clone());
-                Failure { object, ..failure(kind) }
+                let cause = Failure::from(error.clone());
+                Failure { object: cause.object, ..failure(cause.kind()) }
             }
             Trouble::Restarted => failure(Kind::Unexpected),
             Trouble::Stopped(Error::Interrupted) => failure(Kind::Interrupted),

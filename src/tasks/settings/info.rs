@@ -134,7 +134,7 @@ pub fn read(master: &mut Master<'_>, device: &Device) -> Result<Info, Failure> {
     let errors = match read_errors(master, device) {
         Ok(errors) => Some(errors),
         // It has neither register nor history.
-        Err(failure) if failure.object.is_none() && failure.kind == crate::tasks::Kind::Unexpected => None,
+        Err(failure) if failure.object.is_none() && failure.kind() == crate::tasks::Kind::Unexpected => None,
         Err(failure) => return Err(failure),
     };
     let state = state(master, device, &values)?;
@@ -240,7 +240,7 @@ fn samples(master: &mut Master<'_>, device: &Device) -> Result<Vec<Option<Sample
         samples.push(match sample(&target, value, status) {
             Ok(sample) => Some(sample),
             Err(error) => match Failure::from(error) {
-                failure if failure.kind == crate::tasks::Kind::NoAnswer => return Err(failure),
+                failure if failure.kind() == crate::tasks::Kind::NoAnswer => return Err(failure),
                 _ => None,
             },
         });

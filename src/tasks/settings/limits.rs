@@ -122,11 +122,11 @@ pub fn set(master: &mut Master<'_>, device: &Device, signal: &str, wanted: &[(Li
     }
     for (at, (_, _, object, bytes, _)) in writes.iter().enumerate() {
         let Err(failure) = device.set(master, *object, bytes) else { continue };
-        if failure.kind == Kind::NoAnswer || failure.kind == Kind::Bus || failure.kind == Kind::Interrupted {
+        if failure.kind() == Kind::NoAnswer || failure.kind() == Kind::Bus || failure.kind() == Kind::Interrupted {
             return Err(failure.hint(format!("what stands now: cangauge limits {} {signal}", device.node())));
         }
         // The one that acknowledged and keeps something else is put back too.
-        let done = if failure.kind == Kind::Unexpected { at + 1 } else { at };
+        let done = if failure.kind() == Kind::Unexpected { at + 1 } else { at };
         let mut back = true;
         for (_, _, object, _, undo) in writes.iter().take(done).rev() {
             back &= !undo.is_empty() && device.set(master, *object, undo).is_ok();

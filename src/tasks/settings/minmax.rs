@@ -82,7 +82,7 @@ pub fn reset(master: &mut Master<'_>, device: &Device) -> Result<Vec<MinMax>, Fa
         };
         let sent = device.write(master, object, b"zero");
         match sent {
-            Err(failure) if failure.kind != Kind::NoAnswer => return Err(failure),
+            Err(failure) if failure.kind() != Kind::NoAnswer => return Err(failure),
             _ => {}
         }
         let objects = ["minimum-pv", "maximum-pv"].map(|name| device.of_signal(signal, name).unwrap_or(object));

@@ -2,12 +2,15 @@
 //! of them on one page.
 
 pub mod errors;
+mod failure;
 pub mod filter;
 pub mod info;
 pub mod limits;
 pub mod minmax;
 mod page;
 pub mod unit;
+
+pub use failure::SettingsFailure;
 
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;

@@ -1,6 +1,7 @@
 //! The kind of a failure is its real cause.
 
 use super::*;
+use cangauge::output::failure::ErrorMessage;
 
 /// The kind of a failure is its real cause.
 pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
@@ -8,33 +9,33 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     if run.bus.overran {
         return;
     }
-    let told = || format!("{:?}: {failure} (hint: {:?})", failure.kind, failure.hint);
+    let told = || format!("{:?}: {failure} (hint: {:?})", failure.kind(), ErrorMessage::of(&failure).hint);
     let tap = &run.bus;
     if tap.interrupted.is_some() && !tap.was_down && !tap.was_off {
         // What went wrong before the interruption may be the reason.
         let was_full = spec.faults.iter().any(|fault| matches!(fault, Fault::Full { .. } | Fault::BusOff { .. }));
-        if failure.kind == Kind::Bus && !was_full {
+        if failure.kind() == Kind::Bus && !was_full {
             broken.push(("names the cause", format!("interrupted: {}", told())));
         }
         let quiet = spec.faults.is_empty() && spec.others.is_empty() && spec.vagaries().next().is_none();
         // A recording may have ended for want of rows before that, and was putting back what it had started.
         let in_time = tap.interrupted < tap.frames.last().map(|(at, _)| *at) || !records(spec);
-        if quiet && failure.kind == Kind::NoAnswer && all_there(spec) && in_time {
+        if quiet && failure.kind() == Kind::NoAnswer && all_there(spec) && in_time {
             broken.push(("names the cause", format!("interrupted: {}", told())));
         }
         return;
     }
-    if failure.kind == Kind::Interrupted && tap.interrupted.is_none() {
+    if failure.kind() == Kind::Interrupted && tap.interrupted.is_none() {
         broken.push(("names the cause", format!("nobody interrupted: {}", told())));
     }
-    if tap.was_down && tap.interrupted.is_none() && !records(spec) && failure.kind != Kind::Bus {
+    if tap.was_down && tap.interrupted.is_none() && !records(spec) && failure.kind() != Kind::Bus {
         // It may have failed before.
         let down_at = spec.faults.iter().filter_map(|fault| match fault {
             Fault::Down { at_us, .. } => Some(*at_us),
             _ => None,
         });
         if down_at.min() == Some(0)
-            || spec.faults.len() == 1 && !matches!(failure.kind, Kind::Usage | Kind::Refused) && quiet(spec)
+            || spec.faults.len() == 1 && !matches!(failure.kind(), Kind::Usage | Kind::Refused) && quiet(spec)
         {
             broken.push(("names the cause", format!("the interface was down: {}", told())));
         }
@@ -43,7 +44,7 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
         .faults
         .iter()
         .all(|fault| !matches!(fault, Fault::Down { .. } | Fault::BusOff { .. } | Fault::Full { .. }));
-    if failure.kind == Kind::Bus && bus_is_well && spec.devices.iter().all(|device| device.bit_rate.is_none()) {
+    if failure.kind() == Kind::Bus && bus_is_well && spec.devices.iter().all(|device| device.bit_rate.is_none()) {
         let sharing = spec.shares_node_ids() || !spec.others.is_empty();
         let answered = run.bus.frames.iter().any(|(_, passed)| matches!(passed, Passed::Received(_)));
         // A device that has gone to another bit rate acknowledges nothing any more.
@@ -63,13 +64,13 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
         return;
     }
     // Nothing is wrong: who is there answers, and breaks no rule.
-    if failure.kind == Kind::NoAnswer && all_there(spec) && !may_be_silent(spec) {
+    if failure.kind() == Kind::NoAnswer && all_there(spec) && !may_be_silent(spec) {
         broken.push(("names the cause", format!("everybody answers: {}", told())));
     }
-    if failure.kind == Kind::Unexpected && !may_be_odd(spec, &failure.message) {
+    if failure.kind() == Kind::Unexpected && !may_be_odd(spec, &ErrorMessage::of(&failure).message) {
         broken.push(("names the cause", format!("nothing is odd: {}", told())));
     }
-    if failure.kind == Kind::Refused
+    if failure.kind() == Kind::Refused
         && matches!(spec.command, Command::Scan { .. } | Command::Info { .. } | Command::Nmt { .. })
     {
         broken.push(("names the cause", format!("nobody refuses: {}", told())));

@@ -3,6 +3,7 @@
 use super::*;
 use cangauge::canopen::value::DataType;
 use cangauge::measure::expression::verdict::{Outcome, Verdict};
+use cangauge::output::failure::ErrorMessage;
 
 /// Every ruling follows from the rows, or from what the devices answered; and the end from the rulings.
 pub(super) fn checks(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
@@ -15,10 +16,10 @@ pub(super) fn checks(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
     let right = match &run.result {
         Ok(_) => complete && count(Outcome::Ok) == verdicts.len(),
         // Nodes that seem to listen to different SYNC identifiers are not measured.
-        Err(failure) if failure.kind == Kind::CheckFailed && spec.lies() && verdicts.is_empty() => {
-            failure.message.contains("(1005h)")
+        Err(failure) if failure.kind() == Kind::CheckFailed && spec.lies() && verdicts.is_empty() => {
+            ErrorMessage::of(&failure).message.contains("(1005h)")
         }
-        Err(failure) if failure.kind == Kind::CheckFailed => count(Outcome::Fail) > 0,
+        Err(failure) if failure.kind() == Kind::CheckFailed => count(Outcome::Fail) > 0,
         Err(_) => count(Outcome::Fail) == 0,
     };
     if !right {

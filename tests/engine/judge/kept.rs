@@ -4,6 +4,7 @@ use super::claims::{mapped_otherwise, number};
 use super::*;
 use crate::bench::Holds;
 use crate::kinds::model;
+use cangauge::output::failure::ErrorMessage;
 
 /// What was stored is still there after power off and on; what was not changed is as it was.
 pub(super) fn after_power(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) {
@@ -41,7 +42,7 @@ pub(super) fn after_power(spec: &Spec, run: &mut Run, broken: &mut Vec<Broken>) 
         Ok(Said::Stored) if !spec.lies() && !spec.is_meddled_with() && !spec.shares_node_ids() => {
             heartbeat_kept(spec, bus, settled, broken);
         }
-        Err(failure) if failure.message.contains("nothing was changed") && !spec.lies() => {
+        Err(failure) if ErrorMessage::of(&failure).message.contains("nothing was changed") && !spec.lies() => {
             // What another program left configured comes into force with power.
             let own = |holds: &Holds| (holds.stored, holds.node.filter(|_| run.killed.is_none()));
             let before = run.before.iter().map(own);

@@ -33,11 +33,11 @@ pub(super) fn killed(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     let at_once = spec.command.is_lss() && (again_ms < 100 || spec.retries == 0) || moves_data && again_ms < 2000;
     // Whether anything comes while it is listened for is not the program's doing.
     let listens = matches!(spec.command, Command::PdoWatch { .. } | Command::Log { .. } | Command::Check { .. });
-    let may_fail = |failure: &Failure| at_once || listens && failure.kind == Kind::NoAnswer;
+    let may_fail = |failure: &Failure| at_once || listens && failure.kind() == Kind::NoAnswer;
     if let Err(failure) = &run.result
         && !may_fail(failure)
         && self::run(&whole).result.is_ok()
     {
-        broken.push(("comes to its end after a kill", format!("{:?}: {failure}", failure.kind)));
+        broken.push(("comes to its end after a kill", format!("{:?}: {failure}", failure.kind())));
     }
 }

@@ -3,6 +3,7 @@
 use super::*;
 use cangauge::bus::BitRateControl;
 use cangauge::bus::memory::BIT_RATE;
+use cangauge::output::failure::ErrorMessage;
 
 /// What was switched on the way is put back.
 pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[Holds], broken: &mut Vec<Broken>) {
@@ -51,7 +52,7 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[Holds], broken: &mut
             {
                 let remarks = match &run.result {
                     Ok(said) => format!("{said:?}"),
-                    Err(failure) => failure.message.clone(),
+                    Err(failure) => ErrorMessage::of(&failure).message.clone(),
                 };
                 if !remarks.contains("StatesNotRestored")
                     && !remarks.contains("LeftOperational")

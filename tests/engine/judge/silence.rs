@@ -2,25 +2,28 @@
 
 use super::*;
 use cangauge::canopen::frame::Frame;
+use cangauge::output::failure::ErrorMessage;
 use cangauge::tasks::Failure;
 use std::time::Duration;
 
 /// Judges the cause that a failure names by the frames of the command.
 pub(super) fn told_causes(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     let Err(failure) = &run.result else { return };
-    match failure.kind {
+    match failure.kind() {
         Kind::NoAnswer if !spec.lies() && !spec.shares_node_ids() => was_silent(spec, run, failure, broken),
         // What cannot be done at all is not even asked for.
-        Kind::Refused if failure.message.contains("refused by the device") => was_refused(run, failure, broken),
+        Kind::Refused if ErrorMessage::of(&failure).message.contains("refused by the device") => {
+            was_refused(run, failure, broken)
+        }
         _ => {}
     }
-    let stopped = failure.kind == Kind::CheckFailed && !matches!(spec.command, Command::Check { .. });
+    let stopped = failure.kind() == Kind::CheckFailed && !matches!(spec.command, Command::Check { .. });
     // What was configured and is configured as before is nothing; power shows the rest.
     let undoes = matches!(spec.command, Command::Assign { .. });
     if undoes {
         return;
     }
-    if stopped || failure.kind == Kind::Usage || failure.message.contains("nothing was changed") {
+    if stopped || failure.kind() == Kind::Usage || ErrorMessage::of(&failure).message.contains("nothing was changed") {
         let changes = (0..run.bus.frames.len()).find_map(|place| taken(&run.bus.frames[place..]));
         if let Some((at, frame)) = changes {
             broken.push(("says what was changed", format!("{failure}, and {frame} at {:?}", at.since_start())));
@@ -68,10 +71,10 @@ fn begins(frame: &Frame) -> Option<ObjectId> {
 /// Something was asked to which nothing came, if that is what is said.
 fn was_silent(spec: &Spec, run: &Run, failure: &Failure, broken: &mut Vec<Broken>) {
     let (Some(node), Some(object)) = (failure.node, failure.object) else { return };
-    if failure.message.contains("in the middle") {
+    if ErrorMessage::of(&failure).message.contains("in the middle") {
         return;
     }
-    let writes = failure.message.contains(&format!("write {object}"));
+    let writes = ErrorMessage::of(&failure).message.contains(&format!("write {object}"));
     let asks = |frame: &Frame| {
         let writing = frame.data().first().is_some_and(|first| matches!(first >> 5, 1 | 6));
         let begun = begins(frame).filter(|_| frame.id() == CanId::sdo_request(node));
@@ -112,7 +115,7 @@ fn is_full(fault: &Fault) -> bool {
 
 /// Somebody said no, if that is what is said.
 fn was_refused(run: &Run, failure: &Failure, broken: &mut Vec<Broken>) {
-    let refuses = |frame: &Frame| match (failure.abort, failure.node, frame.data()) {
+    let refuses = |frame: &Frame| match (failure.abort(), failure.node, frame.data()) {
         (Some(code), Some(node), [0x80, rest @ ..]) => {
             // What a frame that was cut short does not say counts as zero.
             let said = rest.get(3..).unwrap_or_default();
@@ -124,6 +127,6 @@ fn was_refused(run: &Run, failure: &Failure, broken: &mut Vec<Broken>) {
     };
     let came = run.bus.frames.iter().any(|(_, passed)| matches!(passed, Passed::Received(frame) if refuses(frame)));
     if !came {
-        broken.push(("names the cause", format!("nobody refused: {failure} {:?}", failure.abort)));
+        broken.push(("names the cause", format!("nobody refused: {failure} {:?}", failure.abort())));
     }
 }

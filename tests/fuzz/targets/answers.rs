@@ -2,6 +2,7 @@
 //! nothing, and what is printed of it steers no terminal.
 #![no_main]
 
+use cangauge::output::failure::ErrorMessage;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
@@ -99,8 +100,8 @@ fuzz_target!(|data: &[u8]| {
             info_json::object(&mut text, &page).expect("memory");
         }
         Err(failure) => {
-            assert_eq!(failure.node, Some(node()), "{}", failure.message);
-            json::failure(&mut text, &failure, 1).expect("memory");
+            assert_eq!(failure.node, Some(node()), "{}", ErrorMessage::of(&failure).message);
+            ErrorMessage::of(&failure).json(&mut text, 1).expect("memory");
         }
     }
     assert_harmless(&text);

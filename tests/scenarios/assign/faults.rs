@@ -4,6 +4,7 @@ use super::{Held, Wanted, all_held, bus, id, run};
 use cangauge::bus::memory::{Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
+use cangauge::output::failure::ErrorMessage;
 use cangauge::tasks::Kind;
 use cangauge::tasks::lss::{Rate, Via};
 
@@ -53,10 +54,10 @@ fn whatever_goes_wrong_with_one_service() {
                 let after = all_held(&bus);
                 check(&before, &after, done.result.is_ok(), 12);
                 if let Err(failure) = &done.result {
-                    let says_all = failure.kind == Kind::Refused;
-                    assert!(says_all || failure.hint.is_some(), "{kind}{fault}: {failure}");
+                    let says_all = failure.kind() == Kind::Refused;
+                    assert!(says_all || ErrorMessage::of(&failure).hint.is_some(), "{kind}{fault}: {failure}");
                     // What says that nothing was changed is right even after a reset.
-                    if failure.message.contains("nothing was changed") {
+                    if ErrorMessage::of(&failure).message.contains("nothing was changed") {
                         bus.power_cycle();
                         assert_eq!(all_held(&bus)[0], before[0], "{kind}{fault}: {failure}");
                     }
@@ -79,7 +80,7 @@ fn storing_refused_is_put_back_and_no_success() {
     assert_eq!(done.failure().0, Kind::Refused);
     assert!(done.failure().1.contains("storing not supported"), "{}", done.failure().1);
     assert!(done.failure().1.contains("nothing was changed"), "{}", done.failure().1);
-    assert!(done.result.unwrap_err().hint.unwrap().contains("--via sdo"));
+    assert!(ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap().contains("--via sdo"));
     assert_eq!(all_held(&bus), before);
     // What waited in it waits no longer: a reset leaves it where it is.
     let mut master = cangauge::master::Master::new(&mut bus, cangauge::master::Timing::default());
@@ -107,7 +108,7 @@ fn one_that_does_not_come_back() {
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::NoAnswer);
     assert!(done.failure().1.contains("node-ID 12 configured, stored"), "{}", done.failure().1);
-    let hint = done.result.unwrap_err().hint.unwrap();
+    let hint = ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap();
     assert!(hint.contains("power it off and on"), "{hint}");
 }
 

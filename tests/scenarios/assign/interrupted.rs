@@ -5,6 +5,7 @@ use cangauge::bus::memory::{Outbox, Station};
 use cangauge::bus::{BitRateControl, Bus, Mono};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::CanId;
+use cangauge::output::failure::ErrorMessage;
 use cangauge::tasks::Kind;
 use cangauge::tasks::lss::{Rate, Via};
 use std::collections::BTreeSet;
@@ -75,13 +76,16 @@ fn at_every_step(bench: &str, target: &str, wanted: &Wanted) {
         match &done.result {
             Ok(_) => {}
             Err(failure) => {
-                assert_eq!(failure.kind, Kind::Interrupted, "{moment:?}: {failure}");
+                assert_eq!(failure.kind(), Kind::Interrupted, "{moment:?}: {failure}");
                 interrupted += 1;
-                assert!(bus.bit_rate() == rate || failure.message.contains("configured"), "{moment:?}: {failure}");
-                if failure.message.contains("not stored") {
+                assert!(
+                    bus.bit_rate() == rate || ErrorMessage::of(&failure).message.contains("configured"),
+                    "{moment:?}: {failure}"
+                );
+                if ErrorMessage::of(&failure).message.contains("not stored") {
                     assert_eq!((after[0].2, after[0].3), (before[0].2, before[0].3), "{moment:?}: {failure}");
                 }
-                if failure.message.contains("nothing was changed") {
+                if ErrorMessage::of(&failure).message.contains("nothing was changed") {
                     let mut master = cangauge::master::Master::new(&mut bus, cangauge::master::Timing::default());
                     master.send("000#8105".parse().unwrap());
                     let until = master.now() + Duration::from_millis(500);

@@ -3,6 +3,7 @@
 use super::{Done, Wanted, all_held, bus, run};
 use cangauge::bus::BitRateControl;
 use cangauge::bus::memory::MemoryBus;
+use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::Device;
 use cangauge::tasks::Kind;
 use cangauge::tasks::lss::{Confirmed, Rate, Via};
@@ -60,7 +61,7 @@ fn one_that_is_gone_comes_back_with_power() {
     let done = retimed(&mut bus, "5");
     assert_eq!(done.failure().0, Kind::NoAnswer);
     assert!(done.failure().1.contains("this side is back at 250k"), "{}", done.failure().1);
-    assert!(done.result.unwrap_err().hint.unwrap().contains("power off and on"), "the way on");
+    assert!(ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap().contains("power off and on"), "the way on");
     assert_eq!(bus.bit_rate(), OLD);
     bus.power_cycle();
     assert_eq!(rates(&bus), [(OLD, OLD)]);

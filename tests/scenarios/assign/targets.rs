@@ -8,6 +8,7 @@ use cangauge::canopen::frame::Frame;
 use cangauge::device::assign::spoken_rate;
 use cangauge::master::{Master, Timing};
 use cangauge::node::Overrides;
+use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, State};
 use cangauge::tasks::Kind;
 use cangauge::tasks::lss::{Confirmed, Job, Rate, Target, Via, assign, store};
@@ -139,7 +140,7 @@ fn two_devices_with_one_node_id() {
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::CheckFailed);
     assert!(done.failure().1.contains("more than one device has this node-ID"), "{}", done.failure().1);
-    assert!(done.result.unwrap_err().hint.unwrap().contains("VENDOR:PRODUCT:REVISION:SERIAL"));
+    assert!(ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap().contains("VENDOR:PRODUCT:REVISION:SERIAL"));
     assert_eq!(all_held(&bus), before);
     // By its identity one of them takes it; nobody is reset, and it is no success yet.
     let done = run(&mut bus, "0x362:0x443150:0x10000:200", &id(12));
@@ -243,8 +244,8 @@ fn a_store_that_is_forced_takes_the_yes_of_several() {
     let overrides = Overrides::new();
     let mut master = Master::new(&mut bus, Timing::default());
     let mut stored = |force| store(&mut master, &Target::Only, (&overrides, None), force, &mut |_| {});
-    assert_eq!(stored(false).expect_err("two are there").kind, Kind::CheckFailed);
-    assert_eq!(stored(true), Ok(()));
+    assert_eq!(stored(false).expect_err("two are there").kind(), Kind::CheckFailed);
+    stored(true).unwrap();
 }
 
 #[test]
@@ -376,7 +377,7 @@ fn a_bit_rate_that_the_device_does_not_have_is_refused_with_the_list() {
     ] {
         let done = run(&mut bus, target, &Wanted { rate: Some(rate), ..Wanted::default() });
         assert_eq!(done.failure().0, Kind::Usage);
-        let hint = done.result.unwrap_err().hint.unwrap();
+        let hint = ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap();
         assert!(hint.contains(list), "{hint}");
     }
     assert_eq!(all_held(&bus), before);

@@ -104,7 +104,7 @@ fn what_the_slave_says_is_what_it_said() {
         slave.says.insert(0x17, said.to_vec());
         let result = run(&mut bus_of([slave]), |lss| assign(lss, ONE, node(12)));
         assert_eq!(result.as_ref().err().map(ToString::to_string).unwrap_or_default(), expected);
-        assert_eq!(result.err().map(|error| Failure::from(error).kind), kind, "{said:X?}");
+        assert_eq!(result.err().map(|error| Failure::from(error).kind()), kind, "{said:X?}");
     }
     let code = ErrorCode { code: 1, specific: 0 };
     let mut slave = Slave::new(ONE, 5);

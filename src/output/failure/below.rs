@@ -1,0 +1,94 @@
+//! Text for causes from the layers below the tasks: bus, SDO, LSS, expressions.
+
+use super::{Place, Words};
+use crate::canopen::lss::Service;
+use crate::tasks::failure::{BusError, ExpressionError, LssError, SdoError, SdoFailure};
+
+/// The bus failed.
+pub(super) fn bus(error: &BusError) -> Words {
+    let words = Words::new(error.to_string());
+    match error {
+        BusError::QueueFull => words.hint(
+            "no node acknowledges the frames: check the sensor's power, the bit rate, the wiring and the 120 ohm \
+             terminators; or the bus is overloaded: candump shows the traffic",
+        ),
+        BusError::Down(name) => words.hint(format!(
+            "bring it up: sudo ip link set {name} up type can bitrate 250000 (use the sensors' bit rate)"
+        )),
+        BusError::NoInterface(_) | BusError::NotCan(_) => {
+            words.hint("list the interfaces: cangauge bus list; without hardware: --bus sim")
+        }
+        BusError::ReceiveOnly(_) => words.hint("commands that only listen work on it: log, scan --passive, nmt watch"),
+        BusError::Unsupported(_) => words.hint("without it: --bus sim"),
+        _ => words,
+    }
+}
+
+/// An SDO transfer failed.
+pub(super) fn sdo(error: &SdoError) -> Words {
+    let words = Words::new(error.to_string());
+    match error.failure {
+        SdoFailure::NoAnswer { begun: false, .. } => words.hint("list the nodes that answer: cangauge scan"),
+        SdoFailure::Fit(_) => {
+            words.hint(format!("show its bytes: cangauge sdo read {} {} --type hex", error.node, error.object))
+        }
+        SdoFailure::Disturbed => words.hint("stop the other program for a moment, or try again"),
+        SdoFailure::NoAnswer { .. }
+        | SdoFailure::Refused(_)
+        | SdoFailure::Violation(..)
+        | SdoFailure::NotANumber
+        | SdoFailure::Ambiguous
+        | SdoFailure::Cancelled => words,
+    }
+}
+
+/// An LSS service failed.
+pub(super) fn lss(error: &LssError) -> Words {
+    let words = Words::new(error.to_string());
+    let hint = match error {
+        LssError::Refused { service, .. } => refusal_hint(*service),
+        LssError::NoAnswer { service, .. } => silence_hint(*service),
+        LssError::Several { .. } => Some(
+            "address one device, by its node-ID or as VENDOR:PRODUCT:REVISION:SERIAL, or connect it as the only device",
+        ),
+        LssError::Disturbed(_) => Some("stop the other program, or try again"),
+        LssError::Fastscan(_) | LssError::Mistaken { .. } => {
+            Some("connect the devices without a node-ID one at a time")
+        }
+        LssError::Violation { .. } | LssError::Master(_) => None,
+    };
+    match hint {
+        Some(hint) => words.hint(hint),
+        None => words,
+    }
+}
+
+fn refusal_hint(service: Service) -> Option<&'static str> {
+    match service {
+        Service::ConfigureBitTiming => {
+            Some("find the device's own table of bit rates in its manual, then use --table-index N")
+        }
+        Service::Store => Some("some devices store it through objects: --via sdo"),
+        _ => None,
+    }
+}
+
+fn silence_hint(service: Service) -> Option<&'static str> {
+    match service {
+        Service::SwitchSelective => Some(
+            "no slave has this address, or it accepts no LSS in its present state: list the slaves with \
+             cangauge lss scan, or stop the node first: cangauge nmt stop NODE",
+        ),
+        Service::Store => Some("it is unknown whether the device stored: power it off and on, then read it again"),
+        Service::Inquire(_) | Service::InquireNodeId => {
+            Some("not every device has this service; read its identity by SDO: cangauge scan")
+        }
+        _ => None,
+    }
+}
+
+/// An expression is wrong.
+pub(super) fn expression(error: &ExpressionError) -> Words {
+    let place = Place { before: error.before().to_owned(), text: error.text.clone() };
+    Words { message: error.message.clone(), hint: error.hint.clone(), place: Some(place) }
+}

@@ -1,0 +1,235 @@
+//! Text for failures: a message in one line, and a hint if something can be done.
+//!
+//! Each area of `tasks` has one file here. A message says what happened and what it means; a hint is a command to
+//! type or one thing to check.
+
+mod autozero;
+mod below;
+mod check;
+mod detect;
+mod log;
+mod lss;
+mod nmt;
+mod node;
+mod pdo;
+mod read;
+mod scan;
+mod sdo;
+mod settings;
+mod store;
+
+use super::json;
+use super::notes::{Told, effect};
+use crate::canopen::id::NodeId;
+use crate::tasks::failure::Cause;
+use crate::tasks::{Effect, Failure, Kind};
+use serde::Serialize;
+use std::fmt;
+use std::io::{self, Write};
+
+/// What is printed for a failure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ErrorMessage {
+    /// The kind, which decides the exit code.
+    pub kind: Kind,
+    /// The node that it concerns.
+    pub node: Option<NodeId>,
+    /// The object that was read or written.
+    pub object: Option<String>,
+    /// The abort code, if the device rejected an SDO request.
+    pub abort: Option<String>,
+    /// One line: the node, what happened, and the effects.
+    pub message: String,
+    /// A command to type, or one thing to check.
+    pub hint: Option<String>,
+    /// The place in the text that the user typed.
+    pub place: Option<Place>,
+    /// What was changed before, and what state was left behind.
+    pub effects: Vec<Told>,
+}
+
+/// A character in a text that the user typed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The whole text.
+    pub text: String,
+    /// The part before the character.
+    pub before: String,
+}
+
+impl Place {
+    /// The column of the character, counted from 1.
+    pub fn column(&self) -> usize {
+        self.before.chars().count() + 1
+    }
+}
+
+/// The text for a cause, without the node in front.
+#[derive(Clone, Debug, Default)]
+struct Words {
+    message: String,
+    hint: Option<String>,
+    place: Option<Place>,
+}
+
+impl Words {
+    fn new(message: impl Into<String>) -> Words {
+        Words { message: message.into(), ..Words::default() }
+    }
+
+    fn hint(mut self, hint: impl Into<String>) -> Words {
+        self.hint = Some(hint.into());
+        self
+    }
+}
+
+impl ErrorMessage {
+    /// What is printed for a failure of a task.
+    pub fn of(failure: &Failure) -> ErrorMessage {
+        failure.into()
+    }
+
+    /// An error that no task reports: wrong arguments, a local file.
+    pub fn new(kind: Kind, message: impl Into<String>) -> ErrorMessage {
+        ErrorMessage {
+            kind,
+            node: None,
+            object: None,
+            abort: None,
+            message: message.into(),
+            hint: None,
+            place: None,
+            effects: Vec::new(),
+        }
+    }
+
+    /// Wrong arguments.
+    pub fn usage(message: impl Into<String>) -> ErrorMessage {
+        ErrorMessage::new(Kind::Usage, message)
+    }
+
+    /// The same error with a hint.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Into<String>) -> ErrorMessage {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    /// Writes the error as one JSON object on one line. `exit` is the exit code of its kind.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn json(&self, out: &mut dyn Write, exit: u8) -> io::Result<()> {
+        #[derive(Serialize)]
+        struct Object<'a> {
+            error: Fields<'a>,
+        }
+        #[derive(Serialize)]
+        struct Fields<'a> {
+            kind: &'a str,
+            exit: u8,
+            message: &'a str,
+            node: Option<u8>,
+            object: Option<&'a str>,
+            abort: Option<&'a str>,
+            hint: Option<&'a str>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            column: Option<usize>,
+            #[serde(skip_serializing_if = "<[Told]>::is_empty")]
+            effects: &'a [Told],
+        }
+        let error = Fields {
+            kind: kind_name(self.kind),
+            exit,
+            message: &self.message,
+            node: self.node.map(NodeId::get),
+            object: self.object.as_deref(),
+            abort: self.abort.as_deref(),
+            hint: self.hint.as_deref(),
+            column: self.place.as_ref().map(Place::column),
+            effects: &self.effects,
+        };
+        json::line(out, &Object { error })
+    }
+}
+
+impl fmt::Display for ErrorMessage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for ErrorMessage {}
+
+/// The name of a kind in JSON, as the contract lists it.
+pub fn kind_name(kind: Kind) -> &'static str {
+    match kind {
+        Kind::CheckFailed => "check-failed",
+        Kind::Usage => "usage",
+        Kind::NoAnswer => "no-answer",
+        Kind::Refused => "refused",
+        Kind::Bus => "bus",
+        Kind::Unexpected => "unexpected",
+        Kind::Partial => "partial",
+        Kind::Io => "io",
+        Kind::Interrupted => "interrupted",
+    }
+}
+
+impl From<&Failure> for ErrorMessage {
+    fn from(failure: &Failure) -> ErrorMessage {
+        let words = words(failure);
+        let mut message = words.message;
+        let mut hint = words.hint;
+        let mut effects = Vec::new();
+        for item in &failure.effects {
+            if let Effect::Hint(text) = item {
+                hint = Some(text.clone());
+                continue;
+            }
+            let told = effect(failure.node, item);
+            message = format!("{message}; {}", told.message);
+            // A command that undoes an effect or finishes the job is better than the general hint of the cause.
+            hint = told.hint().or(hint);
+            effects.push(told);
+        }
+        // Text of tasks without typed causes may already begin with its node.
+        if let Some(node) = failure.node.filter(|_| !message.starts_with("node")) {
+            message = format!("node {node}: {message}");
+        }
+        ErrorMessage {
+            kind: failure.kind(),
+            node: failure.node,
+            object: failure.object.map(|object| object.to_string()),
+            abort: failure.abort().map(|code| format!("0x{:08X}", code.0)),
+            message,
+            hint,
+            place: words.place,
+            effects,
+        }
+    }
+}
+
+fn words(failure: &Failure) -> Words {
+    match &failure.cause {
+        Cause::Bus(error) => below::bus(error),
+        Cause::Sdo(error) => below::sdo(error),
+        Cause::LssService(error) => below::lss(error),
+        Cause::Node(error) => node::words(failure, error),
+        Cause::Interrupted => Words::new("interrupted"),
+        Cause::Expression(error) => below::expression(error),
+        Cause::Read(cause) => read::words(failure, cause),
+        Cause::Scan(cause) => scan::words(failure, cause),
+        Cause::Object(cause) => sdo::words(failure, cause),
+        Cause::Nmt(cause) => nmt::words(failure, cause),
+        Cause::Store(cause) => store::words(failure, cause),
+        Cause::Pdo(cause) => pdo::words(failure, cause),
+        Cause::Settings(cause) => settings::words(failure, cause),
+        Cause::Log(cause) => log::words(failure, cause),
+        Cause::Check(cause) => check::words(failure, cause),
+        Cause::Lss(cause) => lss::words(failure, cause),
+        Cause::Detect(cause) => detect::words(failure, cause),
+        Cause::Autozero(cause) => autozero::words(failure, cause),
+        Cause::Text(text) => Words::new(text.message.clone()),
+    }
+}

@@ -1,0 +1,36 @@
+//! Text for causes: reading or writing a node failed.
+
+use super::Words;
+use crate::node::Error;
+use crate::tasks::Failure;
+
+/// The message and the hint for a cause.
+pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
+    match cause {
+        // These have causes of their own, see `From<node::Error> for Failure`.
+        Error::Bus(error) => super::below::bus(error),
+        Error::Interrupted => Words::new("interrupted"),
+        Error::Sdo(error) | Error::Unknown(error) => super::below::sdo(error),
+        Error::NotKept { object, found, .. } => Words::new(format!("{object} was acknowledged and reads {found}")),
+        Error::Width { object, width, given, .. } => Words::new(format!(
+            "write {object}: the object has {width} bytes, the value {given}, and the device accepts no size"
+        )),
+        Error::Value { object, error, .. } => Words::new(format!("write {object}: {error}")),
+        Error::TypeUnknown { node, object } => Words::new(format!("write {object}: its type is unknown"))
+            .hint(format!("state it: cangauge sdo write {node} {object} VALUE --type u32 (or i16, r32, vs)")),
+        Error::Name(error) => {
+            let source = error.title.as_deref().unwrap_or("the standard");
+            let words = Words::new(format!("{source} has no object \"{}\"", error.name));
+            match error.nearest.is_empty() {
+                true => words,
+                false => words.hint(format!("nearest: {}", error.nearest.join(", "))),
+            }
+        }
+        Error::Restarted(_) => Words::new("the device restarted"),
+        Error::NoBootUp(_) => match failure.node {
+            Some(node) => Words::new("no boot-up message after the reset")
+                .hint(format!("check whether it is there: cangauge nmt state {node}; cangauge scan")),
+            None => Words::new("no boot-up message after the reset"),
+        },
+    }
+}

@@ -1,0 +1,84 @@
+//! Text for effects, notes and warnings of tasks.
+//!
+//! Each has a code for scripts, which never changes, and a message for people. Some have a command to type.
+
+use super::console::Console;
+use crate::canopen::id::NodeId;
+use crate::tasks::{Effect, Fact, Note};
+use serde::Serialize;
+
+/// An effect or a note as text, and as one object in the `effects` or `notes` of a JSON report.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Told {
+    /// The code for scripts.
+    pub code: &'static str,
+    /// One line, without the node in front.
+    pub message: String,
+    /// A command to type.
+    pub command: Option<String>,
+    /// What the command does: `undo`.
+    #[serde(skip)]
+    pub purpose: &'static str,
+}
+
+impl Told {
+    /// An effect or a note without a command.
+    pub(super) fn new(code: &'static str, message: impl Into<String>) -> Told {
+        Told { code, message: message.into(), command: None, purpose: "" }
+    }
+
+    /// The same with a command. `purpose` says what the command does: `undo`.
+    pub(super) fn command(mut self, purpose: &'static str, command: impl Into<String>) -> Told {
+        self.command = Some(command.into());
+        self.purpose = purpose;
+        self
+    }
+
+    /// The command with its purpose, as a hint: `undo: cangauge …`.
+    pub fn hint(&self) -> Option<String> {
+        self.command.as_ref().map(|command| format!("{}: {command}", self.purpose))
+    }
+}
+
+/// The text for an effect on `node`.
+pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> Told {
+    let number = node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
+    match effect {
+        Effect::NothingChanged => Told::new("nothing-changed", "nothing was changed"),
+        Effect::WasOperational => Told::new("was-operational", "the node was operational before")
+            .command("start it again", format!("cangauge nmt start {number}")),
+        Effect::Text(text) | Effect::Hint(text) => Told::new("other", text.clone()),
+    }
+}
+
+/// The text for a note.
+pub fn note(note: &Note) -> Told {
+    match &note.fact {
+        Fact::KeptUntilPowerOff => {
+            Told::new("kept-until-power-off", "not stored: the node loses the new values at power off")
+        }
+        Fact::OperationalAgain => Told::new("operational-again", "the node was operational and is operational again"),
+        Fact::LeftOperational => Told::new(
+            "left-operational",
+            "the node was started; its previous state is unknown, so it stays operational",
+        ),
+        Fact::StateAsBooted => Told::new(
+            "state-as-booted",
+            "the state before the reset is unknown; the node is in the state in which it boots",
+        ),
+    }
+}
+
+/// The notes of a report, for JSON.
+pub fn notes(notes: &[Note]) -> Vec<Told> {
+    notes.iter().map(note).collect()
+}
+
+/// Prints a note on stderr: as a warning if the user should act on it.
+pub fn print(console: &Console, note: &Note) {
+    let told = self::note(note);
+    let node = note.node.map_or_else(String::new, |node| format!("node {node}: "));
+    let hint = told.hint().map_or_else(String::new, |hint| format!("; {hint}"));
+    let line = format!("{node}{}{hint}", told.message);
+    if note.fact.is_warning() { console.warn(&line) } else { console.note(&line) }
+}

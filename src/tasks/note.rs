@@ -1,0 +1,61 @@
+//! What a task reports besides its result: effects of a failure, notes and warnings.
+//!
+//! These types contain no text for people. [`crate::output::notes`] turns them into text.
+
+use crate::canopen::id::NodeId;
+
+/// What a task that failed had changed before, or what state it left behind.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Effect {
+    /// The task had changed nothing.
+    NothingChanged,
+    /// The node was operational and may not be operational any more.
+    WasOperational,
+    /// Text of a task that has no typed effects yet.
+    Text(String),
+    /// The hint of a task that has no typed causes yet.
+    Hint(String),
+}
+
+/// Something to report that is not the result.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Note {
+    /// The node that it concerns.
+    pub node: Option<NodeId>,
+    /// What there is to report.
+    pub fact: Fact,
+}
+
+/// What there is to report.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Fact {
+    /// The node keeps the new values only until it loses power or is reset, unless they are stored.
+    KeptUntilPowerOff,
+    /// The node was operational before a reset, was started again, and is operational.
+    OperationalAgain,
+    /// The node was started, its previous state is unknown, and it stays operational.
+    LeftOperational,
+    /// The state of the node before a reset is unknown; it is in the state in which it boots.
+    StateAsBooted,
+}
+
+impl Fact {
+    /// Whether the user should act on it: printed as a warning.
+    pub fn is_warning(&self) -> bool {
+        match self {
+            Fact::KeptUntilPowerOff | Fact::OperationalAgain | Fact::LeftOperational | Fact::StateAsBooted => false,
+        }
+    }
+}
+
+impl Note {
+    /// A note about one node.
+    pub fn of_node(node: NodeId, fact: impl Into<Fact>) -> Note {
+        Note { node: Some(node), fact: fact.into() }
+    }
+
+    /// A note about no single node.
+    pub fn general(fact: impl Into<Fact>) -> Note {
+        Note { node: None, fact: fact.into() }
+    }
+}
