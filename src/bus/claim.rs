@@ -1,266 +1,125 @@
-//! Two programs that talk to one node on one bus of this machine disturb each other. Who comes first claims it;
-//! whoever comes next waits for it, or says who is in the way.
+//! Claims: one program at a time works with a node of a bus of this machine.
 //!
-//! A claim is a name in the abstract namespace of Unix sockets (`@cangauge/can0/5`): it belongs to the same network
-//! namespace as the interface, lies in no folder, ends with the process however that ends, and tells who holds it.
-//! It binds nobody who does not ask for it. Elsewhere than on Linux nothing is claimed.
+//! Two programs that send SDO requests to one node at the same time disturb each other. So each command claims the
+//! nodes it works with. The next command waits for them, or fails and names the holder.
+//!
+//! A claim is a name in the abstract namespace of Unix sockets, `@cangauge/can0/5`. It belongs to the same network
+//! namespace as the interface, needs no directory, and is free again as soon as the process ends. Programs that do
+//! not ask for claims are not affected. On other systems than Linux nothing is claimed.
+
+#[cfg(target_os = "linux")]
+mod holder;
+#[cfg(target_os = "linux")]
+mod linux;
+#[cfg(all(test, target_os = "linux"))]
+mod tests;
 
 use crate::canopen::id::NodeId;
+use std::fmt;
 use std::time::Duration;
-
-/// What a command needs for itself.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub enum Claim {
-    /// Nothing: it only listens, or its bus is its own.
-    #[default]
-    Nothing,
-    /// The SDO servers and NMT states of these nodes.
-    Nodes(Vec<NodeId>),
-    /// The whole bus: LSS reaches every node.
-    Bus,
-}
-
-impl Claim {
-    /// Every node.
-    pub fn every_node() -> Claim {
-        Claim::Nodes(NodeId::all().collect())
-    }
-
-    /// Its names, `None` for LSS. Everybody takes them in this order, so nobody waits in a circle.
-    fn names(&self) -> Vec<Option<NodeId>> {
-        match self {
-            Claim::Nothing => Vec::new(),
-            Claim::Nodes(nodes) => {
-                let mut nodes = nodes.clone();
-                nodes.sort_unstable();
-                nodes.dedup();
-                nodes.into_iter().map(Some).collect()
-            }
-            Claim::Bus => std::iter::once(None).chain(NodeId::all().map(Some)).collect(),
-        }
-    }
-}
-
-/// Why a claim was not got.
-#[derive(Debug, thiserror::Error)]
-pub enum ClaimError {
-    /// Another process holds it and went on holding it.
-    #[error("{} is in use by another cangauge{}", name(*.0), process(*.1))]
-    InUse(Option<NodeId>, Option<u32>),
-    /// The user asked to stop.
-    #[error("interrupted")]
-    Interrupted,
-}
-
-fn name(node: Option<NodeId>) -> String {
-    node.map_or("the bus".to_owned(), |node| format!("node {node}"))
-}
-
-fn process(id: Option<u32>) -> String {
-    id.map(|id| format!(" (process {id})")).unwrap_or_default()
-}
 
 #[cfg(target_os = "linux")]
 pub use linux::Claims;
 
-#[cfg(not(target_os = "linux"))]
-pub use elsewhere::Claims;
+/// What a command needs for itself.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Claim {
+    /// Nothing: the command only listens, or its bus belongs to this process.
+    #[default]
+    Nothing,
+    /// The SDO servers and NMT states of these nodes. More than 16 nodes are claimed as all nodes.
+    Nodes(Vec<NodeId>),
+    /// The whole bus, because LSS reaches every node.
+    Bus,
+}
 
-#[cfg(not(target_os = "linux"))]
-mod elsewhere {
-    use super::{Claim, ClaimError, Duration};
+impl Claim {
+    /// All nodes.
+    pub fn every_node() -> Claim {
+        Claim::Nodes(NodeId::all().collect())
+    }
+}
 
-    /// What has been claimed: nothing.
-    #[derive(Debug, Default)]
-    pub struct Claims;
+/// One name that a process can hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// The LSS services.
+    Lss,
+    /// All nodes.
+    EveryNode,
+    /// One node.
+    Node(NodeId),
+}
 
-    impl Claims {
-        /// Claims nothing.
-        ///
-        /// # Errors
-        /// None.
-        pub fn take(_: &str, _: &Claim, _: Duration, _: &mut dyn FnMut(&ClaimError)) -> Result<Claims, ClaimError> {
-            Ok(Claims)
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Part::Lss => f.write_str("the bus"),
+            Part::EveryNode => f.write_str("every node"),
+            Part::Node(node) => write!(f, "node {node}"),
         }
     }
 }
 
-#[cfg(target_os = "linux")]
-mod linux {
-    use super::{Claim, ClaimError, Duration, NodeId};
-    use crate::bus::interrupt::Interrupts;
-    use crate::bus::poll;
-    use std::io::{self, ErrorKind};
-    use std::os::fd::{AsFd, AsRawFd};
-    use std::os::linux::net::SocketAddrExt;
-    use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
-    use std::time::Instant;
+/// What happens if another process holds a part of the claim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IfHeld {
+    /// Wait for it, up to this time for the whole claim.
+    Wait(Duration),
+    /// Report it and continue beside it.
+    Continue,
+}
 
-    /// Most commands are over sooner: a wait that is shorter than this is not worth a word.
-    const SHORT: Duration = Duration::from_millis(500);
-    /// How often is looked for a holder that cannot be waited for.
-    const LOOK: Duration = Duration::from_millis(20);
+/// The process that holds a claim, as far as it is known. Its text is safe for a terminal.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Holder {
+    /// The process ID.
+    pub process: Option<u32>,
+    /// The name of the user, or the number if it has no name.
+    pub user: Option<String>,
+    /// The name of the program.
+    pub program: Option<String>,
+}
 
-    /// What has been claimed, until this is dropped or the process ends.
-    #[derive(Debug, Default)]
-    pub struct Claims(#[expect(dead_code, reason = "a name is held by its socket being open")] Vec<UnixListener>);
-
-    impl Claims {
-        /// Claims what `claim` says on the interface `bus`, and waits for others as long as `patience` in all. A
-        /// wait that takes longer than a moment is told through `waiting`.
-        ///
-        /// # Errors
-        /// Who is in the way; the wish to stop.
-        pub fn take(
-            bus: &str,
-            claim: &Claim,
-            patience: Duration,
-            waiting: &mut dyn FnMut(&ClaimError),
-        ) -> Result<Claims, ClaimError> {
-            let mut wait = Wait { begun: Instant::now(), patience, interrupts: None, told: false, waiting };
-            let mut claims = Vec::new();
-            for node in claim.names() {
-                // A system that has no such sockets, or forbids them, has no claims: they are an offer.
-                claims.extend(bind(bus, node, &mut wait)?);
-            }
-            Ok(Claims(claims))
+/// `cangauge (process 1234, user root)`.
+impl fmt::Display for Holder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.program.as_deref().unwrap_or("another program"))?;
+        match (self.process, &self.user) {
+            (Some(process), Some(user)) => write!(f, " (process {process}, user {user})"),
+            (Some(process), None) => write!(f, " (process {process})"),
+            (None, Some(user)) => write!(f, " (user {user})"),
+            (None, None) => Ok(()),
         }
-    }
-
-    fn bind(bus: &str, node: Option<NodeId>, wait: &mut Wait<'_>) -> Result<Option<UnixListener>, ClaimError> {
-        let part = node.map_or("lss".to_owned(), |node| node.to_string());
-        let Ok(address) = SocketAddr::from_abstract_name(format!("cangauge/{bus}/{part}")) else { return Ok(None) };
-        loop {
-            match UnixListener::bind_addr(&address) {
-                Ok(listener) => return Ok(Some(listener)),
-                Err(error) if error.kind() == ErrorKind::AddrInUse => wait.for_holder(node, &address)?,
-                Err(_) => return Ok(None),
-            }
-        }
-    }
-
-    struct Wait<'a> {
-        begun: Instant,
-        patience: Duration,
-        /// From the first wait on: Ctrl-C ends it.
-        interrupts: Option<Interrupts>,
-        told: bool,
-        waiting: &'a mut dyn FnMut(&ClaimError),
-    }
-
-    impl Wait<'_> {
-        /// Waits until the holder of a name may be gone.
-        fn for_holder(&mut self, node: Option<NodeId>, address: &SocketAddr) -> Result<(), ClaimError> {
-            // Nobody is ever let in: that the connection breaks says that the holder has gone.
-            let holder = UnixStream::connect_addr(address).ok();
-            let process = holder.as_ref().and_then(|holder| process(holder).ok()).filter(|&id| id > 0);
-            let in_use = ClaimError::InUse(node, process);
-            let left = self.patience.saturating_sub(self.begun.elapsed());
-            if left.is_zero() {
-                return Err(in_use);
-            }
-            let limit = if self.told { left } else { left.min(SHORT) };
-            if self.interrupts.is_none() {
-                self.interrupts = Interrupts::new().ok();
-            }
-            let gone = match (&holder, &mut self.interrupts) {
-                (Some(holder), Some(interrupts)) => {
-                    let [gone, _] = poll::readable([holder.as_fd(), interrupts.fd()], limit).unwrap_or_default();
-                    gone
-                }
-                _ => {
-                    std::thread::sleep(LOOK.min(limit));
-                    true
-                }
-            };
-            if self.interrupts.as_mut().is_some_and(|interrupts| interrupts.wait_until(Instant::now())) {
-                return Err(ClaimError::Interrupted);
-            }
-            if !gone && !self.told {
-                self.told = true;
-                (self.waiting)(&in_use);
-            }
-            Ok(())
-        }
-    }
-
-    /// The process on the other side.
-    #[expect(unsafe_code, reason = "the standard library does not tell the credentials of a peer")]
-    fn process(stream: &UnixStream) -> io::Result<u32> {
-        let mut peer = libc::ucred { pid: 0, uid: 0, gid: 0 };
-        let mut length = libc::socklen_t::try_from(size_of::<libc::ucred>()).map_err(io::Error::other)?;
-        // SAFETY: `peer` is plain numbers, `length` is its length, and both outlive the call.
-        let result = unsafe {
-            let (level, option) = (libc::SOL_SOCKET, libc::SO_PEERCRED);
-            libc::getsockopt(stream.as_raw_fd(), level, option, (&raw mut peer).cast(), &raw mut length)
-        };
-        if result != 0 {
-            return Err(io::Error::last_os_error());
-        }
-        u32::try_from(peer.pid).map_err(io::Error::other)
     }
 }
 
-#[cfg(test)]
-#[cfg(target_os = "linux")]
-mod tests {
-    use super::*;
-    use std::time::Instant;
+/// Why a claim failed.
+#[derive(Debug, thiserror::Error)]
+pub enum ClaimError {
+    /// Another process holds a part of it, and did not release it in time.
+    #[error("{0} is in use by {1}")]
+    InUse(Part, Holder),
+    /// The user asked to stop (Ctrl-C, SIGTERM).
+    #[error("interrupted")]
+    Interrupted,
+    /// The operating system cannot make the socket, for example because too many files are open.
+    #[error("claim {0}: {1}")]
+    System(Part, std::io::Error),
+}
 
-    fn nodes(nodes: &[u8]) -> Claim {
-        Claim::Nodes(nodes.iter().map(|&node| NodeId::new(node).expect("a node-ID")).collect())
-    }
+/// Claims on a system that has none.
+#[cfg(not(target_os = "linux"))]
+#[derive(Debug, Default)]
+pub struct Claims;
 
-    /// A bus that no other test has.
-    fn bus(test: &str) -> String {
-        format!("test-{}-{test}", std::process::id())
-    }
-
-    fn take(bus: &str, claim: &Claim, patience: u64) -> Result<Claims, ClaimError> {
-        Claims::take(bus, claim, Duration::from_millis(patience), &mut |_| {})
-    }
-
-    #[test]
-    fn one_node_has_one_holder_and_each_bus_its_own_nodes() {
-        let bus = bus("one");
-        let held = take(&bus, &nodes(&[5, 3, 5]), 0).expect("free");
-        let refused = take(&bus, &nodes(&[5, 7]), 0).expect_err("held");
-        let me = std::process::id();
-        assert_eq!(refused.to_string(), format!("node 5 is in use by another cangauge (process {me})"));
-        let others = [take(&bus, &nodes(&[4, 6, 7]), 0), take(&format!("{bus}x"), &nodes(&[5]), 0)];
-        assert!(others.iter().all(Result::is_ok), "{others:?}");
-        assert!(matches!(take(&bus, &Claim::Bus, 0), Err(ClaimError::InUse(Some(node), _)) if node.get() == 3));
-        assert!(take(&bus, &Claim::Nothing, 0).is_ok());
-        drop((held, others));
-        assert!(take(&bus, &Claim::Bus, 0).is_ok());
-    }
-
-    #[test]
-    fn lss_is_claimed_first_and_with_every_node() {
-        let bus = bus("lss");
-        let all = take(&bus, &Claim::Bus, 0).expect("free");
-        assert!(take(&bus, &Claim::every_node(), 0).is_err());
-        let refused = take(&bus, &Claim::Bus, 0).expect_err("held");
-        assert!(matches!(refused, ClaimError::InUse(None, Some(_))), "{refused}");
-        drop(all);
-    }
-
-    #[test]
-    fn who_waits_is_woken_and_who_waits_long_says_so() {
-        let bus = bus("wait");
-        let held = take(&bus, &nodes(&[9]), 0).expect("free");
-        let begun = Instant::now();
-        let holder = std::thread::spawn(move || {
-            std::thread::sleep(Duration::from_millis(700));
-            drop(held);
-        });
-        let mut told = Vec::new();
-        let got = Claims::take(&bus, &nodes(&[9]), Duration::from_secs(60), &mut |what| told.push(what.to_string()));
-        assert!(got.is_ok() && begun.elapsed() < Duration::from_secs(50));
-        assert_eq!(told.len(), 1, "{told:?}");
-        assert!(holder.join().is_ok());
-        let begun = Instant::now();
-        assert!(take(&bus, &nodes(&[9]), 50).is_err());
-        assert!(begun.elapsed() >= Duration::from_millis(50));
+#[cfg(not(target_os = "linux"))]
+impl Claims {
+    /// Claims nothing.
+    ///
+    /// # Errors
+    /// None.
+    pub fn take(_: &str, _: &Claim, _: IfHeld, _: &mut dyn FnMut(&ClaimError)) -> Result<Claims, ClaimError> {
+        Ok(Claims)
     }
 }

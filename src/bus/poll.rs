@@ -18,6 +18,20 @@ pub(super) fn readable<const N: usize>(fds: [BorrowedFd<'_>; N], limit: Duration
     }
 }
 
+/// The same for any number of descriptors.
+#[cfg(target_os = "linux")]
+pub(super) fn any_readable(fds: &[BorrowedFd<'_>], limit: Duration) -> io::Result<Vec<bool>> {
+    let poll = |fd: &BorrowedFd<'_>| libc::pollfd { fd: fd.as_raw_fd(), events: libc::POLLIN, revents: 0 };
+    let mut set: Vec<libc::pollfd> = fds.iter().map(poll).collect();
+    if wait(&mut set, limit) >= 0 {
+        return Ok(set.iter().map(|fd| fd.revents != 0).collect());
+    }
+    match io::Error::last_os_error() {
+        error if error.kind() == io::ErrorKind::Interrupted => Ok(vec![false; fds.len()]),
+        error => Err(error),
+    }
+}
+
 fn count(set: &[libc::pollfd]) -> libc::nfds_t {
     libc::nfds_t::try_from(set.len()).unwrap_or(libc::nfds_t::MAX)
 }

@@ -108,6 +108,10 @@ pub struct Global {
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) trace: Option<PathBuf>,
 
+    /// Continue although another program uses the same nodes
+    #[arg(long, global = true)]
+    pub(crate) ignore_lock: bool,
+
     /// Say less on stderr
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub(crate) quiet: bool,

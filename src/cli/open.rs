@@ -5,7 +5,7 @@ use super::args::{BusSpec, Nodes};
 use super::exit::{FileError, IntoFailure};
 use super::read::everybody;
 use crate::bus::Bus;
-use crate::bus::claim::{ClaimError, Claims};
+use crate::bus::claim::{ClaimError, Claims, IfHeld, Part};
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
 use crate::bus::replay::Replay;
@@ -23,8 +23,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How long another cangauge is waited for that is busy with the same nodes.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// The longest wait for another program that uses the same nodes.
+const CLAIM_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The bus that the options name, or the only one there is.
 pub(super) fn spec(global: &Global) -> Result<BusSpec, Failure> {
@@ -36,16 +36,23 @@ pub(super) fn open(global: &Global) -> anyhow::Result<Box<dyn Bus>> {
     open_as(global, &spec(global)?, false)
 }
 
-/// Claims what the command needs for itself. A simulated bus and a recording are its own anyhow.
+/// Claims what the command needs for itself. A simulated bus and a recording belong to this process anyway.
 pub(super) fn claim(global: &Global, spec: &BusSpec) -> Result<Claims, Failure> {
     let BusSpec::SocketCan(bus) = spec else { return Ok(Claims::default()) };
-    let mut waiting = |what: &ClaimError| global.console().note(&format!("{what}; waiting for it to end"));
-    Claims::take(bus, &global.claim, PATIENCE, &mut waiting).map_err(|error| match error {
-        ClaimError::InUse(node, _) => {
-            let hint = "wait until it has ended, or end it; nodes that nobody uses can be named meanwhile";
+    let (if_held, consequence) = if global.ignore_lock {
+        (IfHeld::Continue, "continuing (--ignore-lock)")
+    } else {
+        (IfHeld::Wait(CLAIM_TIMEOUT), "waiting for it to end")
+    };
+    let mut report = |what: &ClaimError| global.console().note(&format!("{what}; {consequence}"));
+    Claims::take(bus, &global.claim, if_held, &mut report).map_err(|error| match error {
+        ClaimError::InUse(part, _) => {
+            let hint = "wait until it ends, or end it; to work beside it, add --ignore-lock";
+            let node = if let Part::Node(node) = part { Some(node) } else { None };
             Failure { node, ..Failure::new(Kind::Bus, error.to_string()) }.hint(hint)
         }
         ClaimError::Interrupted => Failure::new(Kind::Interrupted, error.to_string()),
+        ClaimError::System(..) => Failure::new(Kind::Io, error.to_string()),
     })
 }
 

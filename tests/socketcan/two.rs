@@ -3,7 +3,7 @@
 use super::program::{Done, cangauge, command};
 use super::{Can, run};
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Simulated devices on the interface, until dropped.
@@ -39,6 +39,13 @@ fn poller(can: &Can) -> Child {
     child
 }
 
+/// The message about a program of this user that uses node 5.
+fn in_use_by(holder: &Child) -> String {
+    let user = Command::new("id").arg("-un").output().unwrap();
+    let user = String::from_utf8(user.stdout).unwrap();
+    format!("node 5 is in use by cangauge (process {}, user {})", holder.id(), user.trim())
+}
+
 fn end(mut child: Child) -> Done {
     child.wait().unwrap();
     child.wait_with_output().unwrap().into()
@@ -46,20 +53,19 @@ fn end(mut child: Child) -> Done {
 
 #[test]
 #[ignore = "needs a CAN interface: tests/socketcan/run"]
-fn the_second_waits_and_then_works() {
+fn a_second_program_waits_and_then_works() {
     let can = Can::get();
     let _devices = Devices::new(&can);
     let first = poller(&can);
-    // Another node is nobody's.
+    // Another node is free.
     cangauge(&format!("sdo read 6 0x1018:1 -b {}", can.name)).is(0, "866\n", "");
     let mut second = command(&format!("sdo read 5 0x1018:1 -b {}", can.name));
     let mut second = second.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut told = BufReader::new(second.stderr.take().unwrap());
     let mut line = String::new();
     told.read_line(&mut line).unwrap();
-    let waiting = format!("node 5 is in use by another cangauge (process {}); waiting for it to end\n", first.id());
-    assert_eq!(line, waiting);
-    // However it ends, what it had claimed is free again.
+    assert_eq!(line, format!("{}; waiting for it to end\n", in_use_by(&first)));
+    // The node is free again, even if its holder is killed.
     run("kill", &["-KILL", &first.id().to_string()]);
     end(first);
     let done = end(second);
@@ -68,14 +74,13 @@ fn the_second_waits_and_then_works() {
 
 #[test]
 #[ignore = "needs a CAN interface: tests/socketcan/run"]
-fn who_waits_too_long_says_who_is_in_the_way_and_ctrl_c_ends_the_wait() {
+fn a_wait_ends_after_ten_seconds_or_with_ctrl_c() {
     let can = Can::get();
     let _devices = Devices::new(&can);
     let first = poller(&can);
     let begun = Instant::now();
     let done = cangauge(&format!("lss inquire 5 -q -b {}", can.name));
-    let holder = first.id();
-    let message = format!("cangauge: node 5 is in use by another cangauge (process {holder})\n");
+    let message = format!("cangauge: {}\n", in_use_by(&first));
     assert!(done.code == Some(5) && done.stderr.starts_with(&message), "{done:?}");
     assert!(begun.elapsed() >= Duration::from_secs(10));
 
@@ -86,13 +91,13 @@ fn who_waits_too_long_says_who_is_in_the_way_and_ctrl_c_ends_the_wait() {
     let mut rest = String::new();
     told.read_line(&mut rest).unwrap();
     assert_eq!((second.wait().unwrap().code(), rest.as_str()), (Some(130), "cangauge: interrupted\n"));
-    run("kill", &["-INT", &holder.to_string()]);
+    run("kill", &["-INT", &first.id().to_string()]);
     end(first);
 }
 
 #[test]
 #[ignore = "needs a CAN interface: tests/socketcan/run"]
-fn a_recording_leaves_the_node_to_others() {
+fn a_recording_of_tpdos_leaves_the_node_to_others() {
     let can = Can::get();
     let _devices = Devices::new(&can);
     let mut recording = command(&format!("log 5 --sync 50ms -b {}", can.name)).stdout(Stdio::piped()).spawn().unwrap();
@@ -104,4 +109,27 @@ fn a_recording_leaves_the_node_to_others() {
     drop(rows);
     recording.kill().unwrap();
     recording.wait().unwrap();
+}
+
+#[test]
+#[ignore = "needs a CAN interface: tests/socketcan/run"]
+fn an_interface_is_one_claim_under_each_of_its_names() {
+    let can = Can::get();
+    let _devices = Devices::new(&can);
+    run("ip", &["link", "property", "add", "dev", &can.name, "altname", "gauge-alt"]);
+    let first = poller(&can);
+    for bus in [can.name.as_str(), &format!("socketcan:{}", can.name), "gauge-alt"] {
+        let mut second = command(&format!("sdo read 5 0x1018:1 -b {bus}")).stderr(Stdio::piped()).spawn().unwrap();
+        let mut line = String::new();
+        BufReader::new(second.stderr.take().unwrap()).read_line(&mut line).unwrap();
+        second.kill().unwrap();
+        second.wait().unwrap();
+        assert_eq!(line, format!("{}; waiting for it to end\n", in_use_by(&first)), "{bus}");
+    }
+    // Only this option continues beside the holder.
+    let note = format!("{}; continuing (--ignore-lock)\n", in_use_by(&first));
+    cangauge(&format!("sdo read 5 0x1018:1 --ignore-lock -b {}", can.name)).is(0, "71\n", &note);
+    run("kill", &["-INT", &first.id().to_string()]);
+    end(first);
+    run("ip", &["link", "property", "del", "dev", &can.name, "altname", "gauge-alt"]);
 }

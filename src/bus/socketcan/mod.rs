@@ -422,6 +422,12 @@ impl Bus for SocketCan {
     }
 }
 
+/// The name under which the kernel lists the interface `name`, which may be one of its further names (altname).
+/// `None` if there is no such interface.
+pub(super) fn primary_name(name: &str) -> Option<String> {
+    netlink::get(name).ok().map(|link| link.name).filter(|name| !name.is_empty())
+}
+
 fn now(opened: Instant) -> Stamp {
     Stamp { mono: Mono::at(opened.elapsed()), wall: Wall::now() }
 }

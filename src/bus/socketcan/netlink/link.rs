@@ -1,6 +1,6 @@
 //! A CAN interface as the kernel describes it, and what of it can be set: linux/can/netlink.h.
 
-use super::message::{Attributes, Header, Request, u16_at, u32_at};
+use super::message::{Attributes, Header, NAME, Request, u16_at, u32_at};
 
 /// `IFF_UP`: switched on by the administrator.
 const UP: u32 = 1;
@@ -119,6 +119,8 @@ impl BitTiming {
 pub struct Link {
     /// The number by which the kernel knows it.
     pub(super) index: i32,
+    /// Its name. An interface may have further names (altname).
+    pub name: String,
     /// Whether it carries CAN frames.
     pub is_can: bool,
     /// Whether it is switched on.
@@ -156,6 +158,7 @@ impl Link {
         let rates = can.and_then(|can| can.get(FIXED_RATES)).map(|data| data.as_chunks::<4>().0);
         Link {
             index: header.index,
+            name: attributes.text(NAME).unwrap_or_default().to_owned(),
             is_can: header.hardware == CAN_HARDWARE,
             up: header.flags & UP != 0,
             kind: kind.map(str::to_owned),

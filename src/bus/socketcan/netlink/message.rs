@@ -18,7 +18,7 @@ const EXPLAINED: u16 = 0x200;
 /// `NLMSGERR_ATTR_MSG`: the kernel's words.
 const WORDS: u16 = 1;
 /// `IFLA_IFNAME`.
-const NAME: u16 = 3;
+pub(super) const NAME: u16 = 3;
 /// The flag bits of an attribute's type: nested, network byte order.
 const KIND: u16 = 0x3fff;
 /// The length of `nlmsghdr`, and by chance that of `ifinfomsg`.
@@ -29,7 +29,7 @@ const HEADER: usize = 16;
 pub(super) struct Request(Vec<u8>);
 
 impl Request {
-    /// Asks for one interface by its name.
+    /// Asks for one interface by one of its names.
     pub(super) fn get(name: &str) -> Request {
         let mut request = Request::new(GET_LINK, REQUEST, 0, 0, 0);
         request.attribute(NAME, &[name.as_bytes(), &[0]].concat());

@@ -1,0 +1,256 @@
+//! Claims as Unix sockets in the abstract namespace.
+//!
+//! Two rules exclude each other's holders. A process that claims single nodes binds their names and then checks that
+//! nobody holds "every node". A process that claims every node binds that name and then checks each node. If both
+//! meet, at least one sees the other; the one with single nodes releases them and waits.
+
+use super::holder::identify;
+use super::{Claim, ClaimError, Holder, IfHeld, Part};
+use crate::bus::interrupt::Interrupts;
+use crate::bus::{poll, socketcan};
+use crate::canopen::id::NodeId;
+use std::io::{self, ErrorKind};
+use std::os::fd::AsFd;
+use std::os::linux::net::SocketAddrExt;
+use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Waits shorter than this are not reported: most commands end sooner.
+const SHORT_WAIT: Duration = Duration::from_millis(500);
+/// The interval between two attempts to get a name, and between two looks at the queues of a holder.
+const RETRY_INTERVAL: Duration = Duration::from_millis(20);
+/// More nodes than this are claimed as every node. Each name takes a file descriptor.
+const MAX_SINGLE_NODES: usize = 16;
+
+/// What this process has claimed, until the value is dropped or the process ends.
+#[derive(Debug, Default)]
+pub struct Claims {
+    #[cfg_attr(not(test), expect(dead_code, reason = "a name is held while its socket is open"))]
+    listeners: Arc<[UnixListener]>,
+    /// Its end ends the thread.
+    stop: Option<UnixStream>,
+    drain: Option<JoinHandle<()>>,
+}
+
+impl Claims {
+    /// Claims what `claim` says on the interface `name`, under which of its names ever. `report` gets the first
+    /// holder that is waited for longer than half a second, and each one that is not waited for.
+    ///
+    /// # Errors
+    /// [`ClaimError::InUse`] when the time to wait is over; an interrupt; a failure of the system. A system that has
+    /// no such sockets or forbids them has no claims; that is not an error.
+    pub fn take(
+        name: &str,
+        claim: &Claim,
+        if_held: IfHeld,
+        report: &mut dyn FnMut(&ClaimError),
+    ) -> Result<Claims, ClaimError> {
+        let parts = parts(claim);
+        if parts.is_empty() {
+            return Ok(Claims::default());
+        }
+        let key = socketcan::primary_name(name).unwrap_or_else(|| name.to_owned());
+        let begun = Instant::now();
+        let mut attempt = Attempt {
+            key,
+            if_held,
+            begun,
+            interrupts: None,
+            is_reported: false,
+            holder: None,
+            report,
+            held: Vec::new(),
+        };
+        while !attempt.take_all(&parts)? {}
+        Ok(Claims::hold(attempt.held))
+    }
+
+    fn hold(listeners: Vec<UnixListener>) -> Claims {
+        let listeners: Arc<[UnixListener]> = listeners.into();
+        let Ok((stop, stopped)) = UnixStream::pair() else {
+            return Claims { listeners, stop: None, drain: None };
+        };
+        let ours = Arc::clone(&listeners);
+        let thread = std::thread::Builder::new().name("claims".to_owned()).spawn(move || drain(&ours, &stopped));
+        Claims { listeners, stop: Some(stop), drain: thread.ok() }
+    }
+
+    /// The number of names held.
+    #[cfg(test)]
+    pub(super) fn names(&self) -> usize {
+        self.listeners.len()
+    }
+}
+
+impl Drop for Claims {
+    fn drop(&mut self) {
+        self.stop = None;
+        // The thread holds the names too: they are free when it has ended.
+        if let Some(thread) = self.drain.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Empties the queues of the sockets until `stopped` is closed. Each process that asks who holds a name connects;
+/// without this it would occupy a place in the queue until the holder ends.
+fn drain(listeners: &[UnixListener], stopped: &UnixStream) {
+    let fds: Vec<_> = listeners.iter().map(AsFd::as_fd).chain([stopped.as_fd()]).collect();
+    loop {
+        match poll::any_readable(&fds, Duration::MAX) {
+            Ok(ready) if ready.last() == Some(&true) => return,
+            Ok(_) => {}
+            Err(_) => return,
+        }
+        for listener in listeners {
+            while listener.accept().is_ok() {}
+        }
+        // A process that connects without end must not keep this one busy.
+        match poll::readable([stopped.as_fd()], RETRY_INTERVAL) {
+            Ok([false]) => {}
+            Ok([true]) | Err(_) => return,
+        }
+    }
+}
+
+/// The names of a claim. All processes take them in this order, so that they do not wait for each other in a circle.
+fn parts(claim: &Claim) -> Vec<Part> {
+    match claim {
+        Claim::Nothing => Vec::new(),
+        Claim::Nodes(nodes) => {
+            let mut nodes: Vec<Part> = nodes.iter().copied().map(Part::Node).collect();
+            nodes.sort_unstable();
+            nodes.dedup();
+            if nodes.len() > MAX_SINGLE_NODES { vec![Part::EveryNode] } else { nodes }
+        }
+        Claim::Bus => vec![Part::Lss, Part::EveryNode],
+    }
+}
+
+/// A claim that is being taken.
+struct Attempt<'a> {
+    /// The interface.
+    key: String,
+    if_held: IfHeld,
+    begun: Instant,
+    /// Present from the first wait on. Until then Ctrl-C ends the program by itself.
+    interrupts: Option<Interrupts>,
+    is_reported: bool,
+    /// The holder of this part: it is identified only once.
+    holder: Option<(Part, Holder)>,
+    report: &'a mut dyn FnMut(&ClaimError),
+    held: Vec<UnixListener>,
+}
+
+impl Attempt<'_> {
+    /// Takes all parts, waiting for each. `false`: it had to release them and must begin again.
+    fn take_all(&mut self, parts: &[Part]) -> Result<bool, ClaimError> {
+        for &part in parts {
+            loop {
+                match self.bind(part)? {
+                    Bound::Held(listener) => {
+                        self.held.push(listener);
+                        break;
+                    }
+                    Bound::InUse => {
+                        if !self.wait_for(part)? {
+                            break;
+                        }
+                    }
+                    Bound::Unavailable => return Ok(true),
+                }
+            }
+        }
+        if parts.contains(&Part::EveryNode) {
+            for node in NodeId::all().map(Part::Node) {
+                while self.is_held(node)? && self.wait_for(node)? {}
+            }
+        } else if self.is_held(Part::EveryNode)? {
+            // Its holder may be waiting for one of these nodes.
+            let held = std::mem::take(&mut self.held);
+            if self.if_held == IfHeld::Continue {
+                self.held = held;
+            } else {
+                drop(held);
+            }
+            return Ok(!self.wait_for(Part::EveryNode)?);
+        }
+        Ok(true)
+    }
+
+    fn address(&self, part: Part) -> io::Result<SocketAddr> {
+        let part = match part {
+            Part::Lss => "lss".to_owned(),
+            Part::EveryNode => "all".to_owned(),
+            Part::Node(node) => node.to_string(),
+        };
+        SocketAddr::from_abstract_name(format!("cangauge/{}/{part}", self.key))
+    }
+
+    fn bind(&self, part: Part) -> Result<Bound, ClaimError> {
+        let Ok(address) = self.address(part) else { return Ok(Bound::Unavailable) };
+        let listener = UnixListener::bind_addr(&address).and_then(|listener| {
+            listener.set_nonblocking(true)?;
+            Ok(listener)
+        });
+        match listener {
+            Ok(listener) => Ok(Bound::Held(listener)),
+            Err(error) if error.kind() == ErrorKind::AddrInUse => Ok(Bound::InUse),
+            Err(error) if matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::Unsupported) => {
+                Ok(Bound::Unavailable)
+            }
+            Err(error) if error.raw_os_error() == Some(libc::EAFNOSUPPORT) => Ok(Bound::Unavailable),
+            Err(error) => Err(ClaimError::System(part, error)),
+        }
+    }
+
+    /// Whether another process holds a part that this one does not want to hold itself.
+    fn is_held(&self, part: Part) -> Result<bool, ClaimError> {
+        Ok(matches!(self.bind(part)?, Bound::InUse))
+    }
+
+    /// Waits a moment for the holder of a part. `false`: continue beside the holder.
+    fn wait_for(&mut self, part: Part) -> Result<bool, ClaimError> {
+        let holder = match self.holder.take() {
+            Some((of, holder)) if of == part && holder.process.is_some() => holder,
+            _ => self.address(part).map(|address| identify(&address)).unwrap_or_default(),
+        };
+        self.holder = Some((part, holder.clone()));
+        let in_use = ClaimError::InUse(part, holder);
+        let IfHeld::Wait(limit) = self.if_held else {
+            (self.report)(&in_use);
+            return Ok(false);
+        };
+        let waited = self.begun.elapsed();
+        let left = limit.saturating_sub(waited);
+        if left.is_zero() {
+            return Err(in_use);
+        }
+        if waited >= SHORT_WAIT && !self.is_reported {
+            self.is_reported = true;
+            (self.report)(&in_use);
+        }
+        let pause = RETRY_INTERVAL.min(left);
+        if self.interrupts.is_none() {
+            self.interrupts = Interrupts::new().ok();
+        }
+        let is_interrupted = match &mut self.interrupts {
+            Some(interrupts) => interrupts.wait_for(pause),
+            None => {
+                std::thread::sleep(pause);
+                false
+            }
+        };
+        if is_interrupted { Err(ClaimError::Interrupted) } else { Ok(true) }
+    }
+}
+
+/// What an attempt to bind a name gave.
+enum Bound {
+    Held(UnixListener),
+    InUse,
+    /// This system has no such sockets.
+    Unavailable,
+}
