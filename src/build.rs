@@ -28,7 +28,7 @@ fn entries(folder: &Path) -> io::Result<String> {
     let mut paths =
         fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path())).collect::<io::Result<Vec<_>>>()?;
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
-    paths.sort();
+    paths.sort_by_key(|path| path.file_stem().map(ToOwned::to_owned));
     let mut list = "&[\n".to_owned();
     for path in paths {
         let name = path.file_stem().unwrap_or_default();

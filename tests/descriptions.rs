@@ -1,6 +1,5 @@
-//! Every object of every built-in description against the simulated device of that description: each readable
-//! one is read, each writable one is written inside and outside its limits, and each refusal has the abort code
-//! that the device's manual lists.
+//! Every object of every built-in description on a simulated device: each readable object is read, each writable one is
+//! written inside and outside of its limits, and each refusal has the abort code in the device's manual.
 
 use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::canopen::id::NodeId;
@@ -26,10 +25,10 @@ const NO_OBJECT: u32 = 0x0602_0000;
 const NO_SUB_INDEX: u32 = 0x0609_0011;
 const GENERAL: u32 = 0x0800_0000;
 
-/// Objects beside those of CiA 404 whose value moves by itself.
+/// Objects outside of CiA 404 whose values move.
 const MEASURED: [&str; 4] = ["minimum-pv", "maximum-pv", "process-value-integer", "pressure-float"];
 
-/// Descriptions of what is known of one procedure alone: they are not complete and say so.
+/// Incomplete descriptions: they cover one procedure only and say so.
 const PARTS: [&str; 2] = ["hydac-old", "baumer"];
 
 fn complete() -> impl Iterator<Item = &'static Arc<Model>> {
@@ -40,7 +39,7 @@ fn node() -> NodeId {
     NodeId::new(9).expect("a node-ID")
 }
 
-/// A device on a bus of its own, and what is asked of it.
+/// A device on its own bus.
 struct Desk<'a> {
     model: &'a Arc<Model>,
     master: Master<'a>,
@@ -95,7 +94,7 @@ impl Desk<'_> {
         self.write(entry.object, &bytes)
     }
 
-    /// The code that the manual's list has for this refusal: the first of `codes` that is listed.
+    /// The first of `codes` that the manual lists.
     fn listed(&self, codes: &[u32]) -> u32 {
         let listed = &self.model.description.sdo.aborts;
         let mut codes = codes.iter().chain([&GENERAL]).copied();
@@ -103,10 +102,10 @@ impl Desk<'_> {
         code.unwrap_or_else(|| panic!("{}: none of the codes is listed", self.name()))
     }
 
-    /// What stands in the way of writing PDO parameters is moved out of it.
+    /// Makes PDO parameters writable: disables the PDO and empties its mapping.
     fn clear_the_way(&mut self, object: ObjectId) {
         let communication = (0x1800..0x1a00).contains(&object.index);
-        // The inhibit time too is only written while the PDO is off.
+        // The inhibit time can be written only while the PDO is disabled.
         if !(is_mapping(object) || communication && object.sub == 3) {
             return;
         }
@@ -122,7 +121,7 @@ impl Desk<'_> {
     }
 }
 
-/// Entries with what the description says of them beyond the type.
+/// Entries with their descriptions.
 fn described(model: &Model) -> Vec<(Entry, &ObjectEntry)> {
     let object = |entry: &Entry| model.description.object(entry.object).expect("it is described");
     model.dictionary.iter().map(|entry| (entry.clone(), object(entry))).collect()
@@ -151,7 +150,7 @@ fn limits(data_type: DataType) -> Option<(f64, f64)> {
 }
 
 #[test]
-fn each_readable_object_is_read_as_its_type_and_no_other() {
+fn readable_objects_return_values_of_their_type() {
     for model in built_in() {
         with_desk(model, |desk| {
             for (entry, described) in described(model) {
@@ -162,7 +161,7 @@ fn each_readable_object_is_read_as_its_type_and_no_other() {
                     continue;
                 }
                 let value = read.unwrap_or_else(|code| panic!("{place}: {code:08X}"));
-                // As delivered, but for what is measured.
+                // Factory defaults, except for measured values.
                 let default = entry.default_bytes(node()).and_then(|bytes| entry.data_type.decode(&bytes).ok());
                 let measured = matches!(entry.object.index & 0x0fff, 0x100 | 0x130) && entry.object.index >= 0x6000;
                 if let Some(default) = default.filter(|_| !measured) {
@@ -175,7 +174,7 @@ fn each_readable_object_is_read_as_its_type_and_no_other() {
 }
 
 #[test]
-fn what_cannot_be_written_stays_and_says_so() {
+fn read_only_objects_refuse_writes_and_keep_their_value() {
     for model in built_in() {
         with_desk(model, |desk| {
             for (entry, _) in described(model).into_iter().filter(|(entry, _)| !entry.access.is_writable()) {
@@ -193,7 +192,7 @@ fn what_cannot_be_written_stays_and_says_so() {
 }
 
 #[test]
-fn what_does_not_exist_says_so() {
+fn missing_objects_are_refused() {
     for model in built_in() {
         with_desk(model, |desk| {
             let u8 = DataType::Unsigned(1);
@@ -206,10 +205,10 @@ fn what_does_not_exist_says_so() {
     }
 }
 
-/// Values that the description allows are held; values that it does not allow are refused, and the old one is
-/// held. Signatures, 1003h and the COB-IDs have rules of their own and tests of their own.
+/// Allowed values are kept; other values are refused and do not change the object. Signatures, 1003h and COB-IDs have
+/// their own tests.
 #[test]
-fn each_writable_object_holds_what_is_allowed_and_refuses_the_rest() {
+fn writable_objects_accept_allowed_values_only() {
     for model in complete() {
         let (mut inside, mut outside) = (0, 0);
         for (entry, described) in described(model) {
@@ -217,11 +216,11 @@ fn each_writable_object_holds_what_is_allowed_and_refuses_the_rest() {
             if !entry.access.is_writable() || special || entry.data_type.width().is_none() {
                 continue;
             }
-            // Each on a fresh device: no write depends on another one's.
+            // Each object on a new device, so that the writes are independent.
             with_desk(model, |desk| {
                 let place = format!("{} {} {}", desk.name(), entry.object, entry.full_name());
                 desk.clear_the_way(entry.object);
-                // Which units there are the type does not say.
+                // The type alone does not limit unit codes.
                 let type_limits = limits(entry.data_type).filter(|_| entry.object.index != 0x6131);
                 let low = number(&entry.low, entry.data_type).or(type_limits.map(|(low, _)| low));
                 let high = number(&entry.high, entry.data_type).or(type_limits.map(|(_, high)| high));
@@ -266,7 +265,7 @@ fn each_writable_object_holds_what_is_allowed_and_refuses_the_rest() {
                     assert_eq!(desk.read(&entry), Ok(held.clone()), "{place}: the old value is held");
                     outside += 1;
                 }
-                // A width that is none of the object's, where widths are told.
+                // A wrong width, if sizes are indicated.
                 let width = entry.data_type.width().expect("it has one");
                 if model.description.sdo.size == SizeIndication::Indicated {
                     let wrong = if width == 4 { 2 } else { 4 };
@@ -297,7 +296,7 @@ fn is_mapping(object: ObjectId) -> bool {
     (0x1a00..0x1c00).contains(&object.index)
 }
 
-/// Whether a number can stand in a mapping object: an entry that exists, a count of entries that are mapped.
+/// Whether a number is possible in a mapping object: an existing entry, or the count of mapped entries.
 fn is_sound(desk: &Desk<'_>, object: ObjectId, number: f64) -> bool {
     if object.sub > 0 {
         return number == 0.0
@@ -311,7 +310,7 @@ fn is_sound(desk: &Desk<'_>, object: ObjectId, number: f64) -> bool {
 }
 
 #[test]
-fn signatures_act_and_nothing_else_does() {
+fn only_the_right_signature_acts() {
     for model in built_in() {
         for (entry, described) in described(model) {
             let Some(signature) = described.signature else { continue };
@@ -332,7 +331,7 @@ fn signatures_act_and_nothing_else_does() {
 }
 
 #[test]
-fn guarding_and_heartbeat_exclude_each_other_where_the_manual_says_so() {
+fn guarding_and_heartbeat_exclude_each_other_as_described() {
     let mut tested = 0;
     for model in built_in() {
         for (entry, described) in
@@ -362,7 +361,7 @@ fn guarding_and_heartbeat_exclude_each_other_where_the_manual_says_so() {
 }
 
 #[test]
-fn cob_ids_move_only_by_the_rules() {
+fn cob_ids_change_by_the_rules_only() {
     for model in built_in() {
         for (entry, _) in
             described(model).into_iter().filter(|(entry, _)| entry.object.sub == 1 && is_cob_id(entry.object))
@@ -370,10 +369,10 @@ fn cob_ids_move_only_by_the_rules() {
             with_desk(model, |desk| {
                 let place = format!("{} {}", desk.name(), entry.object);
                 let mut put = |word: u32| desk.write(entry.object, &word.to_le_bytes());
-                // Off, elsewhere, on.
+                // Disable, move, enable.
                 assert_eq!(put(0x8000_0199), Ok(()), "{place}");
                 assert_eq!(put(0x0000_0199), Ok(()), "{place}");
-                // While it is on it cannot be moved, and never to where NMT stands, or what a mapping says.
+                // An enabled PDO cannot be moved; NMT's identifier and mapping entries are refused.
                 for bad in [0x0000_019a, 0x0000_0000, 0x6130_0120] {
                     let zero = model.description.quirks.contains(&cangauge::device::quirk::Quirk::CobIdZeroIsDefault);
                     if bad == 0 && zero {
@@ -388,7 +387,7 @@ fn cob_ids_move_only_by_the_rules() {
 }
 
 #[test]
-fn hydac_takes_zero_for_the_default_of_a_cob_id() {
+fn hydac_zero_restores_the_default_cob_id() {
     let model = cangauge::device::catalog::by_name("hydac").expect("built in");
     with_desk(&model, |desk| {
         for (object, default) in [(ObjectId::new(0x1800, 1), 0x4000_0189), (ObjectId::new(0x1014, 0), 0x89)] {
@@ -401,7 +400,7 @@ fn hydac_takes_zero_for_the_default_of_a_cob_id() {
 }
 
 #[test]
-fn the_history_is_deleted_by_zero_alone() {
+fn only_zero_deletes_the_history() {
     for model in built_in() {
         let Some(entry) = model.dictionary.get(ObjectId::new(0x1003, 0)) else { continue };
         with_desk(model, |desk| {
@@ -412,7 +411,7 @@ fn the_history_is_deleted_by_zero_alone() {
 }
 
 #[test]
-fn every_object_says_what_it_is() {
+fn every_object_has_a_description() {
     for model in complete() {
         for object in &model.description.objects {
             let place = format!("{} {} {}", model.description.name, object.at, object.name);
@@ -420,7 +419,7 @@ fn every_object_says_what_it_is() {
             let counts = object.name.ends_with("entries");
             let plain = object.text.is_empty() && object.values.is_empty();
             assert!(counts || !plain || (0x1018..=0x1018).contains(&index(object)), "{place}: no meaning");
-            // What is measured, and what acts, has no default; the rest has.
+            // Measured values and signatures have no default; all other objects have one.
             let acts = object.access == Access::Wo;
             let measured =
                 ["-pv", "-fv", "-i16", "-i32", "-integer", "-float"].iter().any(|end| object.name.ends_with(end));
@@ -434,7 +433,7 @@ fn index(object: &ObjectEntry) -> u16 {
 }
 
 #[test]
-fn hydac_keeps_its_node_id_with_1010h_4_alone() {
+fn hydac_stores_its_node_id_with_1010h_4_only() {
     let model = cangauge::device::catalog::by_name("hydac").expect("built in");
     for (sub, expected) in [(1, 9), (4, 12)] {
         with_desk(&model, |desk| {
@@ -454,7 +453,7 @@ fn hydac_keeps_its_node_id_with_1010h_4_alone() {
     }
 }
 
-/// The codes as the manuals print them: MH-4 3.3.4, D-20-9 page 7, DPS table 23.
+/// The codes as printed in the manuals: MH-4 3.3.4, D-20-9 page 7, DPS table 23.
 #[test]
 fn the_abort_codes_of_the_manuals() {
     let cases: [(&str, u16, u8, &[u8], u32); 9] = [

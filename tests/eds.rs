@@ -1,4 +1,4 @@
-//! The files of `tests/data/eds`, each with what must come out of it: facts, and every warning.
+//! The files of `tests/data/eds` with their expected contents and warnings.
 
 #![cfg(test)]
 
@@ -16,7 +16,7 @@ fn data() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/eds")
 }
 
-/// A file that can be used, with exactly these warnings.
+/// A usable file with exactly these warnings.
 fn load(name: &str, warnings: &[&str]) -> Eds {
     let bytes = std::fs::read(data().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
     let eds = eds::read(&bytes).unwrap_or_else(|error| panic!("{name}: {error}"));
@@ -49,13 +49,13 @@ fn node(id: u8) -> NodeId {
     NodeId::new(id).expect("a node-ID")
 }
 
-/// A default as a number, the way passive logging takes mapping, unit and digits from a file.
+/// A default as a number, as passive logging reads mapping, unit and digits from a file.
 fn number(dictionary: &Dictionary, index: u16, sub: u8, id: u8) -> Option<u64> {
     let entry = dictionary.get(ObjectId::new(index, sub))?;
     entry.data_type.decode(&entry.default_bytes(node(id))?).ok()?.as_u64()
 }
 
-/// Index and sub-index of what the default mapping of a TPDO carries.
+/// Index and sub-index of the objects in the default mapping of a TPDO.
 fn mapping(dictionary: &Dictionary, pdo: u16) -> Vec<(u64, u64, u64)> {
     let count = number(dictionary, 0x1a00 + pdo - 1, 0, 1).unwrap_or(0);
     let subs = 1..=u8::try_from(count).expect("a count");
@@ -64,7 +64,7 @@ fn mapping(dictionary: &Dictionary, pdo: u16) -> Vec<(u64, u64, u64)> {
 }
 
 #[test]
-fn every_file_is_tested_and_has_its_provenance() {
+fn every_file_is_tested_and_names_its_origin() {
     let source = include_str!("eds.rs");
     let readme = include_str!("data/eds/README.md");
     let mut files = 0;
@@ -82,10 +82,10 @@ fn every_file_is_tested_and_has_its_provenance() {
 }
 
 #[test]
-fn files_that_cannot_be_used_say_where_and_why() {
+fn unusable_files_give_line_and_reason() {
     for (name, expected) in [
         ("empty.eds", "line 1: the file is empty"),
-        ("xdd.eds", "line 2: this is XML, perhaps an XDD or XDC file; an EDS or DCF file is wanted"),
+        ("xdd.eds", "line 2: this is XML, perhaps an XDD or XDC file; expected an EDS or DCF file"),
         ("text.eds", "line 1: no section such as [DeviceInfo] follows: not an EDS or DCF file"),
         ("binary.eds", "line 1: no section such as [DeviceInfo] follows: not an EDS or DCF file"),
         ("no-objects.eds", "line 51: the file ends, and no section such as [1000] describes an object"),
@@ -97,7 +97,7 @@ fn files_that_cannot_be_used_say_where_and_why() {
 }
 
 #[test]
-fn a_clean_file_is_all_that_passive_logging_needs() {
+fn clean_file_is_sufficient_for_passive_logging() {
     let eds = load("01-clean-4.0.eds", &[]);
     assert_eq!(eds.info.eds_version, "4.0");
     assert_eq!(eds.info.vendor_name.as_deref(), Some("Example Instruments"));
@@ -167,10 +167,10 @@ fn the_other_spelling_of_commissioning() {
     let eds = load(
         "04-commissioning.dcf",
         &[
-            "line 55: Baudrate: 500000 kbit/s is no bit rate of CAN; read as bit/s",
+            "line 55: Baudrate: 500000 kbit/s is not a CAN bit rate; read as bit/s",
             "line 56: [DeviceCommissioning] NetNumber: \"010\" begins with 0 and is octal by CiA 306, so 8",
             "line 58: [DeviceCommissioning] CANopenManager: \"perhaps\" is neither 0 nor 1",
-            "line 59: [DeviceCommissioning] LSS_SerialNumber: \"none\" is no number of 32 bits",
+            "line 59: [DeviceCommissioning] LSS_SerialNumber: \"none\" is not a 32-bit number",
         ],
     );
     let commissioning = eds.commissioning.expect("a DCF");
@@ -220,8 +220,8 @@ fn access_types() {
     let eds = load(
         "11-access-types.eds",
         &[
-            "line 183: [2007] AccessType: \"rx\" is unknown; taken for rw",
-            "line 187: [2008] has no AccessType; taken for rw",
+            "line 183: [2007] AccessType: \"rx\" is unknown; read as rw",
+            "line 187: [2008] has no AccessType; read as rw",
         ],
     );
     let expected = ["Ro", "Rw", "Wo", "Ro", "Rw", "Rw", "Const", "Rw", "Rw", "Ro"];
@@ -246,16 +246,16 @@ fn defaults_that_do_not_fit() {
     let eds = load(
         "13-defaults.eds",
         &[
-            "line 140: [2000] DefaultValue: \"0.0\" is no integer; read as 0",
-            "line 156: [2002] DefaultValue: \"256\" does not fit u8 (0 to 255); left out",
-            "line 164: [2003] DefaultValue: \"-1\" does not fit u16 (0 to 65535); left out",
-            "line 196: [2007] DefaultValue: \"0x3F800000\" is taken for the bit pattern of 1",
+            "line 140: [2000] DefaultValue: \"0.0\" is not an integer; read as 0",
+            "line 156: [2002] DefaultValue: \"256\" does not fit u8 (0 to 255); ignored",
+            "line 164: [2003] DefaultValue: \"-1\" does not fit u16 (0 to 65535); ignored",
+            "line 196: [2007] DefaultValue: \"0x3F800000\" is read as the bit pattern of 1",
             "line 204: [2008] DefaultValue: \"1,5\" has a decimal comma; read as 1.5",
-            "line 212: [2009] DefaultValue: \"n/a\" is not a value of type r32; left out",
-            "line 228: [200B] DefaultValue: \"2\" is not a value of type b; left out",
-            "line 260: [200F] DefaultValue: \"0\" is not a value of type d; left out",
-            "line 276: [2011] DefaultValue: \"1e3\" is no integer; read as 1000",
-            "line 300: [2014] DefaultValue: \"-\" is not a value of type u32; left out",
+            "line 212: [2009] DefaultValue: \"n/a\" is not a value of type r32; ignored",
+            "line 228: [200B] DefaultValue: \"2\" is not a value of type b; ignored",
+            "line 260: [200F] DefaultValue: \"0\" is not a value of type d; ignored",
+            "line 276: [2011] DefaultValue: \"1e3\" is not an integer; read as 1000",
+            "line 300: [2014] DefaultValue: \"-\" is not a value of type u32; ignored",
         ],
     );
     let real = |number| Some(Scalar::Real(number));
@@ -295,9 +295,9 @@ fn node_id_formulas() {
         "14-nodeid.eds",
         &[
             "line 186: [2007] DefaultValue: \"0600\" begins with 0 and is octal by CiA 306, so 384",
-            "line 194: [2008] DefaultValue: \"$NODEID-1\" is not a value of type u32; left out",
-            "line 202: [2009] DefaultValue: \"$NODEID+\" is not a value of type u32; left out",
-            "line 210: [200A] DefaultValue: \"$NODEID+0x200000000\" is not a value of type u32; left out",
+            "line 194: [2008] DefaultValue: \"$NODEID-1\" is not a value of type u32; ignored",
+            "line 202: [2009] DefaultValue: \"$NODEID+\" is not a value of type u32; ignored",
+            "line 210: [200A] DefaultValue: \"$NODEID+0x200000000\" is not a value of type u32; ignored",
         ],
     );
     for cob in [0, 1, 2, 3, 6, 7, 11] {
@@ -347,7 +347,7 @@ fn compact_arrays_of_a_configured_device() {
         "17-compact.dcf",
         &[
             "line 157: [6131Value] 17: there is no such sub-index",
-            "line 162: [6132Value] 2: \"300\" does not fit u8 (0 to 255); left out",
+            "line 162: [6132Value] 2: \"300\" does not fit u8 (0 to 255); ignored",
             "line 175: [7130Name] belongs to no object",
         ],
     );
@@ -362,10 +362,10 @@ fn compact_arrays_of_a_configured_device() {
 }
 
 #[test]
-fn sub_objects_without_an_object_and_the_other_way_round() {
+fn sub_objects_without_an_object_and_the_reverse() {
     let eds = load(
         "18-orphans.eds",
-        &["line 114: [2022sub0] stands without a section of its object; the object is called object-2022"],
+        &["line 114: [2022sub0] has no section of its object; the object gets the name object-2022"],
     );
     assert_eq!(entry(&eds, "filter-constant").object, ObjectId::new(0x2022, 2));
     assert_eq!(entry(&eds, "object-2022:1").full_name(), "filter-type");
@@ -388,14 +388,14 @@ fn sub_objects_without_an_object_and_the_other_way_round() {
 }
 
 #[test]
-fn objects_in_no_list_are_used() {
+fn unlisted_objects_are_used() {
     let eds = load(
         "20-unlisted.eds",
         &[
             "line 49: object 1029h is listed, but not described",
-            "line 50: [OptionalObjects] lists \"heartbeat\", which is no index",
-            "line 124: object 2000h is described, but in no list; it is used",
-            "line 132: object 2001h is described, but in no list; it is used",
+            "line 50: [OptionalObjects] lists \"heartbeat\", which is not an index",
+            "line 124: object 2000h is described, but not listed; it is used",
+            "line 132: object 2001h is described, but not listed; it is used",
         ],
     );
     assert_eq!(default(&eds, "hidden-too"), integer(1));
@@ -412,10 +412,10 @@ fn data_types() {
     let eds = load(
         "22-data-types.eds",
         &[
-            "line 347: [2100] DataType: \"0x0040\" is unknown; its value is taken for bytes",
-            "line 360: [2102] has no DataType; its value is taken for bytes",
-            "line 368: [2103] DataType: \"UNSIGNED32\" is unknown; its value is taken for bytes",
-            "line 376: [2104] DataType: \"0x10007\" is unknown; its value is taken for bytes",
+            "line 347: [2100] DataType: \"0x0040\" is unknown; its value is read as bytes",
+            "line 360: [2102] has no DataType; its value is read as bytes",
+            "line 368: [2103] DataType: \"UNSIGNED32\" is unknown; its value is read as bytes",
+            "line 376: [2104] DataType: \"0x10007\" is unknown; its value is read as bytes",
         ],
     );
     let types: Vec<String> = (1..=0x1b)
@@ -448,10 +448,10 @@ fn limits_and_flags() {
     let eds = load(
         "24-limits-and-flags.eds",
         &[
-            "line 170: [2002] HighLimit: \"none\" is not a value of type r32; left out",
+            "line 170: [2002] HighLimit: \"none\" is not a value of type r32; ignored",
             "line 178: [2003] PDOMapping: \"often\" is neither 0 nor 1",
-            "line 214: [2005] LowLimit is above HighLimit; taken for no limits",
-            "line 224: [2006] LowLimit and HighLimit are 0; taken for no limits",
+            "line 214: [2005] LowLimit is above HighLimit; ignored",
+            "line 224: [2006] LowLimit and HighLimit are 0; ignored",
         ],
     );
     let limits = |name| (entry(&eds, name).low.clone(), entry(&eds, name).high.clone());
@@ -471,15 +471,15 @@ fn limits_and_flags() {
 }
 
 #[test]
-fn junk_between_what_counts() {
+fn garbage_between_sections_is_ignored() {
     let eds = load(
         "25-junk.eds",
         &[
-            "line 1: \"EDSVersion=9.9\" stands before the first section",
+            "line 1: \"EDSVersion=9.9\" is before the first section",
             "line 38: the section \"DummyUsage\" has no closing bracket",
-            "line 63: \"read only\" is no section, no key with a value and no comment",
-            "line 64: \"= 5\" is no section, no key with a value and no comment",
-            "line 70: \"Error register\" behind a section is ignored",
+            "line 63: \"read only\" is not a section, a key with a value or a comment",
+            "line 64: \"= 5\" is not a section, a key with a value or a comment",
+            "line 70: \"Error register\" after a section is ignored",
             "line 123: [1018subX] is neither an object nor a sub-object and is ignored",
             "line 126: [10180] is neither an object nor a sub-object and is ignored",
         ],
@@ -491,14 +491,14 @@ fn junk_between_what_counts() {
 }
 
 #[test]
-fn the_first_of_two_counts() {
+fn the_first_of_two_equal_sections_is_used() {
     let eds = load(
         "26-duplicates.eds",
         &[
-            "line 120: [1017] has \"DefaultValue\" a second time; line 119 counts",
-            "line 124: [1018sub1] comes a second time; what [1018sub1] in line 82 says counts",
+            "line 120: [1017] has \"DefaultValue\" twice; line 119 is used",
+            "line 124: [1018sub1] occurs twice; [1018sub1] in line 82 has priority",
             "line 129: [1018SUB02] is [1018sub2] of line 90 again and is ignored",
-            "line 133: [FileInfo] comes a second time; what [FileInfo] in line 2 says counts",
+            "line 133: [FileInfo] occurs twice; [FileInfo] in line 2 has priority",
         ],
     );
     assert_eq!(eds.info.eds_version, "4.0");
@@ -521,7 +521,7 @@ fn long_lines() {
 
 #[test]
 fn names_are_unique_and_can_be_typed() {
-    let eds = load("28-names.eds", &["line 245: [2004] has no ParameterName; the object is called object-2004"]);
+    let eds = load("28-names.eds", &["line 245: [2004] has no ParameterName; the object gets the name object-2004"]);
     let names: Vec<String> =
         eds.dictionary.iter().filter(|entry| entry.object.index >= 0x1800).map(Entry::full_name).collect();
     assert_eq!(
@@ -555,17 +555,17 @@ fn names_are_unique_and_can_be_typed() {
 }
 
 #[test]
-fn huge_numbers_become_neither_loops_nor_memory() {
+fn huge_numbers_cost_neither_time_nor_memory() {
     let eds = load(
         "29-huge-numbers.eds",
         &[
             "line 75: [1018] SubNumber is 0xFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFF…, but the file describes 5",
-            "line 122: [6130] CompactSubObj: \"0xFFFFFFFF\" is none of 1 to 254",
+            "line 122: [6130] CompactSubObj: \"0xFFFFFFFF\" is not in the range 1 to 254",
             "line 134: [2000] has no sub-objects; only the count at sub-index 0 is known",
-            "line 139: [2000] CompactSubObj: \"255\" is none of 1 to 254",
+            "line 139: [2000] CompactSubObj: \"255\" is not in the range 1 to 254",
             "line 144: [2001] SubNumber is 4294967295, but the file describes 1",
-            "line 150: [2001sub1] DefaultValue: \"9999999999999999999999999999999999999999…\" is not a value of type u32; left out",
-            "line 156: [2002] DefaultValue: \"0xFFFFFFFFFFFFFFFF\" does not fit u32 (0 to 4294967295); left out",
+            "line 150: [2001sub1] DefaultValue: \"9999999999999999999999999999999999999999…\" is not a value of type u32; ignored",
+            "line 156: [2002] DefaultValue: \"0xFFFFFFFFFFFFFFFF\" does not fit u32 (0 to 4294967295); ignored",
         ],
     );
     assert_eq!(eds.dictionary.iter().count(), 11);
@@ -576,7 +576,7 @@ fn huge_numbers_become_neither_loops_nor_memory() {
 fn sixteen_channels_over_four_tpdos() {
     let eds = load(
         "30-sixteen-channels.eds",
-        &["line 34: CompactPDO: PDO objects that the file implies and does not describe are left out"],
+        &["line 34: CompactPDO: PDO objects without a description in the file are missing"],
     );
     assert_eq!(mapping(&eds.dictionary, 4), [(0x7130, 13, 16), (0x7130, 14, 16), (0x7130, 15, 16), (0x7130, 16, 16)]);
     assert_eq!(

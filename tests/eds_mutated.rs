@@ -1,5 +1,5 @@
-//! Ten thousand damaged EDS files: the reader neither panics nor hangs nor grows, and what it makes of them
-//! holds together. The same seed gives the same files; a failure names the one.
+//! Ten thousand damaged EDS files: the reader neither panics nor hangs, its memory is limited, and its result is
+//! consistent. The same seed gives the same files; a failure names the file.
 
 #![cfg(test)]
 
@@ -13,10 +13,10 @@ use std::time::{Duration, Instant};
 
 const FILES: u64 = 10_000;
 
-/// Longest time for one file of a few kB, with the tests of two crates beside it in a debug build.
+/// Time limit for one file of a few kB in a debug build, while two other crates are tested.
 const LONGEST: Duration = Duration::from_secs(5);
 
-/// What breaks readers, put in anywhere.
+/// Texts that are difficult for parsers, inserted anywhere.
 const TOKENS: &[&[u8]] = &[
     b"CompactSubObj=0xFFFFFFFF\n",
     b"CompactSubObj=254\n",
@@ -116,7 +116,7 @@ fn mutated(originals: &[Vec<u8>], seed: u64) -> Vec<u8> {
     file
 }
 
-/// Whatever the file was, the result can be relied upon.
+/// Checks that the result is consistent for any file.
 fn check(eds: &Eds, file: &[u8]) {
     let mut names = HashSet::new();
     let node = NodeId::new(5).expect("a node-ID");
@@ -130,7 +130,7 @@ fn check(eds: &Eds, file: &[u8]) {
         assert_eq!(eds.dictionary.find(&entry.full_name()).map(|found| found.object), Some(entry.object));
     }
     assert!(!eds.dictionary.is_empty());
-    // A section makes 255 entries at most.
+    // A section gives 255 entries at most.
     let sections = file.iter().filter(|&&byte| byte == b'[').count();
     assert!(eds.dictionary.iter().count() <= 255 * sections);
     for object in eds.parameter_values.keys().chain(eds.flags.keys()).chain(&eds.untyped) {
@@ -146,7 +146,7 @@ fn check(eds: &Eds, file: &[u8]) {
 }
 
 #[test]
-fn no_damaged_file_makes_the_reader_panic_or_hang() {
+fn damaged_files_cause_no_panic_and_no_hang() {
     let originals = originals();
     let (mut used, mut warned) = (0, 0);
     for seed in 0..FILES {
@@ -165,12 +165,12 @@ fn no_damaged_file_makes_the_reader_panic_or_hang() {
         used += usize::from(result.is_ok());
         warned += usize::from(result.is_ok_and(|eds| !eds.warnings.is_empty()));
     }
-    // Else the test would test nothing: most damaged files are still of use, and say what is wrong.
+    // Most damaged files must still be usable and have warnings, else the test proves nothing.
     assert!(used > 7_000 && warned > 6_000, "{used} files used, {warned} with warnings");
 }
 
 #[test]
-fn files_that_ask_for_much_get_little() {
+fn memory_is_limited() {
     let mut file = String::from("[DeviceInfo]\n");
     for index in 0x1000..0x2000 {
         let _ = write!(
@@ -188,7 +188,7 @@ fn files_that_ask_for_much_get_little() {
 }
 
 #[test]
-fn long_files_take_time_in_proportion() {
+fn time_grows_linearly_with_the_length() {
     for piece in ["[", "[1018sub1]\n", "x\n", "x=1\n", "[1000]\n=", "[6130Name]\n1=a\n", "\r", "=", ";", "[a]\nx=1\n"] {
         let file =
             format!("[1000]\nParameterName=A\nDataType=7\nAccessType=ro\n{}", piece.repeat(500_000 / piece.len()));

@@ -1,30 +1,29 @@
-//! How a device is given its node-ID and bit rate: the ways that lead there, as data, and the indices that stand
-//! for bit rates.
+//! How a device takes a new node-ID and bit rate, and the tables of bit rate indices.
 
 use super::description::Description;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use std::collections::BTreeMap;
 
-/// One way to a new node-ID and bit rate. The first one that a description has is the one to take.
+/// One method to set node-ID and bit rate. The first one of a description is preferred.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssignEntry {
-    /// By which means.
+    /// The method.
     pub way: AssignWay,
-    /// The NMT state that the device wants for it; any, where nothing is said.
+    /// The NMT state that the method requires; `None` for any.
     pub state: Option<AssignState>,
-    /// Whether a device that does not answer LSS is asked once more in STOPPED.
+    /// Whether to retry in STOPPED if the device does not answer LSS.
     pub retry_stopped: bool,
-    /// Where the node-ID is written.
+    /// The object for the node-ID.
     pub node_id: Option<AssignPlace>,
-    /// Where the index of the bit rate is written.
+    /// The object for the index of the bit rate.
     pub bit_rate: Option<AssignPlace>,
-    /// The object that makes it last, written with "save"; none where the device keeps it by itself. LSS has its own
-    /// service for that.
+    /// The object that stores both, written with "save"; `None` if the device stores them by itself. LSS has its own
+    /// store service.
     pub store: Option<ObjectId>,
-    /// What brings it into force.
+    /// When the new values take effect.
     pub applies: Applies,
-    /// No source prints it: it is done only when it is asked for by name.
+    /// No document confirms this method: it is used only if the user names it.
     pub unverified: bool,
     /// Page or table of the manual.
     pub page: String,
@@ -33,7 +32,7 @@ pub struct AssignEntry {
 }
 
 impl AssignEntry {
-    /// LSS as the standard has it, for devices of which nothing else is known.
+    /// LSS as in CiA 305, for devices of which nothing else is known.
     pub fn lss() -> AssignEntry {
         AssignEntry {
             way: AssignWay::Lss,
@@ -50,16 +49,16 @@ impl AssignEntry {
     }
 }
 
-/// By which means a device takes its node-ID and bit rate.
+/// The method by which a device takes its node-ID and bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssignWay {
-    /// CiA 305.
+    /// LSS (CiA 305).
     Lss,
-    /// Objects of its own, by SDO.
+    /// Manufacturer-specific objects, written by SDO.
     Objects,
 }
 
-/// The NMT state that a device wants.
+/// The NMT state that a method requires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssignState {
     /// PRE-OPERATIONAL.
@@ -68,24 +67,24 @@ pub enum AssignState {
     Stopped,
 }
 
-/// What brings a new node-ID or bit rate into force.
+/// When a new node-ID or bit rate takes effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Applies {
-    /// A reset of the node.
+    /// After a reset of the node.
     #[default]
     Reset,
-    /// Power off and on; whether a reset does as well is not known.
+    /// After a power cycle; it is unknown whether a reset is sufficient.
     Power,
 }
 
 /// An object that takes a node-ID or the index of a bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AssignPlace {
-    /// Where.
+    /// The object.
     pub object: ObjectId,
     /// Its type.
     pub data_type: DataType,
-    /// Whether the number goes with the signature: `nn 's' 'e' 't'`, that is 0x746573nn.
+    /// Whether the number is written with the signature: `nn 's' 'e' 't'`, that is 0x746573nn.
     pub signature: bool,
 }
 
@@ -93,7 +92,7 @@ impl AssignPlace {
     /// The bytes that set `number`.
     ///
     /// # Errors
-    /// In words, when the type cannot take the number.
+    /// The type cannot hold the number.
     pub fn encode(&self, number: u8) -> Result<Vec<u8>, String> {
         if self.signature {
             return Ok(vec![number, b's', b'e', b't']);
@@ -102,31 +101,31 @@ impl AssignPlace {
     }
 }
 
-/// Which index stands for which bit rate.
+/// A table of bit rates with their indices.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RateTable {
     rates: BTreeMap<u8, u32>,
     /// The index of automatic detection, if there is one.
     auto: Option<u8>,
-    /// Whose it is.
+    /// The origin of the table.
     pub source: RateSource,
 }
 
-/// Whose table of bit rates it is.
+/// The origin of a table of bit rates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RateSource {
-    /// The description of the device has it.
+    /// The description of the device.
     Device,
-    /// Nothing is known of the device's own: it is that of CiA 305.
+    /// CiA 305: the device's own table is unknown.
     Standard,
 }
 
-/// CiA 305, table 0. 5 is reserved; 9 is automatic detection, which few devices have and each must say itself.
+/// CiA 305, table 0. Index 5 is reserved. Index 9 is automatic detection, which a description must state.
 const STANDARD: [(u8, u32); 8] =
     [(0, 1_000_000), (1, 800_000), (2, 500_000), (3, 250_000), (4, 125_000), (6, 50_000), (7, 20_000), (8, 10_000)];
 
 impl RateTable {
-    /// The table of a device; that of CiA 305 where its own is not known.
+    /// The table of a device, or the table of CiA 305 if its own is unknown.
     pub fn of(description: Option<&Description>) -> RateTable {
         let own = description.filter(|description| !description.bit_rates.is_empty());
         let auto = description.and_then(|description| description.auto_bit_rate);
@@ -159,7 +158,7 @@ impl RateTable {
     }
 }
 
-/// A bit rate as people write it: `250k`, `1M`.
+/// A bit rate in short form: `250k`, `1M`.
 pub fn spoken_rate(bit_rate: u32) -> String {
     match bit_rate {
         mega if mega > 0 && mega.is_multiple_of(1_000_000) => format!("{}M", mega / 1_000_000),
@@ -169,12 +168,12 @@ pub fn spoken_rate(bit_rate: u32) -> String {
 }
 
 impl Description {
-    /// The way to take when the user has not said which: the first that a source prints.
+    /// The preferred method: the first that a document confirms.
     pub fn assign_way(&self) -> Option<&AssignEntry> {
         self.assign.iter().find(|entry| !entry.unverified)
     }
 
-    /// The way by these means, if the device has one.
+    /// The method of this kind, if the device has it.
     pub fn assign_by(&self, way: AssignWay) -> Option<&AssignEntry> {
         self.assign.iter().find(|entry| entry.way == way)
     }
@@ -197,7 +196,7 @@ mod tests {
         assert_eq!(dps.rates(), [1_000_000, 500_000, 250_000, 125_000, 100_000, 50_000]);
         let mh4 = RateTable::of(Some(&description("mh4")));
         assert_eq!((mh4.auto(), mh4.index_of(100_000), mh4.rate_of(5)), (Some(9), None, None));
-        // CiA 305 has 5 reserved, and what is not known to be there is not there: 9.
+        // CiA 305: index 5 is reserved, and automatic detection (9) is not assumed.
         let standard = RateTable::of(None);
         assert_eq!((standard.rate_of(5), standard.rate_of(9), standard.auto()), (None, None, None));
         assert_eq!((standard.index_of(10_000), standard.source), (Some(8), RateSource::Standard));
@@ -205,26 +204,26 @@ mod tests {
     }
 
     #[test]
-    fn numbers_go_with_their_signature() {
+    fn numbers_are_written_with_their_signature() {
         let mh4 = description("mh4");
         assert_eq!(mh4.assign_way().map(|entry| entry.way), Some(AssignWay::Lss));
         let objects = mh4.assign_by(AssignWay::Objects).expect("2320h and 2321h");
         assert_eq!(objects.node_id.map(|place| place.encode(3)), Some(Ok(b"\x03set".to_vec())));
-        // HYDAC and Baumer take plain numbers.
+        // HYDAC and Baumer take plain numbers without a signature.
         let baumer = description("baumer");
         let objects = baumer.assign_way().expect("2100h and 2101h");
         assert_eq!(objects.node_id.map(|place| place.encode(3)), Some(Ok(vec![3])));
     }
 
     #[test]
-    fn what_no_source_prints_is_done_only_when_asked_for() {
+    fn unverified_methods_are_not_preferred() {
         let d20 = description("d20");
         assert_eq!(d20.assign_way().map(|entry| (entry.way, entry.retry_stopped)), Some((AssignWay::Lss, true)));
         assert_eq!(d20.assign_by(AssignWay::Objects).map(|entry| entry.unverified), Some(true));
     }
 
     #[test]
-    fn every_way_leads_somewhere() {
+    fn every_method_has_its_objects() {
         for model in built_in() {
             let Description { name, assign, .. } = &model.description;
             assert!(!assign.is_empty(), "{name}");
@@ -232,7 +231,7 @@ mod tests {
                 let places: Vec<AssignPlace> = entry.node_id.into_iter().chain(entry.bit_rate).collect();
                 assert_eq!(places.is_empty(), entry.way == AssignWay::Lss, "{name}");
                 for place in places {
-                    // What is known by name alone is no entry.
+                    // An unverified object is not described.
                     let described = model.dictionary.get(place.object);
                     assert_eq!(described.is_none(), entry.unverified, "{name}: {}", place.object);
                     let data_type = described.map_or(place.data_type, |described| described.data_type);

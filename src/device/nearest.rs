@@ -1,6 +1,6 @@
-//! How like two words are, for telling what somebody may have meant.
+//! Similarity of words, to suggest the name that the user may have meant.
 
-/// How many letters have to be changed, added or left out to get from one word to the other.
+/// How many letters must be changed, added or removed to turn one word into the other (Levenshtein).
 pub fn distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

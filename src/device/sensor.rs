@@ -1,7 +1,7 @@
-//! Kinds of sensors as 6110h codes them (CiA 404-1).
+//! Sensor types as coded in 6110h (CiA 404-1).
 
-/// Code and what it stands for: 2 (HBM MC1609), 90 and 100 (WIKA MH-4-CAN, HYDAC) from manuals; the rest is
-/// general knowledge of CiA 404, no page at hand.
+/// Codes and their meanings: 2 (HBM MC1609), 90 and 100 (WIKA MH-4-CAN, HYDAC) from manuals; the others are general
+/// knowledge of CiA 404, no page at hand.
 const KINDS: [(u16, &str); 16] = [
     (1, "thermocouple J"),
     (2, "thermocouple K"),
@@ -21,7 +21,7 @@ const KINDS: [(u16, &str); 16] = [
     (100, "temperature transducer"),
 ];
 
-/// What a code of 6110h stands for; `None` where it is not known, as all above 10000 are the manufacturer's.
+/// The meaning of a code of 6110h; `None` if it is unknown. Codes above 10000 are manufacturer-specific.
 pub fn kind(code: u16) -> Option<&'static str> {
     KINDS.iter().find(|(known, _)| *known == code).map(|(_, kind)| *kind)
 }

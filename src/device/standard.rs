@@ -1,10 +1,10 @@
-//! Objects that CiA 301 and CiA 404 give one type on every device.
+//! Objects that have the same type on every device (CiA 301, CiA 404).
 //!
-//! A table and no description file: every `sdo read` looks here first, and reading a file of runs that
-//! stand for thousands of entries would be most of the work of the whole program.
+//! This is a table and not a description: every `sdo read` looks here first, and a file with thousands of entries would
+//! take most of the program's time.
 //!
-//! Objects whose type differs between devices (6130h is INTEGER32 on the DPS) are not here: their type comes
-//! from a description.
+//! Objects whose type differs between devices (6130h is INTEGER32 on the DPS) are missing: their type comes from a
+//! description.
 
 use super::description::Access;
 use super::dictionary::Entry;
@@ -29,7 +29,7 @@ const U16: DataType = DataType::Unsigned(2);
 const U32: DataType = DataType::Unsigned(4);
 const TEXT: DataType = DataType::VisibleString;
 
-/// CiA 301 V4.2.0, 7.5; CiA 302-2 (1F80h); CiA 404-1 V2.1.0.
+/// Sources: CiA 301 V4.2.0, 7.5; CiA 302-2 (1F80h); CiA 404-1 V2.1.0.
 const ROWS: &[Row] = &[
     row(0x1000, 0, 0, "device-type", U32, Access::Ro),
     row(0x1001, 0, 0, "error-register", U8, Access::Ro),
@@ -80,7 +80,7 @@ const ROWS: &[Row] = &[
     row(0x61a1, 1, 199, "ai-filter-constant", U16, Access::Rw),
 ];
 
-/// What stands at 1800h + n-1 and 1A00h + n-1, by name behind `tpdo<n>-`.
+/// The objects at 1800h + n-1 and 1A00h + n-1; their names begin with `tpdo<n>-`.
 const COMMUNICATION: &[Row] = &[
     row(0, 0, 0, "entries", U8, Access::Ro),
     row(0, 1, 1, "cob-id", U32, Access::Rw),
@@ -118,7 +118,7 @@ pub fn entry(object: ObjectId) -> Option<Entry> {
     rows.iter().find_map(|row| row.entry(object, &prefix))
 }
 
-/// The entry of a name: `vendor-id`, `error-history:1`, `tpdo1-mapping:2`. Letter case does not count.
+/// The entry with a name: `vendor-id`, `error-history:1`, `tpdo1-mapping:2`. Letter case is ignored.
 pub fn find(name: &str) -> Option<Entry> {
     let name = name.to_ascii_lowercase();
     let (bare, sub) = match name.split_once(':') {
@@ -139,7 +139,7 @@ pub fn find(name: &str) -> Option<Entry> {
     ROWS.iter().filter(|row| row.name == bare).find_map(|row| found(row, row.index))
 }
 
-/// Every name, a run once with its first sub-index, to look for the nearest one.
+/// Every name, a run once with its first sub-index, for suggestions of the nearest name.
 pub fn names() -> impl Iterator<Item = String> {
     let plain = ROWS.iter().filter_map(|row| entry(ObjectId::new(row.index, row.first)));
     let pdos = [(COMMUNICATION, 0x1800), (MAPPING, 0x1a00)];
@@ -154,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_name_finds_its_object_and_no_other() {
+    fn every_name_finds_exactly_its_object() {
         let mut names: Vec<String> = names().collect();
         let count = names.len();
         for name in &names {

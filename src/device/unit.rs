@@ -1,4 +1,4 @@
-//! Physical units as 6131h codes them (CiA 303-2; sources of each code in the table).
+//! Physical units as coded in 6131h (CiA 303-2). The table gives the source of each code.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Unit(pub u32);
 
-/// What a numerator code stands for: code, ASCII symbol, and how to get to the base of its quantity.
+/// A numerator code with its ASCII symbol and its conversion to the base unit of its quantity.
 struct Base {
     code: u8,
     symbol: &'static str,
@@ -14,7 +14,7 @@ struct Base {
     scale: Option<(Quantity, f64, f64)>,
 }
 
-/// What is measured; only values of one quantity convert into each other.
+/// A physical quantity; only values of one quantity can be converted into each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Quantity {
     Pressure,
@@ -39,8 +39,11 @@ const fn scaled(code: u8, symbol: &'static str, quantity: Quantity, factor: f64,
 /// 1 psi in Pa: pound-force (0.45359237 kg * 9.80665 m/s2) on a square inch (0.0254 m).
 const PSI_PA: f64 = 0.453_592_37 * 9.806_65 / (0.0254 * 0.0254);
 
-/// DRP-303-2 V1.1, but 2Dh (MH-4, MC1609), 4Eh, ABh, ACh (MH-4, DPS), 26h (esd CAN-CBX-THERMO), 41h
-/// (Epson); 40h-4Ch without 41h and 25h-32h without 26h: general knowledge of CiA 303-2, no page at hand.
+/// Sources: DRP-303-2 V1.1, except 2Dh (MH-4, MC1609), 4Eh, ABh, ACh (MH-4, DPS), 26h (esd CAN-CBX-THERMO) and 41h
+/// (Epson).
+/// 40h-4Ch without 41h and 25h-32h without 26h: general knowledge of CiA 303-2, no page at hand.
+///
+/// A new unit is one line here.
 const BASES: &[Base] = &[
     scaled(0x01, "m", Quantity::Length, 1.0, 0.0),
     scaled(0x02, "kg", Quantity::Mass, 1.0, 0.0),
@@ -85,7 +88,7 @@ const BASES: &[Base] = &[
     scaled(0xac, "degF", Quantity::Temperature, 5.0 / 9.0, 459.67 * 5.0 / 9.0),
 ];
 
-/// Prefixes by power of ten. "da" and "h" are used only where nothing else reads the same.
+/// Prefixes by power of ten. "da" and "h" are printed only if no other unit has the same symbol.
 const PREFIXES: &[(i8, &str)] = &[
     (18, "E"),
     (15, "P"),
@@ -119,8 +122,8 @@ impl Unit {
         BASES.iter().find(|base| base.code == code)
     }
 
-    /// The ASCII symbol: `bar`, `degC`, `mbar`, `deg/s`; empty for no dimension; `None` where the code is
-    /// not known, or would look like another one (a hundredth of a day is no candela).
+    /// The ASCII symbol: `bar`, `degC`, `mbar`, `deg/s`; empty for no dimension. `None` if the code is unknown, or if
+    /// the symbol would mean another unit ("cd" is candela, not a hundredth of a day).
     pub fn symbol(self) -> Option<String> {
         self.composed().filter(|symbol| symbol.is_empty() || Unit::from_symbol(symbol) == Some(self))
     }
@@ -139,7 +142,7 @@ impl Unit {
         }
     }
 
-    /// The unit of a symbol as people type it: `bar`, `mbar`, `kPa`, `°C` or `degC`, `deg/s`, or a raw code `0x…`.
+    /// The unit of a symbol: `bar`, `mbar`, `kPa`, `°C` or `degC`, `deg/s`, or a raw code `0x…`.
     pub fn from_symbol(text: &str) -> Option<Unit> {
         if text.starts_with("0x") || text.starts_with("0X") {
             return crate::canopen::id::parse_u32(text).map(Unit);
@@ -165,14 +168,14 @@ impl Unit {
         Some((quantity, factor * 10f64.powi(i32::from(prefix)), offset))
     }
 
-    /// `value` of this unit in another one; `None` when they do not measure the same quantity or one of
-    /// them is not known. A temperature converts as a temperature, not as a difference of two.
+    /// Converts `value` from this unit to another; `None` if the quantities differ or a unit is unknown. A temperature
+    /// is converted as a temperature, not as a difference.
     pub fn convert(self, value: f64, to: Unit) -> Option<f64> {
         self.convert_with_zeros(value, to, 1.0)
     }
 
-    /// The same for a value that holds the zero of its scale `zeros` times: once for a temperature, not at all
-    /// for a difference of two.
+    /// Converts a value that contains the zero point of its scale `zeros` times: once for a temperature, 0 times for a
+    /// difference.
     pub fn convert_with_zeros(self, value: f64, to: Unit, zeros: f64) -> Option<f64> {
         if self == to {
             return Some(value);
@@ -182,7 +185,7 @@ impl Unit {
         (from_quantity == to_quantity).then(|| (value * from_factor + (from_offset - to_offset) * zeros) / to_factor)
     }
 
-    /// Whether zero of this unit is zero of the other one, as it is not for degC and K.
+    /// Whether both units have the same zero point; degC and K do not.
     pub fn has_zero_of(self, other: Unit) -> bool {
         let zero = |unit: Unit| unit.scale().map(|(_, _, offset)| offset);
         self == other || zero(self) == zero(other)
@@ -190,7 +193,7 @@ impl Unit {
 }
 
 impl fmt::Display for Unit {
-    /// The symbol, or the raw code where it is not known.
+    /// The symbol, or the raw code if the unit is unknown.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.symbol() {
             Some(symbol) => f.write_str(&symbol),
@@ -242,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn every_code_of_the_table_stands_once_and_reads_back() {
+    fn every_unit_code_occurs_once_and_reads_back() {
         for base in BASES {
             let unit = Unit(u32::from(base.code) << 16);
             assert_eq!(unit.to_string(), base.symbol);
@@ -251,8 +254,8 @@ mod tests {
     }
 
     #[test]
-    fn no_code_looks_like_another_one() {
-        // Found by fuzzing: centi-days looked like candelas, and m/rad could not be typed.
+    fn no_two_codes_have_the_same_symbol() {
+        // Found by fuzzing: centi-days had the symbol of candela, and m/rad could not be typed.
         let mut shown = std::collections::BTreeMap::new();
         for base in BASES {
             for (power, _) in PREFIXES {
@@ -271,8 +274,7 @@ mod tests {
     fn conversion() {
         let unit = |symbol| Unit::from_symbol(symbol).expect("a unit");
         let convert = |value: f64, from, to| unit(from).convert(value, unit(to)).expect("the same quantity");
-        // DPS, table 19: 50.000 psi read 3.448 bar after the change of unit (3.44738 is exact; the device
-        // cuts or rounds to what it keeps).
+        // DPS, table 19: 50.000 psi are 3.448 bar after the change of unit. 3.44738 is exact; the device rounds.
         assert!((convert(50.0, "psi", "bar") - 3.447_379).abs() < 1e-6);
         assert!((convert(1.0, "bar", "kPa") - 100.0).abs() < 1e-9);
         assert!((convert(25.0, "degC", "degF") - 77.0).abs() < 1e-9);

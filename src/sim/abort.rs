@@ -1,12 +1,12 @@
 //! Abort codes that the simulated SDO server sends (CiA 301, 7.2.4.3.17).
 
-/// Why a server refuses: the code as it stands in bytes 4 to 7.
+/// The reason for a refusal: the code in bytes 4 to 7 of the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Abort(pub u32);
 
 impl Abort {
-    /// The code that a device sends whose manual lists only `listed`: this one, or the next of its kind that
-    /// is listed. Where nothing is listed, and for what no other code says, it stays.
+    /// The code that a device sends if its manual lists only `listed`: this one if it is listed, else the nearest
+    /// listed one. If nothing is listed or no code is near, this one.
     pub(super) fn of_list(self, listed: &[u32]) -> Abort {
         let kin: &[Abort] = match self {
             Abort::VALUE | Abort::TOO_HIGH | Abort::TOO_LOW => &[Abort::VALUE, Abort::TOO_HIGH],
@@ -24,17 +24,17 @@ impl Abort {
 
     /// Toggle bit not alternated.
     pub const TOGGLE: Abort = Abort(0x0503_0000);
-    /// The client did not go on.
+    /// The client did not continue the transfer.
     pub const TIMEOUT: Abort = Abort(0x0504_0000);
     /// Client command specifier not valid or unknown.
     pub const COMMAND: Abort = Abort(0x0504_0001);
-    /// No block size from 1 to 127.
+    /// The block size is not in the range 1 to 127.
     pub const BLOCK_SIZE: Abort = Abort(0x0504_0002);
-    /// Segments acknowledged that were not sent.
+    /// The client acknowledged segments that were not sent.
     pub const SEQUENCE: Abort = Abort(0x0504_0003);
-    /// The data is not what was sent.
+    /// CRC error: the data differs from the data sent.
     pub const CRC: Abort = Abort(0x0504_0004);
-    /// More data than the server takes.
+    /// The data is longer than the server accepts.
     pub const MEMORY: Abort = Abort(0x0504_0005);
     /// Unsupported access to an object: the mapping cannot be changed while it is in use.
     pub const UNSUPPORTED: Abort = Abort(0x0601_0000);
@@ -52,7 +52,7 @@ impl Abort {
     pub const LENGTH: Abort = Abort(0x0607_0010);
     /// No such sub-index.
     pub const NO_SUB_INDEX: Abort = Abort(0x0609_0011);
-    /// Not one of the values allowed.
+    /// The value is not one of those allowed.
     pub const VALUE: Abort = Abort(0x0609_0030);
     /// Above the highest value.
     pub const TOO_HIGH: Abort = Abort(0x0609_0031);
@@ -62,6 +62,6 @@ impl Abort {
     pub const GENERAL: Abort = Abort(0x0800_0000);
     /// Cannot be transferred or stored: a wrong signature.
     pub const NOT_STORED: Abort = Abort(0x0800_0020);
-    /// Not in the present state of the device.
+    /// Not possible in the present state of the device.
     pub const DEVICE_STATE: Abort = Abort(0x0800_0022);
 }

@@ -1,32 +1,32 @@
-//! Benches: which simulated devices are on the bus, and how they are set up.
+//! Benches: the simulated devices on a bus, and their settings.
 //!
 //! `mh4@5,dps@127,dps@unconfigured`, or a TOML file:
 //!
 //! ```toml
-//! clock = "virtual"          # "real" unless given
-//! bit_rate = 125000          # of the bus as the program finds it; 250000 unless given
-//! retime = false             # the program may not change it; it may unless this is given
-//! seed = 7                   # 0 unless given
-//! record = "truth.csv"       # what was sent; beside this file
+//! clock = "virtual"          # default: "real"
+//! bit_rate = 125000          # bit rate of the bus at the start, in bit/s; default: 250000
+//! retime = false             # whether the program may change the bit rate; default: true
+//! seed = 7                   # seed of the noise; default: 0
+//! record = "truth.csv"       # record of the values sent, in the folder of this file
 //!
 //! [[device]]
-//! kind = "mh4"               # a built-in description, or a description file beside this one
-//! node = 5                   # without it the device is unconfigured
-//! twin = true                # another device may have the same node-ID
-//! bit_rate = 125000          # at another one than the bus's the device is deaf and mute
-//! latency = "300us"          # how long it thinks before it answers
-//! gone_after = ["reset"]     # does not come back after it until power on; or "activate"
+//! kind = "mh4"               # a built-in description, or a description file in the folder of this file
+//! node = 5                   # node-ID; without it the device is unconfigured
+//! duplicate_id = true        # another device may have the same node-ID
+//! bit_rate = 125000          # at a different bit rate than the bus, the device neither receives nor sends
+//! latency = "300us"          # response time
+//! offline_after = ["reset"]  # after this, the device is offline until a power cycle; or "activate"
 //! serial = 4711
 //! start = true               # becomes OPERATIONAL by itself
-//! set = { "0x1017" = 100, "0x1800:5" = 100 }   # as if written and saved before
+//! set = { "0x1017" = 100, "0x1800:5" = 100 }   # stored values
 //!
-//! [device.lss]               # by the service in the request
-//! lose = [0x17]              # the next answer is lost; once each
+//! [device.lss]               # keys are services, by the command specifier of the request
+//! lose = [0x17]              # the next answer is lost, once per entry
 //! late = { "0x11" = "2s" }   # the next answer is late
 //! refuse = { "0x17" = 1 }    # always refused, with this error code: 11h, 13h, 17h
-//! scans_for_ever = true      # answers every fastscan frame in configuration state
+//! endless_fastscan = true    # answers every fastscan frame in configuration state
 //!
-//! [[device.channel]]         # what is not given is as described
+//! [[device.channel]]         # a measured quantity; missing keys keep their defaults
 //! channel = 1
 //! base = 5.0
 //! amplitude = 1.0
@@ -36,7 +36,7 @@
 //! [[device.overload]]
 //! channel = 1
 //! from = "1s"
-//! until = "2s"               # for ever unless given
+//! until = "2s"               # default: no end
 //! direction = "high"         # or "low"
 //! ```
 
@@ -50,13 +50,13 @@ use file::{BenchFile, DeviceEntry};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// What stands in the place of the node-ID of a device that has none.
+/// The word in place of a node-ID for an unconfigured device.
 const UNCONFIGURED: &str = "unconfigured";
 
-/// The bench when none is described.
+/// The bench of plain `sim`.
 const DEFAULT: &str = "mh4@1,d20@2,mc1609@3,dps@127";
 
-/// Devices that are ready to be put on a bus.
+/// Devices that can be attached to a bus.
 pub struct Bench {
     clock: Clock,
     bit_rate: u32,
@@ -68,7 +68,7 @@ pub struct Bench {
 /// A bench that cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
-    /// What was asked for makes no sense; nothing has been opened.
+    /// A mistake in the bench; nothing was opened.
     #[error("{0}")]
     Usage(String),
     /// A file cannot be opened.
@@ -76,16 +76,16 @@ pub enum BenchError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
 }
 
 impl Bench {
-    /// Reads what stands behind `sim:`; nothing at all is the bench of plain `sim`.
+    /// Reads the text after `sim:`; empty text is the bench of plain `sim`.
     ///
     /// # Errors
-    /// Everything that is wrong with it, before anything is opened for writing.
+    /// Any mistake in it, before a file is opened for writing.
     pub fn parse(spec: &str) -> Result<Bench, BenchError> {
         if spec.is_empty() {
             Bench::from_list(DEFAULT)
@@ -117,7 +117,7 @@ impl Bench {
         Bench::build(file, Path::new(""))
     }
 
-    /// Reads a bench description; files that it names stand in the folder `beside`.
+    /// Reads a bench file; `beside` is the folder of the files that it names.
     ///
     /// # Errors
     /// TOML errors with their line, unknown keys, devices and objects that do not exist.
@@ -138,7 +138,7 @@ impl Bench {
         let mut of_kind: BTreeMap<String, u32> = BTreeMap::new();
         let mut devices = Vec::new();
         for entry in &file.device {
-            if let Some(node) = entry.node.filter(|node| !taken.insert(*node) && !entry.twin) {
+            if let Some(node) = entry.node.filter(|node| !taken.insert(*node) && !entry.duplicate_id) {
                 return Err(BenchError::Usage(format!("two devices with node-ID {node}")));
             }
             let before = of_kind.entry(entry.kind.clone()).or_default();
@@ -150,15 +150,15 @@ impl Bench {
         Ok(Bench { clock: file.clock.into(), bit_rate, retime: file.retime, record, devices })
     }
 
-    /// The clock that it goes by.
+    /// The clock of the bench.
     pub fn clock(&self) -> Clock {
         self.clock
     }
 
-    /// The devices, recording if the bench says so.
+    /// The devices, with a recorder if the bench asks for one.
     ///
     /// # Errors
-    /// When the record cannot be written.
+    /// The record cannot be written.
     pub fn into_devices(self) -> Result<Vec<Device>, BenchError> {
         let Some(path) = self.record else { return Ok(self.devices) };
         let recorder = std::fs::File::create(&path)
@@ -167,10 +167,10 @@ impl Bench {
         Ok(self.devices.into_iter().map(|device| device.recording(recorder.clone())).collect())
     }
 
-    /// A bus with the devices on it, their power just switched on.
+    /// A bus with the devices attached and switched on.
     ///
     /// # Errors
-    /// When the record cannot be written.
+    /// The record cannot be written.
     pub fn open(self) -> Result<MemoryBus, BenchError> {
         let mut bus = MemoryBus::new(self.clock).with_bit_rate(self.bit_rate).with_retiming(self.retime);
         self.into_devices()?.into_iter().for_each(|device| bus.attach(device));

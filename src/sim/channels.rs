@@ -1,5 +1,5 @@
-//! The measuring channels of a simulated device: the quantity behind each, and the objects that show it
-//! (CiA 404: x100h, x130h, 6150h and what belongs to them).
+//! The measuring channels of a simulated device: the quantity of each, and the objects that contain its value (CiA 404:
+//! x100h, x130h, 6150h and related objects).
 
 use super::filter::{self, Filter};
 use super::model::{Direction, Quantity};
@@ -17,7 +17,7 @@ use std::time::Duration;
 /// The first digit of an index: REAL32, INTEGER16, INTEGER24, INTEGER32.
 const FAMILIES: [u16; 4] = [0x6000, 0x7000, 0x8000, 0x9000];
 
-/// What an object shows.
+/// The contents of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shows {
     Value,
@@ -27,16 +27,16 @@ enum Shows {
     Highest,
 }
 
-/// How a number that is kept in the unit of its channel changes with the unit.
+/// How a number in the unit of its channel is converted if the unit changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// A point on the scale: limits and ends of the range.
+    /// A point on the scale: limits, start and end of the range.
     Point,
     /// A distance on the scale: offsets, deltas, hysteresis.
     Distance,
 }
 
-/// What CiA 404 keeps in the unit of 6131h beside the value itself.
+/// The objects of CiA 404 in the unit of 6131h, besides the value itself.
 const IN_PV_UNIT: [(u16, Kind); 9] = [
     (0x121, Kind::Point),
     (0x123, Kind::Point),
@@ -61,23 +61,23 @@ struct Channel {
     signal: SignalEntry,
     quantity: Quantity,
     filter: Filter,
-    /// The lowest and highest value that was looked at.
+    /// The lowest and highest value that was read.
     seen: Option<(f64, f64)>,
-    /// Other objects in its unit.
+    /// Other objects in the unit of the channel.
     follows: Vec<(ObjectId, Kind)>,
 }
 
-/// One measured value as it went out.
+/// One measured value as it was sent.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Reading {
     pub(super) signal: String,
     pub(super) unit: Unit,
-    /// Where the device tells the status of the value.
+    /// The object with the status of the value.
     pub(super) status: Option<ObjectId>,
-    /// Digits behind the point of an integer, none of a real number.
+    /// Decimal digits of an integer; `None` for a real number.
     pub(super) digits: Option<u32>,
     pub(super) overload: Option<Direction>,
-    /// Whether an overload shows in the value itself.
+    /// Whether an overload replaces the value itself.
     pub(super) marker: bool,
 }
 
@@ -103,7 +103,7 @@ impl Channels {
         Channels { list, shown }
     }
 
-    /// The bytes of an object that shows a measurement at `time`; `None` of every other object.
+    /// The bytes of an object with a measurement at `time`; `None` for any other object.
     pub(super) fn read(&mut self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Vec<u8>> {
         let (index, shows) = *self.shown.get(&object)?;
         let data_type = objects.spec(object)?.data_type;
@@ -111,7 +111,7 @@ impl Channels {
         Some(channel.read(objects, shows, data_type, time))
     }
 
-    /// What a mapped object means, if it is a measured value.
+    /// The meaning of a mapped object, if it is a measured value.
     pub(super) fn reading(&self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Reading> {
         let (index, Shows::Value) = *self.shown.get(&object)? else { return None };
         let channel = self.list.get(index)?;
@@ -126,12 +126,12 @@ impl Channels {
         })
     }
 
-    /// Whether an object shows the status of a channel.
+    /// Whether an object contains the status of a channel.
     pub(super) fn is_status(&self, object: ObjectId) -> bool {
         self.shown.get(&object).is_some_and(|(_, shows)| *shows == Shows::Status)
     }
 
-    /// The measured value at `time` in the numbers of the object (an integer counts its digits), without
+    /// The measured value at `time` as the number in the object: an integer is multiplied by its power of ten. Without
     /// marker and rounding.
     pub(super) fn number(&mut self, objects: &Objects, object: ObjectId, time: Duration) -> Option<f64> {
         let (index, Shows::Value) = *self.shown.get(&object)? else { return None };
@@ -141,7 +141,7 @@ impl Channels {
         Some(channel.scaled(objects, data_type, channel.value(objects, raw)))
     }
 
-    /// The lowest and highest number that [`Channels::number`] can come to.
+    /// The lowest and highest possible number of [`Channels::number`].
     pub(super) fn reach(&self, objects: &Objects, object: ObjectId) -> Option<(f64, f64)> {
         let (channel, data_type) = self.value_of(objects, object)?;
         let (low, high) = channel.quantity.reach();
@@ -149,7 +149,7 @@ impl Channels {
         Some((a.min(b), a.max(b)))
     }
 
-    /// When the next value of an object is there.
+    /// The time of the next sample of an object.
     pub(super) fn next_sample(&self, objects: &Objects, object: ObjectId, time: Duration) -> Option<Duration> {
         let (channel, _) = self.value_of(objects, object)?;
         Some(channel.quantity.next_sample(time))
@@ -160,17 +160,17 @@ impl Channels {
         Some((self.list.get(index)?, objects.spec(object)?.data_type))
     }
 
-    /// Every channel with the side on which it is overloaded at `time`.
+    /// Every channel with the direction of its overload at `time`.
     pub(super) fn overloads(&self, time: Duration) -> impl Iterator<Item = (u8, Option<Direction>)> {
         self.list.iter().map(move |channel| (channel.signal.channel, channel.quantity.overload(time)))
     }
 
-    /// When [`Channels::overloads`] may change next.
+    /// The time of the next change in [`Channels::overloads`].
     pub(super) fn next_overload_change(&self, time: Duration) -> Option<Duration> {
         self.list.iter().filter_map(|channel| channel.quantity.next_change(time)).min()
     }
 
-    /// The present value becomes zero: the offset takes it up. `false` if the channel has none.
+    /// Sets the present value to zero through the offset. `false` if the channel has no offset.
     pub(super) fn autozero(&mut self, objects: &mut Objects, number: u8, time: Duration) -> bool {
         let Some(channel) = self.list.iter_mut().find(|channel| channel.signal.channel == number) else { return false };
         let Some(object) = channel.offset_object(objects) else { return false };
@@ -180,18 +180,17 @@ impl Channels {
         true
     }
 
-    /// Minimum and maximum begin anew.
-    pub(super) fn forget_extremes(&mut self, number: u8) {
+    /// Resets minimum and maximum.
+    pub(super) fn reset_extremes(&mut self, number: u8) {
         self.list.iter_mut().filter(|channel| channel.signal.channel == number).for_each(|channel| channel.seen = None);
     }
 
-    /// Whether an object holds the unit of a channel.
+    /// Whether an object contains the unit of a channel.
     pub(super) fn is_unit(&self, object: ObjectId) -> bool {
         self.list.iter().any(|channel| channel.signal.unit == Some(object))
     }
 
-    /// A channel gets another unit, and what is kept in it changes along. `false` if the value cannot be
-    /// converted.
+    /// Changes the unit of a channel and converts every object in it. `false` if the value cannot be converted.
     pub(super) fn change_unit(&self, objects: &mut Objects, object: ObjectId, to: Unit) -> bool {
         let Some(channel) = self.list.iter().find(|channel| channel.signal.unit == Some(object)) else { return false };
         let from = channel.unit(objects);
@@ -208,12 +207,12 @@ impl Channels {
         true
     }
 
-    /// Every filter begins anew: the device has started.
+    /// Restarts every filter: the device has started.
     pub(super) fn begin(&mut self, objects: &Objects, time: Duration) {
         self.list.iter_mut().for_each(|channel| channel.filter.begin(objects, &channel.quantity, time));
     }
 
-    /// An object was written: if it sets a filter, that begins anew.
+    /// Restarts a filter if the object written belongs to it.
     pub(super) fn refilter(&mut self, objects: &mut Objects, written: ObjectId, time: Duration) {
         let constant = self.damp(objects, written);
         let sets = |channel: &&mut Channel| channel.filter.is_set_by(constant.unwrap_or(written));
@@ -222,7 +221,7 @@ impl Channels {
         }
     }
 
-    /// A PDO with these objects has been sent.
+    /// Notes that a PDO with these objects was sent.
     pub(super) fn sent(&mut self, mapped: &[ObjectId]) {
         for (index, _) in mapped.iter().filter_map(|object| self.shown.get(object)) {
             if let Some(channel) = self.list.get_mut(*index) {
@@ -231,8 +230,8 @@ impl Channels {
         }
     }
 
-    /// A damping that was written makes a constant of the moving average (MH-4, 4.3.7); the object that it
-    /// has changed.
+    /// Derives the constant of the moving average from a damping that was written (MH-4, 4.3.7). Returns the object
+    /// changed.
     fn damp(&self, objects: &mut Objects, object: ObjectId) -> Option<ObjectId> {
         objects.spec(object).filter(|spec| spec.name == "damping")?;
         let [kind, constant] = [0x61a0, 0x61a1].map(|index| ObjectId::new(index, object.sub));
@@ -266,7 +265,7 @@ impl Channel {
         Channel { signal: signal.clone(), quantity, filter, seen: None, follows }
     }
 
-    /// The objects that show this channel.
+    /// The objects that contain a value of this channel.
     fn shown(&self, objects: &Objects, alone: bool) -> Vec<(ObjectId, Shows)> {
         let sub = self.signal.channel;
         let mut shown: Vec<(ObjectId, Shows)> = Vec::new();
@@ -277,8 +276,8 @@ impl Channel {
         shown.push((self.signal.value, Shows::Value));
         shown.extend(self.signal.also.iter().map(|object| (*object, Shows::Value)));
         shown.extend(self.signal.status.map(|object| (object, Shows::Status)));
-        // The two are the manufacturer's own and have names instead of fixed indices.
-        // A device that measures one thing may keep them without sub-indices.
+        // These two are manufacturer-specific: they have fixed names, not fixed indices. A device with one channel may
+        // have them without sub-indices.
         let mine = |object: &ObjectId| object.sub == sub || (object.sub == 0 && alone);
         shown.extend(objects.specs().filter(|(object, _)| mine(object)).filter_map(|(object, spec)| {
             match spec.name.as_str() {
@@ -312,12 +311,12 @@ impl Channel {
         }
     }
 
-    /// The measured quantity at `time` behind the filter.
+    /// The measured quantity at `time` after the filter.
     fn filtered(&mut self, time: Duration) -> f64 {
         self.filter.value(&self.quantity, time)
     }
 
-    /// A measured quantity as a value in the current unit, with factor and offset.
+    /// Converts a measured quantity into the present unit, with factor and offset.
     fn value(&self, objects: &Objects, raw: f64) -> f64 {
         let converted = Unit(self.quantity.channel().unit).convert(raw, self.unit(objects)).unwrap_or(raw);
         let factor = objects.real(ObjectId::new(0x6126, self.signal.channel)).unwrap_or(1.0);
@@ -325,7 +324,7 @@ impl Channel {
         converted * factor + offset
     }
 
-    /// Where the offset stands: 6127h beside the factor, else x124h.
+    /// The object with the offset: 6127h with a factor, else x124h.
     fn offset_object(&self, objects: &Objects) -> Option<ObjectId> {
         let sub = self.signal.channel;
         let candidates = [0x6127, 0x6124, 0x7124, 0x8124, 0x9124];
@@ -336,7 +335,7 @@ impl Channel {
         number::to_bytes(self.scaled(objects, data_type, self.value(objects, raw)), data_type)
     }
 
-    /// A value in the numbers of a type: integers count their digits.
+    /// A value as the number in a type: an integer is multiplied by its power of ten.
     fn scaled(&self, objects: &Objects, data_type: DataType, value: f64) -> f64 {
         match data_type {
             DataType::Real32 | DataType::Real64 => value,
@@ -357,7 +356,7 @@ impl Channel {
         Unit(told.map_or(self.quantity.channel().unit, |object| objects.number(object)))
     }
 
-    /// The value of an object that is kept in the unit of the channel.
+    /// The value of an object in the unit of the channel.
     fn pv(&self, objects: &Objects, object: ObjectId) -> Option<f64> {
         let number = objects.real(object)?;
         Some(match objects.spec(object)?.data_type {
@@ -374,7 +373,7 @@ impl Channel {
     }
 }
 
-/// 6150h: bit 0 not valid, bit 1 positive, bit 2 negative overload.
+/// 6150h: bit 0 invalid, bit 1 positive, bit 2 negative overload.
 pub(super) fn status(overload: Option<Direction>) -> u8 {
     match overload {
         None => 0b000,
@@ -383,7 +382,7 @@ pub(super) fn status(overload: Option<Direction>) -> u8 {
     }
 }
 
-/// What stands in the place of a value that is not valid (MH-4, 4.2.15): not a number, the smallest integer.
+/// The bytes that replace an invalid value (MH-4, 4.2.15): NaN, or the smallest integer.
 fn marker(data_type: DataType) -> Vec<u8> {
     match data_type {
         DataType::Integer(_) => number::to_bytes(f64::NEG_INFINITY, data_type),
@@ -404,7 +403,7 @@ mod tests {
 
     const AT: Duration = Duration::from_millis(500);
 
-    /// A device whose every channel stands still at `base`, given in its own unit.
+    /// A device whose channels are constant at `base` in their own units.
     fn still(name: &str, base: f64, overloads: &[(u8, Overload)]) -> (Objects, Channels) {
         let mut setup = Setup::new(catalog::by_name(name).expect("built in"), NodeId::new(5).expect("a node-ID"));
         for channel in &mut setup.channels {
@@ -452,13 +451,13 @@ mod tests {
         // Table 18: the span goes along; 100 psi are 6.895 bar.
         assert_eq!(objects.real(id("6149:1")), Some(6895.0));
         assert_eq!(objects.real(id("2006")), Some(6895.0));
-        // To a temperature it cannot change, and nothing is changed then.
+        // A pressure cannot change to a temperature; nothing is changed.
         assert!(!channels.change_unit(&mut objects, id("6131:1"), Unit(0x2d_0000)));
         assert_eq!(objects.number(id("6131:1")), 0x4e_0000);
     }
 
     #[test]
-    fn points_and_distances_convert_each_in_their_way() {
+    fn points_and_distances_are_converted_differently() {
         let (mut objects, mut channels) = still("mh4", 25.0, &[]);
         objects.put(id("6133:2"), 10f32.to_le_bytes().to_vec());
         assert!(channels.change_unit(&mut objects, id("6131:2"), Unit(0xac_0000)));
@@ -469,12 +468,12 @@ mod tests {
     }
 
     #[test]
-    fn autozero_takes_the_value_into_the_offset() {
+    fn autozero_moves_the_value_into_the_offset() {
         let (mut objects, mut channels) = still("mh4", 0.25, &[]);
         assert!(channels.autozero(&mut objects, 1, AT));
         assert_eq!(objects.real(id("6127:1")), Some(-0.25));
         assert_eq!(real(&channels.read(&objects, id("6130:1"), AT).expect("shown")), 0.0);
-        // Again at zero changes nothing.
+        // A second autozero at zero changes nothing.
         assert!(channels.autozero(&mut objects, 1, AT));
         assert_eq!(objects.real(id("6127:1")), Some(-0.25));
         let (mut objects, mut channels) = still("dps", 0.5, &[]);
@@ -484,7 +483,7 @@ mod tests {
     }
 
     #[test]
-    fn an_overload_shows_as_the_manual_says() {
+    fn overload_has_the_form_of_the_manual() {
         let overload = |direction| [(1, Overload { from: Duration::ZERO, until: Duration::MAX, direction })];
         for (direction, bits) in [(Direction::High, 0x03), (Direction::Low, 0x05)] {
             let (objects, mut channels) = still("mh4", 5.0, &overload(direction));
@@ -494,13 +493,13 @@ mod tests {
             assert_eq!(channels.read(&objects, id("6150:1"), AT), Some(vec![bits]));
             assert_eq!(channels.read(&objects, id("6150:2"), AT), Some(vec![0]), "the other channel is well");
         }
-        // Without a marker the value itself is beyond the range of 100 psi.
+        // Without a marker, the value itself is outside of the range of 100 psi.
         let (objects, mut channels) = still("dps", 5.0, &overload(Direction::High));
         assert_eq!(channels.read(&objects, id("6130:1"), AT), Some(105_000i32.to_le_bytes().to_vec()));
     }
 
     #[test]
-    fn extremes_are_those_of_what_was_looked_at() {
+    fn extremes_cover_the_values_read() {
         let model = catalog::by_name("mh4").expect("built in");
         let objects = Objects::new(&model, NodeId::new(5).expect("a node-ID"));
         let mut channels = Channels::new(&Setup::new(model, NodeId::MIN), &objects);
@@ -515,7 +514,7 @@ mod tests {
         assert!(lowest < highest);
         assert_eq!(real(&channels.read(&objects, id("2020:1"), last).expect("shown")), lowest);
         assert_eq!(real(&channels.read(&objects, id("2021:1"), last).expect("shown")), highest);
-        channels.forget_extremes(1);
+        channels.reset_extremes(1);
         let now = values.last().copied().expect("values");
         assert_eq!(real(&channels.read(&objects, id("2020:1"), last).expect("shown")), now);
         assert_eq!(real(&channels.read(&objects, id("2021:1"), last).expect("shown")), now);

@@ -48,7 +48,7 @@ pub struct SimLss {
     pub states: Vec<SimState>,
     /// Whether the answer to the selective switch contains the mode (44h 01h).
     #[serde(default)]
-    pub tells_mode: bool,
+    pub reports_mode: bool,
 }
 
 /// An NMT state of a simulated device.

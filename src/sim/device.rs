@@ -1,4 +1,4 @@
-//! A simulated device: NMT, heartbeat, guarding, and what makes it send.
+//! A simulated device: NMT, heartbeat, guarding, and the causes of its frames.
 
 mod assign;
 
@@ -11,7 +11,7 @@ use super::objects::{Area, Objects};
 use super::record::{Line, Recorder, line, plain};
 use super::sdo_server::SdoServer;
 use super::settings::{Pair, Rate, Settings};
-use super::setup::{GoneAfter, SERIAL_NUMBER, Setup};
+use super::setup::{OfflineAfter, SERIAL_NUMBER, Setup};
 use super::tpdo::{Cause, Tpdo};
 use crate::bus::memory::{Outbox, Station, Tuning};
 use crate::bus::time::Mono;
@@ -22,28 +22,28 @@ use crate::device::quirk::Quirk;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// How long a device is away after a reset of the node.
+/// Duration of a reset of the node.
 const RESTART: Duration = Duration::from_millis(100);
-/// How long it is away after a reset of the communication.
+/// Duration of a reset of the communication.
 const RECONNECT: Duration = Duration::from_millis(10);
 
 const COB_ID_SYNC: ObjectId = ObjectId::new(0x1005, 0);
 const GUARD_TIME: ObjectId = ObjectId::new(0x100c, 0);
 const HEARTBEAT_TIME: ObjectId = ObjectId::new(0x1017, 0);
 const NMT_STARTUP: ObjectId = ObjectId::new(0x1f80, 0);
-/// CAN overrun and SYNC length: the code that CiA 301 has for a SYNC with unexpected bytes.
+/// Emergency code for a SYNC of unexpected length (CiA 301).
 const SYNC_LENGTH: u16 = 0x8240;
 
-/// What a device is doing.
+/// What a device does at present.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     Off,
-    /// Away until then.
+    /// Initialising until then.
     Starting(Mono),
-    /// Without a node-ID: only LSS.
+    /// Without a node-ID: it answers LSS only.
     Unconfigured,
     Running(State),
-    /// It changes its bit rate at the moment `switch` and is silent until `until`; the state then is `after`.
+    /// It changes its bit rate at `switch`, is silent until `until`, and then has the state `after`.
     Retiming {
         after: Option<State>,
         switch: Option<Mono>,
@@ -60,22 +60,22 @@ pub struct Device {
     tpdos: Vec<Tpdo>,
     phase: Phase,
     heartbeat: Option<Mono>,
-    /// Bit 7 of the next guarding answer.
+    /// Toggle bit of the next guarding answer.
     toggle: bool,
-    /// When an overload may begin or end.
-    overload_look: Option<Mono>,
-    /// Answers that it still thinks about.
-    thinking: VecDeque<(Mono, Frame)>,
+    /// The next time at which an overload may begin or end.
+    next_overload_change: Option<Mono>,
+    /// Answers that are not due yet.
+    delayed: VecDeque<(Mono, Frame)>,
     recorder: Option<Recorder>,
-    /// TPDOs on their way to the wire, with what the record says of them.
-    under_way: VecDeque<(Frame, Vec<Line>)>,
+    /// TPDOs that wait for the bus, with their lines for the record.
+    in_transit: VecDeque<(Frame, Vec<Line>)>,
 }
 
 impl Device {
-    /// A device without power.
+    /// A device that is switched off.
     ///
     /// # Errors
-    /// In words, when an object that is to be set does not exist or cannot hold the value.
+    /// An object of `setup.set` does not exist or cannot hold the value.
     pub fn new(setup: Setup) -> Result<Device, String> {
         let model = &setup.model;
         let description = &model.description;
@@ -99,7 +99,7 @@ impl Device {
         let settings = Settings::new(description, &objects, pair);
         let memory = Memory { node, settings, objects, channels, emergencies, remap: description.pdo.remap };
         let oddities = &setup.oddities;
-        let lss = Slave::new(setup.sim.lss.clone(), oddities.refuse.clone(), oddities.scans_for_ever);
+        let lss = Slave::new(setup.sim.lss.clone(), oddities.refuse.clone(), oddities.endless_fastscan);
         Ok(Device {
             setup,
             memory,
@@ -109,41 +109,41 @@ impl Device {
             phase: Phase::Off,
             heartbeat: None,
             toggle: false,
-            overload_look: None,
-            thinking: VecDeque::new(),
+            next_overload_change: None,
+            delayed: VecDeque::new(),
             recorder: None,
-            under_way: VecDeque::new(),
+            in_transit: VecDeque::new(),
         })
     }
 
-    /// The same device, which records what it sends.
+    /// The same device with a recorder for the values it sends.
     pub fn recording(mut self, recorder: Recorder) -> Device {
         self.recorder = Some(recorder);
         self
     }
 
-    /// Its present node-ID; `None` if it has none.
+    /// Its present node-ID; `None` if it is unconfigured.
     pub fn node(&self) -> Option<NodeId> {
         self.memory.settings.active.node
     }
 
-    /// Its present bit rate in bit/s; `None` if it is that of the bus.
+    /// Its present bit rate in bit/s; `None` if it follows the bus.
     pub fn bit_rate(&self) -> Option<u32> {
         fixed(self.memory.settings.active.rate)
     }
 
-    /// The node-ID and the bit rate in bit/s that it will have after power on.
+    /// The node-ID and the bit rate in bit/s after the next power-on.
     pub fn stored(&self) -> (Option<NodeId>, Option<u32>) {
         let Pair { node, rate } = self.memory.settings.persistent;
         (node, fixed(rate))
     }
 
-    /// Whether it is in the configuration state of LSS.
+    /// Whether it is in LSS configuration state.
     pub fn is_configuring(&self) -> bool {
         self.lss.is_configuring()
     }
 
-    /// Its NMT state; `None` without power and while it starts.
+    /// Its NMT state; `None` while it is off or initialising.
     pub fn state(&self) -> Option<State> {
         match self.phase {
             Phase::Running(state) => Some(state),
@@ -152,7 +152,7 @@ impl Device {
         }
     }
 
-    /// The bytes of an object at `now`, whatever its access; `None` if there is no such object.
+    /// The bytes of an object at `now`, independent of its access; `None` if it does not exist.
     pub fn value(&mut self, object: ObjectId, now: Mono) -> Option<Vec<u8>> {
         self.memory.value(object, now.since_start())
     }
@@ -161,7 +161,7 @@ impl Device {
         self.phase == Phase::Running(State::Operational)
     }
 
-    /// Initialisation is over: boot-up, then PRE-OPERATIONAL or at once OPERATIONAL.
+    /// Ends the initialisation: boot-up, then PRE-OPERATIONAL or OPERATIONAL.
     fn boot(&mut self, now: Mono, out: &mut Outbox) {
         if self.node().is_none() {
             self.phase = Phase::Unconfigured;
@@ -170,7 +170,7 @@ impl Device {
         out.send(Frame::byte(CanId::heartbeat(self.memory.node), 0x00));
         self.toggle = false;
         self.restart_heartbeat(now + self.heartbeat_period().unwrap_or_default());
-        // MH-4, 4.1.16: 8 starts by itself. CiA 302-2: bit 3 set with bit 2 clear.
+        // MH-4, 4.1.16: 8 means autonomous start. CiA 302-2: bit 3 set and bit 2 clear.
         let startup = self.memory.objects.number(NMT_STARTUP);
         let other = self.setup.model.description.startup.as_ref().filter(|startup| startup.object != NMT_STARTUP);
         let by_other = other.is_some_and(|other| self.memory.objects.number(other.object) == other.auto);
@@ -178,7 +178,7 @@ impl Device {
         self.enter(if starts { State::Operational } else { State::PreOperational }, now);
         self.memory.channels.begin(&self.memory.objects, now.since_start());
         self.memory.emergencies.publish(&mut self.memory.objects);
-        self.look_for_overload(now);
+        self.update_overloads(now);
         self.send_emergencies(now, out);
     }
 
@@ -201,37 +201,37 @@ impl Device {
         }
     }
 
-    /// A reset: nothing that waits is sent any more, and the device is away for a while.
+    /// Resets the device: pending frames are dropped, and it initialises.
     fn reset(&mut self, area: Area, now: Mono, out: &mut Outbox) {
-        self.fall_silent(out);
+        self.drop_pending(out);
         if area == Area::All {
             self.memory.emergencies.forget();
         }
         self.memory.settings.reset();
         self.restart(area);
-        let is_gone = self.setup.oddities.gone_after.contains(&GoneAfter::Reset);
+        let is_gone = self.setup.oddities.offline_after.contains(&OfflineAfter::Reset);
         let away = if area == Area::All { RESTART } else { RECONNECT };
         self.phase = if is_gone { Phase::Off } else { Phase::Starting(now + away) };
     }
 
-    /// Nothing that waits is sent any more, and nothing is made that could be.
-    fn fall_silent(&mut self, out: &mut Outbox) {
-        // What is on the wire already gets there, and into the record.
+    /// Drops every pending frame and everything that would cause one.
+    fn drop_pending(&mut self, out: &mut Outbox) {
+        // A frame that is already being transmitted still arrives and is recorded.
         let mut dropped: Vec<Frame> = std::iter::from_fn(|| out.pop()).collect();
         while let Some(frame) = dropped.pop() {
-            if self.under_way.back().is_some_and(|(waiting, _)| *waiting == frame) {
-                self.under_way.pop_back();
+            if self.in_transit.back().is_some_and(|(waiting, _)| *waiting == frame) {
+                self.in_transit.pop_back();
             }
         }
-        self.thinking.clear();
+        self.delayed.clear();
         self.sdo.forget();
         self.tpdos.iter_mut().for_each(Tpdo::stop);
         self.heartbeat = None;
-        self.overload_look = None;
+        self.next_overload_change = None;
         self.memory.emergencies.drop_waiting();
     }
 
-    /// What is saved comes into force, under the node-ID that does.
+    /// Loads the stored values, under the node-ID that is now active.
     fn restart(&mut self, area: Area) {
         let Memory { node, settings, objects, .. } = &mut self.memory;
         *node = settings.active.node.unwrap_or(NodeId::MIN);
@@ -249,7 +249,7 @@ impl Device {
         self.heartbeat = self.heartbeat_period().map(|_| first);
     }
 
-    fn obey(&mut self, command: Command, now: Mono, out: &mut Outbox) {
+    fn execute(&mut self, command: Command, now: Mono, out: &mut Outbox) {
         match command {
             Command::ResetNode => self.reset(Area::All, now, out),
             Command::ResetCommunication => self.reset(Area::Communication, now, out),
@@ -257,7 +257,7 @@ impl Device {
         }
     }
 
-    /// The answer to node guarding, where the device has it and no heartbeat takes its place.
+    /// Answers node guarding, if the device supports it and has no heartbeat.
     fn guard(&mut self, state: State, out: &mut Outbox) {
         if !self.memory.objects.has(GUARD_TIME) || self.heartbeat_period().is_some() {
             return;
@@ -275,11 +275,11 @@ impl Device {
         let written = access.written;
         let id = CanId::sdo_response(self.memory.node);
         if was_giving {
-            // The rest of a sub-block that the client has given up.
+            // The remaining segments of a sub-block that the client has given up.
             out.retain(|frame| frame.id() != id);
         }
-        let thought = now + self.setup.oddities.latency;
-        answers.into_iter().for_each(|answer| self.answer(Frame::full(id, answer), thought, now, out));
+        let due_time = now + self.setup.oddities.latency;
+        answers.into_iter().for_each(|answer| self.answer(Frame::full(id, answer), due_time, now, out));
         match written {
             // "The heartbeat protocol begins immediately" (CiA 301, 7.5.2.14).
             Some(HEARTBEAT_TIME) => self.restart_heartbeat(now),
@@ -288,14 +288,14 @@ impl Device {
         }
     }
 
-    /// A parameter was written while PDOs are running.
+    /// Applies a parameter that was written while PDOs are active.
     fn apply(&mut self, object: ObjectId, now: Mono) {
         let measuring = object.index >= 0x6000;
         for tpdo in &mut self.tpdos {
             if tpdo.is_configured_by(object.index) {
                 tpdo.start(&self.memory.objects, &mut self.memory.channels, now);
             } else if measuring {
-                // A limit, a unit, an offset: what can cause an event is worked out anew.
+                // A new limit, unit or offset changes the values that cause an event.
                 tpdo.watch(&self.memory.objects, &mut self.memory.channels, now);
             }
         }
@@ -330,7 +330,7 @@ impl Device {
         let tpdo = &mut self.tpdos[index];
         let Some(id) = tpdo.cob_id(&self.memory.objects) else { return };
         let mapping = tpdo.mapping(&self.memory.objects);
-        if mapping.is_empty() && !self.memory.sends_empty() {
+        if mapping.is_empty() && !self.memory.sends_empty_pdo() {
             return;
         }
         let time = now.since_start();
@@ -344,11 +344,11 @@ impl Device {
         self.memory.channels.sent(&mapping);
         out.send(frame);
         if self.recorder.is_some() {
-            self.under_way.push_back((frame, self.lines(&values, time)));
+            self.in_transit.push_back((frame, self.lines(&values, time)));
         }
     }
 
-    /// What the record says of a TPDO.
+    /// The record's lines for a TPDO.
     fn lines(&self, values: &[(ObjectId, Vec<u8>)], time: Duration) -> Vec<Line> {
         let Memory { objects, channels, node, .. } = &self.memory;
         let mapped: Vec<ObjectId> = values.iter().map(|(object, _)| *object).collect();
@@ -365,9 +365,9 @@ impl Device {
         values.iter().filter_map(described).collect()
     }
 
-    fn look_for_overload(&mut self, now: Mono) {
+    fn update_overloads(&mut self, now: Mono) {
         let time = now.since_start();
-        self.overload_look = self.memory.channels.next_overload_change(time).map(Mono::at);
+        self.next_overload_change = self.memory.channels.next_overload_change(time).map(Mono::at);
         let Some(code) = self.setup.sim.overload_emcy else { return };
         let Memory { objects, channels, emergencies, .. } = &mut self.memory;
         for (channel, overload) in channels.overloads(time) {
@@ -389,8 +389,7 @@ impl Device {
     }
 }
 
-/// When something that was due at `due` comes next: one period later, without drift. Turns that were missed
-/// because nobody played the device are not made up for.
+/// The next time after `due`, in whole periods, so that it does not drift. Periods that were missed are skipped.
 pub(super) fn next_turn(due: Mono, period: Duration, now: Mono) -> Mono {
     let next = due + period;
     if next > now { next } else { now + period }
@@ -398,7 +397,7 @@ pub(super) fn next_turn(due: Mono, period: Duration, now: Mono) -> Mono {
 
 impl Station for Device {
     fn power_on(&mut self, now: Mono, out: &mut Outbox) {
-        self.fall_silent(out);
+        self.drop_pending(out);
         self.memory.emergencies.forget();
         self.memory.settings.power_on();
         self.restart(Area::All);
@@ -410,16 +409,16 @@ impl Station for Device {
             && !frame.is_remote()
             && let Some(request) = frame.all_eight()
         {
-            // Of a device that changes its bit rate nobody expects more than that it goes back to waiting.
+            // A device that changes its bit rate only returns to the waiting state.
             let is_retiming = matches!(self.phase, Phase::Retiming { .. });
-            if self.hears_lss() || is_retiming && request[0] == 0x04 {
+            if self.accepts_lss() || is_retiming && request[0] == 0x04 {
                 self.configure(request, now, out);
             }
             return;
         }
         let Phase::Running(state) = self.phase else { return };
         if let Some(command) = Command::for_node(self.memory.node, frame) {
-            self.obey(command, now, out);
+            self.execute(command, now, out);
         } else if frame.is_remote() {
             if frame.id() == CanId::heartbeat(self.memory.node) {
                 self.guard(state, out);
@@ -444,8 +443,8 @@ impl Station for Device {
             return;
         }
         self.retime(now, out);
-        let thought = self.thinking.partition_point(|(due, _)| *due <= now);
-        self.thinking.drain(..thought).for_each(|(_, frame)| out.send(frame));
+        let due_time = self.delayed.partition_point(|(due, _)| *due <= now);
+        self.delayed.drain(..due_time).for_each(|(_, frame)| out.send(frame));
         let Phase::Running(state) = self.phase else { return };
         if let Some(due) = self.heartbeat.filter(|due| *due <= now) {
             out.send(Frame::byte(CanId::heartbeat(self.memory.node), state.code()));
@@ -456,8 +455,8 @@ impl Station for Device {
         {
             out.send(Frame::full(CanId::sdo_response(self.memory.node), abort));
         }
-        if self.overload_look.is_some_and(|due| due <= now) {
-            self.look_for_overload(now);
+        if self.next_overload_change.is_some_and(|due| due <= now) {
+            self.update_overloads(now);
         }
         self.send_emergencies(now, out);
         if self.is_operational() {
@@ -473,7 +472,7 @@ impl Station for Device {
         match self.phase {
             Phase::Off => None,
             Phase::Starting(until) => Some(until),
-            Phase::Unconfigured => self.thinking.front().map(|(due, _)| *due),
+            Phase::Unconfigured => self.delayed.front().map(|(due, _)| *due),
             Phase::Retiming { switch, until, .. } => Some(switch.unwrap_or(until)),
             Phase::Running(_) => {
                 let mut next = self.heartbeat;
@@ -483,9 +482,9 @@ impl Station for Device {
                     }
                 };
                 add(self.sdo.deadline());
-                add(self.overload_look);
+                add(self.next_overload_change);
                 add(self.memory.emergencies.next_wake());
-                add(self.thinking.front().map(|(due, _)| *due));
+                add(self.delayed.front().map(|(due, _)| *due));
                 self.tpdos.iter().for_each(|tpdo| add(tpdo.next_wake()));
                 next
             }
@@ -497,10 +496,10 @@ impl Station for Device {
             self.sdo.sent(now);
         }
         let Some(recorder) = &self.recorder else { return };
-        // What stands before it never got out: a controller that goes off forgets what waits.
-        if let Some(place) = self.under_way.iter().position(|(waiting, _)| waiting == frame) {
-            self.under_way.drain(..place);
-            if let Some((_, lines)) = self.under_way.pop_front() {
+        // Frames before it were dropped when the controller went off.
+        if let Some(place) = self.in_transit.iter().position(|(waiting, _)| waiting == frame) {
+            self.in_transit.drain(..place);
+            if let Some((_, lines)) = self.in_transit.pop_front() {
                 lines.iter().for_each(|line| recorder.write(now, line));
             }
         }
@@ -516,7 +515,7 @@ impl Station for Device {
 
     fn told_bit_rate(&mut self, bit_rate: u32) {
         let settings = &mut self.memory.settings;
-        settings.tell_wire(bit_rate, self.setup.bit_rate.is_some());
+        settings.set_bus_bit_rate(bit_rate, self.setup.bit_rate.is_some());
     }
 }
 

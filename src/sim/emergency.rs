@@ -1,4 +1,4 @@
-//! Emergencies of a simulated device: what is pending, the error register, the history, and the frames.
+//! Emergencies of a simulated device: pending errors, the error register, the history, and the frames.
 
 use super::device::next_turn;
 use super::objects::Objects;
@@ -21,15 +21,15 @@ const INHIBIT_TIME: ObjectId = ObjectId::new(0x1015, 0);
 pub(super) struct Emergencies {
     described: Vec<EmergencyEntry>,
     layout: ErrorHistory,
-    /// Codes that are pending, and on which channels; channel 0 stands for the device.
+    /// Pending codes with their channels; channel 0 is the device itself.
     pending: BTreeMap<u16, BTreeSet<u8>>,
     history: VecDeque<u32>,
     waiting: VecDeque<[u8; 8]>,
-    /// Before this moment the inhibit time forbids the next frame.
+    /// End of the inhibit time.
     free: Mono,
-    /// The deviation [`Quirk::EmergencyRepeats`].
+    /// [`Quirk::EmergencyRepeats`].
     repeats: bool,
-    /// What is said again while an error is pending, and when.
+    /// The message that is repeated while an error is pending, and its next time.
     again: Option<([u8; 8], Mono)>,
 }
 
@@ -40,12 +40,12 @@ impl Emergencies {
         Emergencies { described, layout: description.error_history, repeats, ..Emergencies::default() }
     }
 
-    /// Whether the device knows this emergency.
+    /// Whether the device can send this emergency.
     pub(super) fn knows(&self, code: u16) -> bool {
         self.described.iter().any(|entry| entry.code == code)
     }
 
-    /// An error appears on a channel. One message an error event: none while the same code is pending.
+    /// Notes an error of a channel. A code that is already pending is not sent again.
     pub(super) fn raise(&mut self, objects: &mut Objects, code: u16, channel: u8, status: u8) {
         let known = self.pending.contains_key(&code);
         self.pending.entry(code).or_default().insert(channel);
@@ -71,7 +71,7 @@ impl Emergencies {
         self.queue(objects, code, extra);
     }
 
-    /// An error has gone.
+    /// Notes the end of an error.
     pub(super) fn clear(&mut self, objects: &mut Objects, code: u16, channel: u8) {
         let Some(channels) = self.pending.get_mut(&code) else { return };
         channels.remove(&channel);
@@ -82,13 +82,13 @@ impl Emergencies {
         }
     }
 
-    /// The history is deleted; what is pending stays pending.
+    /// Deletes the history; pending errors stay pending.
     pub(super) fn clear_history(&mut self, objects: &mut Objects) {
         self.history.clear();
         self.publish(objects);
     }
 
-    /// As after power-on.
+    /// Forgets everything, as at power-on.
     pub(super) fn forget(&mut self) {
         self.pending.clear();
         self.again = None;
@@ -96,12 +96,12 @@ impl Emergencies {
         self.waiting.clear();
     }
 
-    /// Nothing that waits is sent any more, as in STOPPED.
+    /// Drops the messages that wait, as in STOPPED.
     pub(super) fn drop_waiting(&mut self) {
         self.waiting.clear();
     }
 
-    /// Puts register and history into the objects that show them.
+    /// Writes register and history into their objects.
     pub(super) fn publish(&self, objects: &mut Objects) {
         objects.put(ERROR_REGISTER, vec![self.register()]);
         let count = u8::try_from(self.history.len()).unwrap_or(u8::MAX);
@@ -112,7 +112,7 @@ impl Emergencies {
         }
     }
 
-    /// 1001h: bit 0 with every error.
+    /// The value of 1001h: bit 0 is set with every error.
     fn register(&self) -> u8 {
         self.pending.keys().fold(0, |register, code| {
             let described = self.described.iter().find(|entry| entry.code == *code);
@@ -124,7 +124,7 @@ impl Emergencies {
         })
     }
 
-    /// How many errors 1003h keeps.
+    /// The number of errors that 1003h can hold.
     fn capacity(&self, objects: &Objects) -> usize {
         (1..=254).take_while(|sub| objects.has(HISTORY.with_sub(*sub))).count()
     }
@@ -136,7 +136,7 @@ impl Emergencies {
         self.waiting.push_back([low, high, register, a, b, c, d, e]);
     }
 
-    /// Puts the emergency of a pending error behind those that wait when its time has come again.
+    /// Queues the repeated emergency of a pending error when it is due.
     pub(super) fn repeat(&mut self, objects: &Objects, now: Mono) {
         let Some((message, due)) = self.again else { return };
         if self.pending.is_empty() {
@@ -147,7 +147,7 @@ impl Emergencies {
         }
     }
 
-    /// The next message, if one waits and the inhibit time allows it.
+    /// The next message, if there is one and the inhibit time is over.
     pub(super) fn next_frame(&mut self, objects: &Objects, node: NodeId, now: Mono) -> Option<Frame> {
         if now < self.free {
             return None;
@@ -160,7 +160,7 @@ impl Emergencies {
         Some(Frame::full(cob_id(objects, node)?, message))
     }
 
-    /// When [`Emergencies::next_frame`] has something.
+    /// The time of the next message of [`Emergencies::next_frame`].
     pub(super) fn next_wake(&self) -> Option<Mono> {
         let waiting = self.waiting.front().map(|_| self.free);
         let again = self.again.map(|(_, due)| due);
@@ -168,13 +168,13 @@ impl Emergencies {
     }
 }
 
-/// How often a pending error is told again; `None` where it is told once.
+/// The repeat period of a pending error; `None` if it is sent once.
 fn repeat_time(objects: &Objects) -> Option<Duration> {
     let (object, _) = objects.specs().find(|(_, spec)| spec.name == "emcy-repeat-time")?;
     Some(objects.number(object)).filter(|&period| period > 0).map(|period| Duration::from_millis(period.into()))
 }
 
-/// The identifier of emergencies: 1014h, unless its bit 31 switches them off.
+/// The COB-ID of emergencies: 1014h, unless its bit 31 disables them.
 fn cob_id(objects: &Objects, node: NodeId) -> Option<CanId> {
     if !objects.has(EMCY_COB_ID) {
         return Some(CanId::emergency(node));
@@ -184,7 +184,7 @@ fn cob_id(objects: &Objects, node: NodeId) -> Option<CanId> {
     if cob_id & 0x8000_0000 == 0 { CanId::standard(id) } else { None }
 }
 
-/// What a byte of the message holds: "1 (channel)", "AI status 6150h", "0".
+/// The number in a byte of the message: "1 (channel)", "AI status 6150h", "0".
 fn meaning_of(meaning: &str, channel: u8, status: u8) -> u8 {
     let meaning = meaning.to_ascii_lowercase();
     if meaning.contains("channel") {
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn one_message_an_event_and_one_when_it_is_over() {
+    fn each_error_sends_one_message_and_one_at_its_end() {
         let (mut objects, mut emergencies) = mh4();
         emergencies.raise(&mut objects, 0xf001, 1, 0x03);
         assert_eq!(frames(&objects, &mut emergencies), ["085#01F0810103000000"]);
@@ -225,7 +225,7 @@ mod tests {
         assert_eq!(objects.number(HISTORY), 1);
         // Byte 4 in bits 16 to 23, byte 3 in bits 24 to 31.
         assert_eq!(objects.number(HISTORY.with_sub(1)), 0x0103_f001);
-        // The same code on another channel while it is pending: nothing.
+        // The same code on another channel while it is pending sends nothing.
         emergencies.raise(&mut objects, 0xf001, 2, 0x05);
         emergencies.clear(&mut objects, 0xf001, 1);
         assert_eq!(frames(&objects, &mut emergencies), Vec::<String>::new());
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_still_pending_stays_in_the_register() {
+    fn pending_errors_stay_in_the_register() {
         let (mut objects, mut emergencies) = mh4();
         emergencies.raise(&mut objects, 0xf001, 1, 0x03);
         emergencies.raise(&mut objects, 0x8240, 0, 0);
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn the_inhibit_time_holds_messages_back() {
+    fn inhibit_time_delays_messages() {
         let (mut objects, mut emergencies) = mh4();
         objects.put(INHIBIT_TIME, 50u16.to_le_bytes().to_vec());
         emergencies.raise(&mut objects, 0xf001, 1, 0x03);
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn the_cob_id_moves_them_or_switches_them_off() {
+    fn cob_id_moves_or_disables_emergencies() {
         let (mut objects, mut emergencies) = mh4();
         objects.put(EMCY_COB_ID, 0x99u32.to_le_bytes().to_vec());
         emergencies.raise(&mut objects, 0x8110, 0, 0);

@@ -1,5 +1,4 @@
-//! The filter of a simulated channel (CiA 404: 61A0h, 61A1h): what is between the sensor's samples and the
-//! process value.
+//! The filter of a simulated channel (CiA 404: 61A0h, 61A1h), between the sensor's samples and the process value.
 
 use super::model::Quantity;
 use super::objects::Objects;
@@ -10,15 +9,15 @@ use std::time::Duration;
 
 const TYPE: u16 = 0x61a0;
 const CONSTANT: u16 = 0x61a1;
-/// The longest mean that ends with a PDO; beyond it is the moving average (MC1609, 2.2, Filter).
-const LONGEST: Duration = Duration::from_millis(1000);
-/// After so many times its constant a moving average knows nothing any more of what was before.
+/// The longest mean that ends with a PDO; above it, the filter is a moving average (MC1609, 2.2, Filter).
+const MAX_LENGTH: Duration = Duration::from_millis(1000);
+/// After this many times its constant, a moving average no longer depends on earlier samples.
 const FORGOTTEN: u64 = 40;
 
-/// How samples become one value.
+/// How samples are combined into one value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// Each for itself.
+    /// Each sample is a value.
     None,
     /// A part of the difference is added: `v += (in - v) / N`.
     Moving,
@@ -32,25 +31,25 @@ enum Kind {
 #[derive(Clone, Debug)]
 pub(super) struct Filter {
     channel: u8,
-    /// What the codes of 61A0h stand for.
+    /// The meanings of the codes of 61A0h.
     kinds: BTreeMap<u32, Kind>,
     kind: Kind,
     /// N, at least 1.
     constant: u64,
-    /// The number of the sample that comes next.
+    /// The number of the next sample.
     next: u64,
     /// Whether the next sample is the first.
     is_new: bool,
     value: f64,
     sum: f64,
-    /// How many samples are in the sum.
+    /// The number of samples in the sum.
     count: u64,
-    /// Whether a whole mean was there already.
+    /// Whether there was a complete mean.
     is_full: bool,
 }
 
 impl Filter {
-    /// That of a channel as its device describes it; without 61A0h there is none, whatever is asked.
+    /// The filter of a channel from the device's description; none without 61A0h.
     pub(super) fn new(description: &Description, channel: u8, until_pdo: bool) -> Filter {
         let codes = description.object(ObjectId::new(TYPE, channel)).map(|entry| &entry.values);
         let kinds = codes.into_iter().flatten().filter_map(|(code, meaning)| {
@@ -81,23 +80,23 @@ impl Filter {
         object.sub == self.channel && matches!(object.index, TYPE | CONSTANT)
     }
 
-    /// Begins anew at `time` with what the objects say.
+    /// Restarts at `time` with the values of the objects.
     pub(super) fn begin(&mut self, objects: &Objects, quantity: &Quantity, time: Duration) {
         let [kind, constant] = [TYPE, CONSTANT].map(|index| objects.number(ObjectId::new(index, self.channel)));
         self.kind = self.kinds.get(&kind).copied().unwrap_or(Kind::None);
-        // What a constant of 0 does is not printed: here what 1 does.
+        // The manual does not print the effect of constant 0; here it acts as 1.
         self.constant = u64::from(constant).max(1);
         self.next = quantity.index(time);
         self.is_new = true;
     }
 
-    /// The filtered quantity at `time`. An overload goes out as it is, and the filter begins anew behind it.
+    /// The filtered quantity at `time`. An overload passes unfiltered and restarts the filter.
     pub(super) fn value(&mut self, quantity: &Quantity, time: Duration) -> f64 {
         let present = quantity.index(time);
         if self.kind == Kind::None {
             return quantity.sample(present);
         }
-        let longest = u64::try_from(LONGEST.as_micros() / quantity.sample_us()).unwrap_or(u64::MAX).max(1);
+        let longest = u64::try_from(MAX_LENGTH.as_micros() / quantity.sample_us()).unwrap_or(u64::MAX).max(1);
         self.skip(present, longest);
         while self.next <= present {
             let input = quantity.sample(self.next);
@@ -112,7 +111,7 @@ impl Filter {
         self.value
     }
 
-    /// Leaves out the samples of a long silence that make no difference to the value.
+    /// Skips the samples of a long pause that do not change the value.
     fn skip(&mut self, present: u64, longest: u64) {
         let missing = present.saturating_sub(self.next);
         let window = self.constant.saturating_mul(FORGOTTEN);
@@ -123,10 +122,10 @@ impl Filter {
             }
             Kind::SincePdo if missing > window.saturating_add(longest) => {
                 self.next = present - window;
-                // As if the mean had grown to its longest.
+                // The mean has reached its longest.
                 (self.is_new, self.count) = (false, longest);
             }
-            // Whole means, so that the next ones end where they would have ended.
+            // Skip complete means, so that the next ones end at the same samples.
             Kind::Repeating => self.next += (missing / self.constant).saturating_sub(2) * self.constant,
             _ => {}
         }
@@ -157,7 +156,7 @@ impl Filter {
         }
     }
 
-    /// A PDO with the value has been sent.
+    /// Notes that a PDO with the value was sent.
     pub(super) fn sent(&mut self) {
         if self.kind == Kind::SincePdo {
             (self.sum, self.count) = (0.0, 0);
@@ -165,8 +164,8 @@ impl Filter {
     }
 }
 
-/// The constant of a moving average that comes within 1 % of a step's end after `damping` (MH-4, 4.3.7: what
-/// 2023h means, not how it is worked out).
+/// The constant with which a moving average is within 1 % of a step's end after `damping`. MH-4, 4.3.7 gives this
+/// meaning of 2023h, but not its formula.
 pub(super) fn constant_for(damping: Duration, sample_us: u128) -> u16 {
     let steps = damping.as_micros() as f64 / sample_us as f64;
     // (1 - 1/N)^steps = 0.01
@@ -190,7 +189,7 @@ mod tests {
         Filter { kind, constant, ..Filter::new(&mh4.description, 1, false) }
     }
 
-    /// What shows after each of the samples.
+    /// The values after each of the samples.
     fn shown(filter: &mut Filter, inputs: &[f64], longest: u64) -> Vec<f64> {
         let mut shown = Vec::new();
         for input in inputs {
@@ -200,7 +199,7 @@ mod tests {
         shown
     }
 
-    /// A quantity with noise of 1 around 5, renewed every millisecond.
+    /// A quantity around 5 with noise of 1 and a new sample every millisecond.
     fn noisy(overloads: Vec<Overload>) -> Quantity {
         let channel = toml::from_str(
             "channel = 1\nunit = 0x4E0000\nbase = 5.0\namplitude = 2.0\nperiod_s = 4.0\nnoise = 1.0\nstart = 0.0\nend = 10.0",
@@ -224,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn a_moving_average_takes_its_part_of_the_difference() {
+    fn moving_average_adds_a_part_of_the_difference() {
         // MC1609, 2.2: Value = Value + (Input - Value) / N.
         let mut moving = filter(Kind::Moving, 4);
         assert_eq!(shown(&mut moving, &[0.0, 8.0, 8.0, 0.0], LONG), [0.0, 2.0, 3.5, 2.625]);
@@ -233,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damping_is_the_time_to_the_last_percent_of_a_step() {
+    fn damping_is_the_time_to_within_one_percent_of_a_step() {
         for (milliseconds, sample_us) in [(100, 640), (10, 640), (2000, MS), (5, MS)] {
             let damping = Duration::from_millis(milliseconds);
             let constant = constant_for(damping, sample_us);
@@ -253,14 +252,14 @@ mod tests {
     }
 
     #[test]
-    fn a_repeating_average_is_renewed_every_n_samples() {
+    fn repeating_average_is_renewed_every_n_samples() {
         let mut repeating = filter(Kind::Repeating, 3);
         let inputs = [1.0, 2.0, 6.0, 10.0, 11.0, 12.0, 0.0];
         assert_eq!(shown(&mut repeating, &inputs, LONG), [1.0, 1.5, 3.0, 3.0, 3.0, 11.0, 11.0]);
     }
 
     #[test]
-    fn a_mean_ends_with_the_pdo_or_after_a_second() {
+    fn mean_ends_with_the_pdo_or_after_one_second() {
         let mut mean = filter(Kind::SincePdo, 4);
         assert_eq!(shown(&mut mean, &[1.0, 3.0, 8.0], 5), [1.0, 2.0, 4.0]);
         mean.sent();
@@ -270,7 +269,7 @@ mod tests {
         assert_eq!(shown(&mut mean, &[70.0, 0.0], 5), [40.0, 30.0]);
         mean.sent();
         assert_eq!(shown(&mut mean, &[2.0, 4.0], 5), [2.0, 3.0]);
-        // Others do not care for PDOs.
+        // The other kinds ignore PDOs.
         let mut repeating = filter(Kind::Repeating, 2);
         shown(&mut repeating, &[1.0], LONG);
         repeating.sent();
@@ -278,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn an_overload_goes_out_as_it_is_and_leaves_no_trace() {
+    fn overload_passes_unfiltered_and_restarts_the_filter() {
         let (from, until) = (Duration::from_millis(20), Duration::from_millis(30));
         let quantity = noisy(vec![Overload { from, until, direction: Direction::High }]);
         let mut moving = filter(Kind::Moving, 1000);
@@ -291,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_silence_makes_no_difference() {
+    fn long_pause_does_not_change_the_value() {
         let quantity = noisy(Vec::new());
         let at = Duration::from_millis;
         for (kind, constant) in [(Kind::Moving, 7), (Kind::Repeating, 50), (Kind::SincePdo, 20), (Kind::None, 9)] {
@@ -305,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn it_begins_anew_with_what_the_objects_say() {
+    fn filter_restarts_with_the_values_of_the_objects() {
         let mh4 = catalog::by_name("mh4").expect("built in");
         let mut objects = Objects::new(&mh4, NodeId::new(5).expect("a node-ID"));
         let (quantity, at) = (noisy(Vec::new()), Duration::from_millis);

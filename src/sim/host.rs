@@ -7,19 +7,19 @@ use crate::canopen::frame::Frame;
 use crate::canopen::wire_length::priority;
 use std::time::Duration;
 
-/// How long to wait when the bus takes no more frames.
+/// Wait time if the bus accepts no more frames.
 const FULL: Duration = Duration::from_millis(1);
 
-/// The longest wait in one go; only the number matters that it is finite.
+/// The longest single wait; any finite number serves.
 const IDLE: Duration = Duration::from_secs(3600);
 
 /// Runs stations on `bus` until the user asks to stop, or until `until`.
 ///
-/// They hear each other, too, as they would on a wire: a bus does not give back what was sent on it. A station
-/// at another bit rate than the bus, where that is known, is deaf and mute; errors it cannot make.
+/// The stations receive each other's frames, as on a bus_bit_rate: a bus does not return the frames sent on it. A station at a
+/// different bit rate than the bus, if that is known, neither receives nor sends. It cannot cause bus errors.
 ///
 /// # Errors
-/// When the bus fails; a transmit queue that is full is waited for.
+/// The bus failed. A full transmit queue is no error: the frame waits.
 pub fn run(
     bus: &mut dyn Bus,
     stations: Vec<Box<dyn Station>>,
@@ -52,7 +52,7 @@ pub fn run(
 
 struct Host {
     places: Vec<(Box<dyn Station>, Outbox)>,
-    /// That of the bus, where it is known.
+    /// The bit rate of the bus, if it is known.
     bit_rate: Option<u32>,
 }
 
@@ -69,7 +69,7 @@ impl Host {
         }
     }
 
-    /// The interface came back, perhaps at another bit rate.
+    /// Notes that the interface is up again, perhaps at another bit rate.
     fn retime(&mut self, bit_rate: Option<u32>) {
         if bit_rate != self.bit_rate {
             self.bit_rate = bit_rate;
@@ -79,7 +79,7 @@ impl Host {
         }
     }
 
-    /// Whether a station takes part.
+    /// Whether a station is on the bus at its bit rate.
     fn is_on_the_bus(&self, station: &dyn Station) -> bool {
         match station.tuning() {
             Tuning::Follows => true,
@@ -88,7 +88,7 @@ impl Host {
         }
     }
 
-    /// A frame that everybody but its sender gets.
+    /// Delivers a frame to every station except its sender.
     fn hear(&mut self, sender: Option<usize>, now: Mono, frame: &Frame) {
         for index in 0..self.places.len() {
             if sender != Some(index) && self.is_on_the_bus(&*self.places[index].0) {
@@ -98,7 +98,7 @@ impl Host {
         }
     }
 
-    /// Hands over what waits, the lowest identifier first; `false` when the bus takes no more.
+    /// Sends pending frames, the lowest identifier first; `false` if the bus accepts no more.
     fn send(&mut self, bus: &mut dyn Bus) -> Result<bool, BusError> {
         for index in 0..self.places.len() {
             if !self.is_on_the_bus(&*self.places[index].0) {
@@ -131,7 +131,7 @@ mod tests {
     use crate::sim::{Device, Setup};
     use std::collections::VecDeque;
 
-    /// The other side of the wire: sends at given moments, keeps what it receives.
+    /// The peer on the bus: sends at given times and keeps the frames received.
     #[derive(Default)]
     struct Master {
         planned: VecDeque<(Mono, Frame)>,
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn devices_serve_a_master_on_the_other_side() {
+    fn devices_answer_a_master_on_the_bus() {
         let mut bus = MemoryBus::new(Clock::Virtual);
         bus.attach(master(&[(10, "605#4000100000000000"), (20, "000#0100"), (30, "080#")]));
         let stations = run(&mut bus, vec![device("mh4", 5), device("dps", 127)], Some(ms(150))).expect("no error");
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn the_stations_hear_each_other_and_not_themselves() {
+    fn stations_receive_the_frames_of_other_stations_only() {
         let mut bus = MemoryBus::new(Clock::Virtual);
         let hosted: Vec<Box<dyn Station>> = vec![Box::new(master(&[(10, "000#0105"), (20, "080#")])), device("mh4", 5)];
         let stations = run(&mut bus, hosted, Some(ms(50))).expect("no error");
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_queue_loses_nothing() {
+    fn full_queue_loses_no_frame() {
         let mut bus = MemoryBus::new(Clock::Virtual).with_queue_length(1);
         bus.attach(master(&[(10, "000#0103")]));
         run(&mut bus, vec![device("mc1609", 3)], Some(ms(120))).expect("no error");
@@ -216,8 +216,8 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_has_left_the_bit_rate_is_gone() {
-        // 125 kbit/s by LSS, at once; then a request at the 250 of the bus, and a heartbeat that would come.
+    fn device_at_another_bit_rate_neither_receives_nor_sends() {
+        // LSS switches to 125 kbit/s. A request at 250 kbit/s follows, and the time of a heartbeat.
         let configure = ["7E5#0401000000000000", "7E5#1300040000000000", "7E5#1500000000000000"];
         let mut plan = vec![(1, "605#2B17100064000000")];
         plan.extend(configure.iter().zip([10, 20, 30]).map(|(frame, at)| (at, *frame)));
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interrupt_ends_it() {
+    fn interrupt_ends_the_run() {
         let mut bus = MemoryBus::new(Clock::Virtual);
         bus.interrupt_at(ms(70));
         run(&mut bus, vec![device("mh4", 5)], None).expect("no error");

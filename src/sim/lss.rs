@@ -1,4 +1,4 @@
-//! The LSS slave of a simulated device, from the tables of CiA 305 and not from the client's.
+//! The LSS slave of a simulated device, written from the tables of CiA 305 and not with the master's code.
 
 use super::settings::Settings;
 use crate::canopen::id::NodeId;
@@ -9,41 +9,41 @@ use std::time::Duration;
 /// Vendor-ID, product code, revision number and serial number: 1018h:1 to 4.
 pub(super) type Identity = [u32; 4];
 
-/// How many parts an identity has.
+/// The number of parts of an identity.
 const PARTS: u8 = 4;
 
-/// What the slave keeps between two requests.
+/// The state of the slave between two requests.
 #[derive(Clone, Debug)]
 pub(super) struct Slave {
-    knows: SimLss,
-    /// Error codes with which services are refused.
+    supported: SimLss,
+    /// Services that are refused, with their error codes.
     refuses: BTreeMap<u8, u8>,
     /// Whether every fastscan frame is answered in configuration state, as CANopenNode does.
-    scans_for_ever: bool,
+    endless_fastscan: bool,
     is_configuring: bool,
-    /// How many parts of a selective address have fitted so far.
+    /// How many parts of a selective address have matched so far.
     selected: u8,
-    /// How many parts of an identification have fitted so far.
+    /// How many parts of an identification have matched so far.
     identified: u8,
-    /// The part of the identity that fastscan is at.
+    /// The part of the identity that fastscan asks for next.
     scanned: u8,
 }
 
-/// What comes of a request.
+/// The result of a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Reply {
     pub(super) answer: Option<[u8; 8]>,
     pub(super) then: Then,
 }
 
-/// What the device has to do.
+/// What the device does after a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Then {
     #[default]
     Nothing,
-    /// It had no node-ID and has one now.
+    /// It was unconfigured and now has a node-ID.
     Boot,
-    /// It is silent for this long, changes its bit rate, and is silent for as long again.
+    /// It is silent for this time, changes its bit rate, and is silent for the same time again.
     Activate(Duration),
 }
 
@@ -60,27 +60,27 @@ impl Reply {
 }
 
 impl Slave {
-    pub(super) fn new(knows: SimLss, refuses: BTreeMap<u8, u8>, scans_for_ever: bool) -> Slave {
-        Slave { knows, refuses, scans_for_ever, is_configuring: false, selected: 0, identified: 0, scanned: 0 }
+    pub(super) fn new(supported: SimLss, refuses: BTreeMap<u8, u8>, endless_fastscan: bool) -> Slave {
+        Slave { supported, refuses, endless_fastscan, is_configuring: false, selected: 0, identified: 0, scanned: 0 }
     }
 
     pub(super) fn is_configuring(&self) -> bool {
         self.is_configuring
     }
 
-    /// The state after power on and after every reset.
+    /// Returns to waiting state, as at power-on and after every reset.
     pub(super) fn reset(&mut self) {
         (self.is_configuring, self.selected, self.identified, self.scanned) = (false, 0, 0, 0);
     }
 
-    /// Takes one request of eight bytes.
+    /// Handles one request of eight bytes.
     pub(super) fn request(&mut self, request: [u8; 8], identity: Identity, settings: &mut Settings) -> Reply {
         let [service, first, second, third, fourth, ..] = request;
         let number = u32::from_le_bytes([first, second, third, fourth]);
-        // The parts of an address come one after the other, with nothing between them.
+        // The parts of an address must follow each other directly.
         let selected = std::mem::take(&mut self.selected);
         let identified = std::mem::take(&mut self.identified);
-        let is_known = self.knows.services.is_empty() || self.knows.services.contains(&service);
+        let is_known = self.supported.services.is_empty() || self.supported.services.contains(&service);
         if !is_known {
             return Reply::default();
         }
@@ -90,7 +90,7 @@ impl Slave {
             0x40..=0x43 if !self.is_configuring => self.select(service - 0x40, selected, number, identity),
             0x46..=0x4b => self.identify(service - 0x46, identified, number, identity),
             0x4c if is_unconfigured => Reply::with(&[0x50]),
-            0x51 if self.is_configuring && self.scans_for_ever => Reply::with(&[0x4f]),
+            0x51 if self.is_configuring && self.endless_fastscan => Reply::with(&[0x4f]),
             0x51 if is_unconfigured && !self.is_configuring => self.scan(request, number, identity),
             _ if !self.is_configuring => Reply::default(),
             0x11 | 0x13 | 0x17 if self.refuses.contains_key(&service) => {
@@ -127,7 +127,7 @@ impl Slave {
         Reply::default()
     }
 
-    /// Switch state selective: vendor-ID, product code, revision, serial number, each as it is here.
+    /// Switch state selective: vendor-ID, product code, revision number and serial number must all match.
     fn select(&mut self, part: u8, so_far: u8, number: u32, identity: Identity) -> Reply {
         if part != 0 && part != so_far || identity[usize::from(part)] != number {
             return Reply::default();
@@ -138,11 +138,11 @@ impl Slave {
         }
         self.selected = 0;
         self.is_configuring = true;
-        Reply::with(&[0x44, u8::from(self.knows.tells_mode)])
+        Reply::with(&[0x44, u8::from(self.supported.reports_mode)])
     }
 
-    /// Identify remote slaves: vendor-ID and product code as they are here, revision and serial number within
-    /// the limits, the lower one first.
+    /// Identify remote slaves: vendor-ID and product code must match; revision number and serial number must be in a
+    /// range, whose lower end comes first.
     fn identify(&mut self, step: u8, so_far: u8, number: u32, identity: Identity) -> Reply {
         let [vendor, product, revision, serial] = identity;
         let fits = match step {
@@ -160,7 +160,7 @@ impl Slave {
         if step == 5 { Reply::with(&[0x4f]) } else { Reply::default() }
     }
 
-    /// Fastscan: which part of the identity is asked for, and its upper bits down to bit `check`.
+    /// Fastscan: compares one part of the identity from bit 31 down to bit `check`.
     fn scan(&mut self, request: [u8; 8], number: u32, identity: Identity) -> Reply {
         let [_, _, _, _, _, check, part, next] = request;
         if check == 0x80 {
@@ -174,7 +174,7 @@ impl Slave {
             return Reply::default();
         }
         if check == 0 {
-            // After the last part the order begins anew: it is found.
+            // After the last part the slave is found, and the order restarts.
             self.is_configuring = next < part;
         }
         self.scanned = next;

@@ -1,5 +1,5 @@
-//! What the SDO server of a simulated device sees: objects that hold something, objects that show a
-//! measurement, and objects that do something when they are written.
+//! The objects as the SDO server sees them: objects with a value, objects with a measurement, and objects that act when
+//! they are written.
 
 use super::abort::Abort;
 use super::channels::Channels;
@@ -17,7 +17,7 @@ use std::time::Duration;
 /// Objects, measuring channels and errors of one device.
 #[derive(Clone, Debug)]
 pub(super) struct Memory {
-    /// The node-ID in force; without one nothing asks for it.
+    /// The active node-ID; unused while the device is unconfigured.
     pub(super) node: NodeId,
     pub(super) settings: Settings,
     pub(super) objects: Objects,
@@ -27,7 +27,7 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// The bytes of an object at `time`, whatever its access.
+    /// The bytes of an object at `time`, independent of its access.
     pub(super) fn value(&mut self, object: ObjectId, time: Duration) -> Option<Vec<u8>> {
         match self.channels.read(&self.objects, object, time) {
             Some(shown) => Some(shown),
@@ -35,8 +35,8 @@ impl Memory {
         }
     }
 
-    /// Whether a TPDO without mapped objects goes out, with no bytes, instead of not at all.
-    pub(super) fn sends_empty(&self) -> bool {
+    /// Whether a TPDO without mapped objects is sent with 0 bytes, instead of not at all.
+    pub(super) fn sends_empty_pdo(&self) -> bool {
         self.remap == Remap::CountOnly
     }
 
@@ -45,7 +45,7 @@ impl Memory {
         Access { memory: self, time, pre_operational, written: None }
     }
 
-    /// A write that has passed every check.
+    /// Executes a write that has passed every check.
     fn act(&mut self, object: ObjectId, bytes: &[u8], time: Duration) -> Result<(), Abort> {
         if !self.settings.allows(object, bytes) {
             return Err(Abort::VALUE);
@@ -61,8 +61,8 @@ impl Memory {
                     return Err(Abort::NOT_STORED);
                 }
             }
-            Some(Signature::Zero) => self.channels.forget_extremes(object.sub),
-            // The signature goes, the number stays.
+            Some(Signature::Zero) => self.channels.reset_extremes(object.sub),
+            // Only the number is kept, without the signature.
             Some(Signature::Set) => {
                 self.objects.put(object, vec![bytes.first().copied().unwrap_or(0), 0, 0, 0]);
             }
@@ -123,7 +123,7 @@ impl Dictionary for Access<'_> {
             return self.finish(object, bytes);
         }
         let pdo = || tpdo::check(objects, self.memory.remap, self.pre_operational, object, bytes);
-        // What cannot be mapped is told as that, before the limits of the entry are.
+        // A mapping that is impossible has its own abort code, so it is checked before the limits.
         if (0x1a00..0x1c00).contains(&object.index) && object.sub > 0 {
             objects.check_length(object, bytes)?;
             pdo()?;

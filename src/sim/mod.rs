@@ -1,12 +1,12 @@
-//! Simulated devices, built from the device descriptions: object dictionary, SDO server, NMT, heartbeat,
-//! TPDOs, emergencies, LSS and a measured quantity that moves.
+//! Simulated devices, built from the device descriptions: object dictionary, SDO server, NMT, heartbeat, TPDOs,
+//! emergencies, LSS and moving quantities.
 //!
-//! Written from CiA 301, CiA 404 and the manuals, not with the client's encoders: two halves that share a
-//! mistake would agree with each other. Nothing here asks for a device's name; what differs between
-//! devices stands in their descriptions.
+//! Written from CiA 301, CiA 404 and the manuals, not with the client's encoders: two halves with the same mistake
+//! agree with each other. No code here depends on a device's name: the descriptions and the files in `models/` contain
+//! the differences.
 //!
-//! A device is a [`Station`](crate::bus::memory::Station). It sits on a
-//! [`MemoryBus`](crate::bus::memory::MemoryBus) or, through [`host`], on a real bus.
+//! A device is a [`Station`](crate::bus::memory::Station) on a [`MemoryBus`](crate::bus::memory::MemoryBus) or, through
+//! [`host`], on a real bus.
 
 mod abort;
 mod bench;
@@ -36,4 +36,4 @@ pub use device::Device;
 pub use model::{Direction, Overload};
 pub use nmt::State;
 pub use record::{HEADER, Recorder};
-pub use setup::{GoneAfter, Oddities, Setup};
+pub use setup::{Oddities, OfflineAfter, Setup};

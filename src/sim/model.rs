@@ -3,7 +3,7 @@
 use crate::sim::data::SimChannel;
 use std::time::Duration;
 
-/// Which side of the measuring range the quantity has left.
+/// The side of the measuring range on which the quantity is outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Above its end.
@@ -12,14 +12,14 @@ pub enum Direction {
     Low,
 }
 
-/// A time in which the quantity is outside of its range, whatever it is otherwise.
+/// A period in which the quantity is outside of its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overload {
-    /// Its beginning, on the bus's time line.
+    /// Its start, in the bus's time.
     pub from: Duration,
     /// Its end.
     pub until: Duration,
-    /// The side.
+    /// The side of the range.
     pub direction: Direction,
 }
 
@@ -28,14 +28,14 @@ pub struct Overload {
 pub(super) struct Quantity {
     channel: SimChannel,
     sample: Duration,
-    /// How far beyond the range an overload begins, in the unit of the channel.
+    /// How far outside of the range an overload begins, in the unit of the channel.
     margin: f64,
     overloads: Vec<Overload>,
     key: u64,
 }
 
 impl Quantity {
-    /// `seed` is the bench's, `serial` tells devices apart that measure the same.
+    /// `seed` is the bench's; `serial` makes the noise of equal devices different.
     pub(super) fn new(
         channel: SimChannel,
         sample: Duration,
@@ -58,12 +58,12 @@ impl Quantity {
         &self.channel
     }
 
-    /// The number of the sample that is current at `time`.
+    /// The number of the sample at `time`.
     pub(super) fn index(&self, time: Duration) -> u64 {
         u64::try_from(time.as_nanos() / self.sample.as_nanos()).unwrap_or(u64::MAX)
     }
 
-    /// When the first sample after `time` is there.
+    /// The time of the first sample after `time`.
     pub(super) fn next_sample(&self, time: Duration) -> Duration {
         self.sample_time(self.index(time).saturating_add(1))
     }
@@ -73,16 +73,16 @@ impl Quantity {
         Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
     }
 
-    /// What is measured at `time`, in the unit of the channel.
+    /// The quantity at `time`, in the unit of the channel.
     pub(super) fn at(&self, time: Duration) -> f64 {
         self.sample(self.index(time))
     }
 
-    /// A sample by its number.
+    /// The sample with this number.
     pub(super) fn sample(&self, index: u64) -> f64 {
         let sampled = self.sample_time(index);
         let channel = &self.channel;
-        // Clearly beyond the limit, whatever the noise does.
+        // Outside of the limit even with noise.
         let far = self.margin + 0.05 * (channel.end - channel.start);
         match self.scripted(sampled) {
             Some(Direction::High) => channel.end + far,
@@ -95,7 +95,7 @@ impl Quantity {
         }
     }
 
-    /// Between -1 and 1, different for every sample, the same in every run.
+    /// Between -1 and 1: different for each sample, and the same in each run.
     fn noise(&self, index: u64) -> f64 {
         let bits = mix(self.key ^ index) >> 11;
         bits as f64 / (1u64 << 52) as f64 - 1.0
@@ -108,12 +108,12 @@ impl Quantity {
             .map(|overload| overload.direction)
     }
 
-    /// Whether the quantity is beyond its limits at `time`, and on which side.
+    /// The direction of the overload at `time`, if there is one.
     pub(super) fn overload(&self, time: Duration) -> Option<Direction> {
         self.beyond(self.at(time))
     }
 
-    /// On which side a value is beyond the limits.
+    /// The direction in which a value is outside of the limits.
     pub(super) fn beyond(&self, value: f64) -> Option<Direction> {
         if value > self.channel.end + self.margin {
             Some(Direction::High)
@@ -124,10 +124,10 @@ impl Quantity {
         }
     }
 
-    /// The next moment after `time` at which an overload may begin or end.
+    /// The next time after `time` at which an overload may begin or end.
     pub(super) fn next_change(&self, time: Duration) -> Option<Duration> {
         let edges = self.overloads.iter().flat_map(|overload| [overload.from, overload.until]);
-        // An edge shows in the first sample that is not before it.
+        // A change becomes visible in the first sample at or after it.
         let shown = edges.map(|edge| {
             let index = self.index(edge);
             if self.sample_time(index) < edge { self.sample_time(index.saturating_add(1)) } else { edge }
@@ -139,14 +139,14 @@ impl Quantity {
         scripted.into_iter().chain(natural).min()
     }
 
-    /// The lowest and highest value that can come, scripted overloads left out.
+    /// The lowest and highest possible value without scripted overloads.
     fn swing(&self) -> (f64, f64) {
         let channel = &self.channel;
         let reach = channel.amplitude.abs() + channel.noise.abs();
         (channel.base - reach, channel.base + reach)
     }
 
-    /// The lowest and highest value that can come.
+    /// The lowest and highest possible value.
     pub(super) fn reach(&self) -> (f64, f64) {
         let far = self.margin + 0.05 * (self.channel.end - self.channel.start);
         self.overloads.iter().fold(self.swing(), |(low, high), overload| match overload.direction {
@@ -184,16 +184,16 @@ mod tests {
     }
 
     #[test]
-    fn it_moves_as_described() {
+    fn quantity_follows_its_sine() {
         let quiet = quantity(SimChannel { noise: 0.0, ..channel() }, Vec::new(), 1);
         assert_eq!(quiet.at(Duration::ZERO), 5.0);
         assert!((quiet.at(ms(1000)) - 7.0).abs() < 0.01, "{}", quiet.at(ms(1000)));
         assert!((quiet.at(ms(3000)) - 3.0).abs() < 0.01);
-        // A new value every 640 us and none between.
+        // A new value every 640 us and none in between.
         assert_eq!(quiet.at(Duration::from_micros(640)), quiet.at(Duration::from_micros(1279)));
         assert_ne!(quiet.at(Duration::from_micros(640)), quiet.at(Duration::from_micros(1280)));
         assert_eq!(quiet.next_sample(Duration::from_micros(640)), Duration::from_micros(1280));
-        // A period of 0 stands still.
+        // A period of 0 means constant.
         let still = quantity(SimChannel { noise: 0.0, period_s: 0.0, ..channel() }, Vec::new(), 1);
         assert_eq!(still.at(ms(1234)), 5.0);
     }
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn overload_begins_beyond_the_range_and_its_margin() {
+    fn overload_begins_outside_of_range_and_margin() {
         let at = |base: f64| {
             quantity(SimChannel { base, amplitude: 0.0, noise: 0.0, ..channel() }, Vec::new(), 1).overload(ms(1))
         };
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn scripted_overloads_show_from_the_next_sample_on() {
+    fn scripted_overloads_start_with_the_next_sample() {
         let script = vec![
             Overload { from: ms(1), until: ms(2), direction: Direction::High },
             Overload { from: ms(5), until: ms(6), direction: Direction::Low },
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn what_can_leave_its_range_by_itself_is_watched() {
+    fn quantity_that_can_leave_its_range_is_checked_at_every_sample() {
         let wide = quantity(SimChannel { amplitude: 8.0, ..channel() }, Vec::new(), 1);
         assert_eq!(wide.next_change(Duration::ZERO), Some(Duration::from_micros(640)));
         assert_eq!(wide.overload(ms(1000)), Some(Direction::High));

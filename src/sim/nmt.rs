@@ -1,4 +1,4 @@
-//! The network management of a simulated device, from the tables of CiA 301 and not from the client's.
+//! The NMT slave of a simulated device, written from the tables of CiA 301 and not with the master's code.
 
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
@@ -6,16 +6,16 @@ use crate::canopen::id::{CanId, NodeId};
 /// The state of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
-    /// Only NMT, heartbeat and guarding.
+    /// NMT, heartbeat and guarding only.
     Stopped,
-    /// Everything.
+    /// All services.
     Operational,
-    /// Everything but PDOs.
+    /// All services except PDOs.
     PreOperational,
 }
 
 impl State {
-    /// As a heartbeat tells it (CiA 301, 7.2.8.3.2.2).
+    /// The state as coded in a heartbeat (CiA 301, 7.2.8.3.2.2).
     pub(super) fn code(self) -> u8 {
         match self {
             State::Stopped => 0x04,
@@ -25,7 +25,7 @@ impl State {
     }
 }
 
-/// What a device is told to do.
+/// An NMT command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Command {
     Enter(State),
@@ -34,7 +34,7 @@ pub(super) enum Command {
 }
 
 impl Command {
-    /// What `frame` tells the node to do, if it is an NMT command for it (CiA 301, 7.2.8.3.1).
+    /// The command in `frame`, if it is an NMT command for this node (CiA 301, 7.2.8.3.1).
     pub(super) fn for_node(node: NodeId, frame: &Frame) -> Option<Command> {
         let (id, &[specifier, target]) = (frame.id(), frame.data()) else { return None };
         if id != CanId::NMT || target != 0 && target != node.get() {

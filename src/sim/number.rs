@@ -1,9 +1,9 @@
-//! Numbers of the model into the numbers of the wire, without silent casts.
+//! Converts numbers of the model to numbers on the wire, without silent casts.
 
 use crate::canopen::value::DataType;
 
-/// `value` rounded to the nearest integer of the type (half away from zero), the nearest end of its range
-/// where it does not fit. Not a number gives zero: no type of integers has one.
+/// `value` rounded to the nearest integer of the type (half away from zero); the nearest end of the range if it does
+/// not fit. NaN gives 0.
 pub(super) fn to_integer(value: f64, data_type: DataType) -> i64 {
     let (low, high) = match data_type {
         DataType::Integer(width) => {
@@ -16,7 +16,7 @@ pub(super) fn to_integer(value: f64, data_type: DataType) -> i64 {
     whole(value).clamp(low, high)
 }
 
-/// The nearest integer, read out of the bits of the number: mantissa shifted by exponent.
+/// The nearest integer, computed from the bits of the number: the mantissa shifted by the exponent.
 fn whole(value: f64) -> i64 {
     let rounded = value.round();
     if rounded.is_nan() {
@@ -24,7 +24,7 @@ fn whole(value: f64) -> i64 {
     }
     let bits = rounded.abs().to_bits();
     let mantissa = bits & 0x000f_ffff_ffff_ffff | 0x0010_0000_0000_0000;
-    // The mantissa is an integer of 53 bits; below 2^0 only 0 is left after rounding.
+    // The mantissa is an integer of 53 bits; numbers below 2^0 round to 0 or 1.
     let magnitude = match i64::try_from(bits >> 52).unwrap_or(0) - 1075 {
         shift @ 0..=10 => mantissa << shift,
         shift @ -52..=-1 => mantissa >> -shift,
@@ -47,7 +47,7 @@ pub(super) fn to_bytes(value: f64, data_type: DataType) -> Vec<u8> {
     }
 }
 
-/// The nearest REAL32, by way of text: the standard library rounds once and right there.
+/// The nearest REAL32, converted as text: the standard library rounds once and correctly.
 fn to_real32(value: f64) -> f32 {
     if value.is_nan() {
         return f32::NAN;
@@ -61,7 +61,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn integers_are_rounded_and_stay_in_their_range() {
+    fn integers_are_rounded_and_limited_to_their_range() {
         let i16 = DataType::Integer(2);
         for (value, expected) in [
             (0.0, 0),

@@ -1,5 +1,4 @@
-//! The memory of a simulated device: working values, what is saved beyond a reset, and the rules that hold
-//! for every write.
+//! The object values of a simulated device: working values, stored values, and the rules for every write.
 
 use super::abort::Abort;
 use crate::canopen::id::NodeId;
@@ -12,7 +11,7 @@ use crate::device::scalar::{NumberRange, Scalar};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// What the description says of one entry, laid out for the server.
+/// The facts about one entry that the server needs.
 #[derive(Clone, Debug)]
 pub(super) struct Spec {
     pub(super) name: String,
@@ -28,7 +27,7 @@ pub(super) struct Spec {
     group: Option<Group>,
 }
 
-/// Whether these bytes carry the signature. "set" leaves the lowest byte to the value.
+/// Whether these bytes are the signature. With "set", byte 0 is the value.
 fn is_signed(signature: Signature, bytes: &[u8]) -> bool {
     let word: &[u8] = match signature {
         Signature::Save => b"save",
@@ -39,13 +38,13 @@ fn is_signed(signature: Signature, bytes: &[u8]) -> bool {
     bytes == word
 }
 
-/// Parameters that are saved and restored together.
+/// Parameters that are stored and restored together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Group {
     All,
     Communication,
     Application,
-    /// What only the manufacturer knows; none of the entries with a value.
+    /// A manufacturer-specific group; no entry with a value belongs to it.
     Other,
 }
 
@@ -77,7 +76,7 @@ impl From<StoreGroup> for Group {
     }
 }
 
-/// Which part of the dictionary a reset takes back.
+/// The part of the dictionary that a reset affects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Area {
     /// Everything.
@@ -96,18 +95,18 @@ impl Area {
 #[derive(Clone, Debug)]
 pub(super) struct Objects {
     specs: Arc<BTreeMap<ObjectId, Spec>>,
-    /// Without `stored` marks in the description everything writable is kept, by area.
+    /// Whether the description has `stored` marks. Without marks, every writable object is stored, by area.
     marked: bool,
-    /// The deviation [`Quirk::SaveAllResetsCobIds`].
+    /// [`Quirk::SaveAllResetsCobIds`].
     resets_cob_ids: bool,
-    /// The deviation [`Quirk::CobIdZeroIsDefault`].
+    /// [`Quirk::CobIdZeroIsDefault`].
     zero_is_default: bool,
     values: BTreeMap<ObjectId, Vec<u8>>,
     saved: BTreeMap<ObjectId, Vec<u8>>,
 }
 
 impl Objects {
-    /// As delivered, under `node`.
+    /// A new device under `node`.
     pub(super) fn new(model: &Model, node: NodeId) -> Objects {
         let mut specs = BTreeMap::new();
         for entry in &model.description.objects {
@@ -150,7 +149,7 @@ impl Objects {
         self.values.get(&object).map(Vec::as_slice)
     }
 
-    /// The working value as an unsigned number of at most four bytes, 0 where there is none.
+    /// The working value as an unsigned number of at most four bytes; 0 if there is none.
     pub(super) fn number(&self, object: ObjectId) -> u32 {
         let mut wide = [0; 4];
         let bytes = self.bytes(object).unwrap_or_default();
@@ -164,26 +163,26 @@ impl Objects {
         self.spec(object)?.data_type.decode(self.bytes(object)?).ok()?.as_f64()
     }
 
-    /// Whether a write asks for the default of a COB-ID instead of the value written.
+    /// Whether a write requests the default of a COB-ID instead of setting a value.
     pub(super) fn asks_for_default(&self, object: ObjectId, bytes: &[u8]) -> bool {
         self.zero_is_default && is_cob_id(object) && bytes.iter().all(|&byte| byte == 0)
     }
 
-    /// Puts the value as delivered in place.
+    /// Restores the factory default of an object.
     pub(super) fn put_default(&mut self, object: ObjectId, node: NodeId) {
         if let Some(value) = self.spec(object).map(|spec| spec.delivered(node)) {
             self.values.insert(object, value);
         }
     }
 
-    /// Puts a working value in place, whatever the access says.
+    /// Sets a working value, independent of the access.
     pub(super) fn put(&mut self, object: ObjectId, bytes: Vec<u8>) {
         if self.has(object) {
             self.values.insert(object, bytes);
         }
     }
 
-    /// Keeps a value beyond a reset, as if it had been written and saved.
+    /// Sets and stores a value, as if it had been written and stored before.
     pub(super) fn preset(&mut self, object: ObjectId, bytes: Vec<u8>) {
         if self.has(object) {
             self.saved.insert(object, bytes.clone());
@@ -211,7 +210,7 @@ impl Objects {
         }
     }
 
-    /// Whether the entry can be written with that many bytes.
+    /// Checks that the entry can be written with this number of bytes.
     pub(super) fn check_length(&self, object: ObjectId, bytes: &[u8]) -> Result<&Spec, Abort> {
         let spec = self.check_writable(object)?;
         if spec.data_type.width().is_some_and(|width| width != bytes.len()) {
@@ -220,7 +219,7 @@ impl Objects {
         Ok(spec)
     }
 
-    /// Whether `bytes` may be written to the entry: access, length, signature, limits.
+    /// Checks access, length, signature and limits of a write.
     pub(super) fn check_write(&self, object: ObjectId, bytes: &[u8]) -> Result<&Spec, Abort> {
         let spec = self.check_length(object, bytes)?;
         if let Some(signature) = spec.signature {
@@ -233,7 +232,7 @@ impl Objects {
         Ok(spec)
     }
 
-    /// Working values become what is saved, else what was delivered.
+    /// Resets the working values to the stored ones, else to the factory defaults.
     pub(super) fn reset(&mut self, area: Area, node: NodeId) {
         for (object, spec) in self.specs.iter().filter(|(object, _)| area.holds(**object)) {
             let value = self.saved.get(object).cloned().unwrap_or_else(|| spec.delivered(node));
@@ -241,8 +240,8 @@ impl Objects {
         }
     }
 
-    /// Saves the working values of a group. What is as delivered is not kept, so that defaults which hold the
-    /// node-ID follow it.
+    /// Stores the working values of a group. Factory defaults are not stored, so that defaults with the node-ID follow
+    /// it.
     pub(super) fn save(&mut self, group: Group, node: NodeId) {
         let specs = Arc::clone(&self.specs);
         for (object, spec) in specs.iter() {
@@ -257,11 +256,11 @@ impl Objects {
         }
     }
 
-    /// Forgets what is saved of a group; the working values change at the next reset.
+    /// Deletes the stored values of a group; the working values change at the next reset.
     pub(super) fn restore(&mut self, group: Group) {
         let specs = Arc::clone(&self.specs);
         for (object, spec) in specs.iter() {
-            // Node-ID and bit rate stay (MH-4, 4.3.8 and 4.3.9).
+            // Node-ID and bit rate are not restored (MH-4, 4.3.8 and 4.3.9).
             if spec.signature != Some(Signature::Set) && self.is_kept(group, *object, spec) {
                 self.saved.remove(object);
             }
@@ -278,7 +277,7 @@ impl Objects {
     }
 }
 
-/// The identifiers of emergencies and TPDOs.
+/// Whether an object is the COB-ID of emergencies or of a TPDO.
 fn is_cob_id(object: ObjectId) -> bool {
     object == ObjectId::new(0x1014, 0) || ((0x1800..0x1a00).contains(&object.index) && object.sub == 1)
 }
@@ -301,13 +300,13 @@ impl Spec {
         }
     }
 
-    /// The value as delivered; where the description has none: zeros, or no text.
+    /// The factory default; zeros or empty text if the description has none.
     fn delivered(&self, node: NodeId) -> Vec<u8> {
         let described = self.default.as_ref().and_then(|default| default.encode(self.data_type, node).ok());
         described.unwrap_or_else(|| vec![0; self.data_type.width().unwrap_or(0)])
     }
 
-    /// Bytes of a person's number in the entry's type.
+    /// The bytes of a value in the entry's type.
     pub(super) fn encode(&self, value: &Scalar, node: NodeId) -> Result<Vec<u8>, String> {
         value.encode(self.data_type, node).map_err(|error| error.to_string())
     }
@@ -421,7 +420,7 @@ mod tests {
     }
 
     #[test]
-    fn delivered_values() {
+    fn new_device_has_factory_defaults() {
         let objects = objects();
         assert_eq!(objects.number(id("0x1800:1")), 0x4000_0185);
         assert_eq!(objects.bytes(id("0x6127:1")), Some([0; 4].as_slice()));
@@ -429,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn each_refusal_has_its_code() {
+    fn each_refusal_has_its_abort_code() {
         let objects = objects();
         for (object, bytes, code) in [
             ("0x2000", &[0][..], 0x0602_0000),
@@ -468,7 +467,7 @@ mod tests {
     }
 
     #[test]
-    fn saved_is_what_its_group_was_asked_for() {
+    fn save_stores_the_requested_group_only() {
         let mut objects = objects();
         let change = |objects: &mut Objects| {
             objects.put(id("0x1017"), vec![100, 0]);
@@ -495,7 +494,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reset_of_the_communication_leaves_the_rest() {
+    fn communication_reset_keeps_other_objects() {
         let mut objects = objects();
         objects.put(id("0x1017"), vec![100, 0]);
         objects.put(id("0x6131:1"), vec![0, 0, 0xab, 0]);
@@ -505,7 +504,7 @@ mod tests {
     }
 
     #[test]
-    fn restoring_leaves_node_id_and_bit_rate() {
+    fn restore_keeps_node_id_and_bit_rate() {
         let mut objects = objects();
         objects.put(id("0x2320"), vec![9, 0, 0, 0]);
         objects.save(Group::All, node(5));

@@ -1,6 +1,6 @@
-//! The simulator's own record of what it sent: one line for every measured value in every TPDO, at the
-//! moment when the frame was complete. Its text is made here and not by the program's output, so that a
-//! test can hold the two against each other.
+//! The simulator's own record of the values it sent: one line for each measured value in each TPDO, with the time at
+//! which the frame was complete. It formats its text without the program's output code, so that a test can compare
+//! both.
 
 use super::channels::Reading;
 use super::model::Direction;
@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex};
 /// The first line.
 pub const HEADER: &str = "t_us,node,signal,value,unit,status,raw";
 
-/// Where the record is written to; clones write to the same place.
+/// The destination of the record; clones write to the same place.
 #[derive(Clone)]
 pub struct Recorder {
     inner: Arc<Mutex<Inner>>,
@@ -30,20 +30,20 @@ struct Inner {
 pub(super) struct Line(String);
 
 impl Recorder {
-    /// Begins a record: writes its header.
+    /// Starts a record and writes its header.
     ///
     /// # Errors
-    /// When that cannot be written.
+    /// The header cannot be written.
     pub fn new(out: Box<dyn Write + Send>) -> std::io::Result<Recorder> {
         let mut out = std::io::BufWriter::new(out);
         writeln!(out, "{HEADER}")?;
         Ok(Recorder { inner: Arc::new(Mutex::new(Inner { out, error: None })) })
     }
 
-    /// Hands what is buffered to the operating system. Dropping the last clone does it, too.
+    /// Writes buffered lines. Dropping the last clone does the same.
     ///
     /// # Errors
-    /// The first error since the record was begun.
+    /// The first error since the start of the record.
     pub fn flush(&self) -> std::io::Result<()> {
         let Ok(mut inner) = self.inner.lock() else { return Ok(()) };
         match inner.error.take() {
@@ -62,12 +62,12 @@ impl Recorder {
     }
 }
 
-/// The line of one mapped value. `told` says whether the device's status stands in the same PDO.
+/// The line of one mapped value. `told`: the same PDO contains the device's status.
 pub(super) fn line(node: NodeId, reading: &Reading, bytes: &[u8], told: bool) -> Line {
     let status = match (reading.overload, told, reading.marker) {
         (Some(Direction::High), true, _) => "overload-high",
         (Some(Direction::Low), true, _) => "overload-low",
-        // The marker alone does not tell the side.
+        // The marker alone does not show the direction.
         (Some(_), false, true) => "invalid",
         (None, true, _) | (None, false, true) => "ok",
         (_, false, false) => "",
@@ -83,7 +83,7 @@ pub(super) fn line(node: NodeId, reading: &Reading, bytes: &[u8], told: bool) ->
     Line(format!("{node},{},{value},{unit},{status},{}", reading.signal, raw(bytes)))
 }
 
-/// The line of a mapped object that is no process value (a field value): under its address, as it stands.
+/// The line of a mapped object that is no process value (a field value), under its address.
 pub(super) fn plain(node: NodeId, object: ObjectId, data_type: DataType, bytes: &[u8]) -> Line {
     let value = match data_type {
         DataType::Real32 | DataType::Real64 => real(bytes),
@@ -105,7 +105,7 @@ fn signed(bytes: &[u8]) -> i128 {
     if negative { unsigned - (0..bytes.len()).fold(1i128, |power, _| power * 256) } else { unsigned }
 }
 
-/// An integer with its point before the last `digits`.
+/// An integer with a decimal point before the last `digits`.
 fn decimal(number: i128, digits: u32) -> String {
     let mut text = number.unsigned_abs().to_string();
     let digits = usize::try_from(digits).unwrap_or(0);
@@ -121,7 +121,7 @@ fn decimal(number: i128, digits: u32) -> String {
     text
 }
 
-/// A REAL32 as the shortest text that reads back to it.
+/// A REAL32 as the shortest text that reads back to the same number.
 fn real(bytes: &[u8]) -> String {
     let Ok(bytes) = bytes.try_into() else { return String::new() };
     let number = f32::from_le_bytes(bytes);
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn values_as_the_contract_writes_them() {
+    fn values_have_the_form_of_the_contract() {
         // DPS, table 19: 50 C3 00 00 is 50.000 psi.
         let integer = reading(Some(3), None, false);
         assert_eq!(text(&integer, &[0x50, 0xc3, 0, 0], false), "127,pressure,50.000,psi,,0x50C30000");
@@ -159,21 +159,21 @@ mod tests {
     }
 
     #[test]
-    fn field_values_stand_under_their_address() {
+    fn field_values_are_recorded_under_their_address() {
         let line = |data_type, bytes: &[u8]| plain(NodeId::MAX, ObjectId::new(0x7100, 1), data_type, bytes).0;
         assert_eq!(line(DataType::Integer(2), &[0xff, 0xff]), "127,0x7100:1,-1,,,0xFFFF");
         assert_eq!(line(DataType::Unsigned(2), &[0xff, 0xff]), "127,0x7100:1,65535,,,0xFFFF");
     }
 
     #[test]
-    fn status_only_as_far_as_the_device_tells_it() {
+    fn status_is_recorded_only_if_the_device_sends_it() {
         let nan = f32::NAN.to_le_bytes();
         let high = |marker| reading(None, Some(Direction::High), marker);
         assert_eq!(text(&high(true), &nan, true), "127,pressure,,psi,overload-high,0x0000C07F");
         assert_eq!(text(&high(true), &nan, false), "127,pressure,,psi,invalid,0x0000C07F");
         let low = reading(None, Some(Direction::Low), true);
         assert_eq!(text(&low, &nan, true), "127,pressure,,psi,overload-low,0x0000C07F");
-        // Neither status nor marker: nothing shows that the number means nothing.
+        // Without status and marker, nothing shows that the value is invalid.
         assert_eq!(text(&high(false), &[0, 0, 0xd2, 0x42], false), "127,pressure,105,psi,,0x0000D242");
     }
 }

@@ -1,26 +1,26 @@
-//! Block transfer of the simulated SDO server (CiA 301, 7.2.4.3.9 to 7.2.4.3.16), with a CRC of its own.
+//! Block transfer of the simulated SDO server (CiA 301, 7.2.4.3.9 to 7.2.4.3.16), with its own CRC.
 
 use super::abort::Abort;
 
-/// Segments in a sub-block that this server takes.
+/// Segments per sub-block that this server requests.
 const BLOCK_SIZE: u8 = 127;
 
-/// A block transfer under way, as seen by the server.
+/// The state of a block transfer in the server.
 #[derive(Clone, Debug)]
 pub(super) enum Block {
-    /// Download: segments come, `taken` of this sub-block so far, all in order.
+    /// Download: `taken` segments of this sub-block were received in order.
     Taking { value: Incoming, taken: u8 },
-    /// Download: the last segment is there, the end is not.
+    /// Download: the last segment was received, the end request not yet.
     Taken { value: Incoming, closing: [u8; 8] },
-    /// Upload: the client has not said "start" yet.
+    /// Upload: the client has not sent the start request yet.
     Offered { value: Outgoing, block_size: u8 },
-    /// Upload: a sub-block of `count` segments from byte `start` on is out.
+    /// Upload: a sub-block of `count` segments from byte `start` on was sent.
     Giving { value: Outgoing, start: usize, count: u8 },
-    /// Upload: the end is out.
+    /// Upload: the end request was sent.
     Given,
 }
 
-/// A value that arrives.
+/// A value that is received.
 #[derive(Clone, Debug)]
 pub(super) struct Incoming {
     pub(super) announced: Option<usize>,
@@ -28,22 +28,22 @@ pub(super) struct Incoming {
     pub(super) checked: bool,
 }
 
-/// A value that leaves.
+/// A value that is sent.
 #[derive(Clone, Debug)]
 pub(super) struct Outgoing {
     pub(super) bytes: Vec<u8>,
     pub(super) checked: bool,
 }
 
-/// What a frame of the client leads to.
+/// The result of a frame from the client.
 pub(super) enum Step {
-    /// It goes on, with these answers.
+    /// The transfer continues with these answers.
     On(Block, Vec<[u8; 8]>),
-    /// A value has arrived whole; the answer is for when the device has taken it.
+    /// A value is complete; the answer is sent after the device has accepted it.
     Arrived(Vec<u8>, [u8; 8]),
-    /// The client has everything.
+    /// The client has received everything.
     Over,
-    /// The frame has no place in this transfer, which is over.
+    /// The frame is not allowed here; the transfer ends.
     Foreign,
 }
 
@@ -69,11 +69,11 @@ fn block_size(byte: u8) -> Result<u8, Abort> {
 }
 
 impl Block {
-    /// A frame of the client, aborts excepted.
+    /// Handles a frame from the client, except an abort.
     pub(super) fn step(self, frame: [u8; 8], longest: usize) -> Result<Step, Abort> {
         match self {
             Block::Taking { value, taken } => take(value, taken, frame, longest),
-            // The last segment once more; it can look like an end.
+            // The last segment repeated; it can look like an end request.
             Block::Taken { value, closing } if frame == closing && frame != end(&value.bytes, 0, value.checked) => {
                 Ok(Step::On(Block::Taken { value, closing }, Vec::new()))
             }
@@ -99,7 +99,7 @@ impl Block {
     }
 }
 
-/// A segment. What is out of order is dropped; the answer comes with the end of the sub-block.
+/// Handles a segment. Segments out of order are dropped; the answer follows at the end of the sub-block.
 fn take(mut value: Incoming, mut taken: u8, frame: [u8; 8], longest: usize) -> Result<Step, Abort> {
     let sequence = frame[0] & 0x7f;
     let last = frame[0] & 0x80 != 0;
@@ -119,14 +119,14 @@ fn take(mut value: Incoming, mut taken: u8, frame: [u8; 8], longest: usize) -> R
     Ok(Step::On(block, answers))
 }
 
-/// The frame that ends a value, in either direction, whose last segment has `unused` bytes too many.
+/// The end request of a value, in either direction; `unused` bytes of the last segment are not part of it.
 fn end(value: &[u8], unused: usize, checked: bool) -> [u8; 8] {
     let [low, high] = if checked { remainder(value).to_le_bytes() } else { [0, 0] };
     let [unused, ..] = unused.to_le_bytes();
     [0b1100_0001 | unused << 2, low, high, 0, 0, 0, 0, 0]
 }
 
-/// The end of a download.
+/// Handles the end request of a download.
 fn arrive(mut value: Incoming, frame: [u8; 8]) -> Result<Step, Abort> {
     let unused = usize::from(frame[0] >> 2 & 0b111);
     value.bytes.truncate(value.bytes.len().saturating_sub(unused));
@@ -139,7 +139,7 @@ fn arrive(mut value: Incoming, frame: [u8; 8]) -> Result<Step, Abort> {
     Ok(Step::Arrived(value.bytes, [0b1010_0001, 0, 0, 0, 0, 0, 0, 0]))
 }
 
-/// The segments of a sub-block. A value without bytes is one segment of which nothing counts.
+/// The segments of a sub-block. An empty value is one segment without data.
 fn give(value: Outgoing, start: usize, block_size: u8) -> Step {
     let mut frames = Vec::new();
     let mut count = 0;
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_remainder_of_the_standards_example() {
+    fn crc_of_the_standards_example() {
         assert_eq!(remainder(b"123456789"), 0x31c3);
     }
 }

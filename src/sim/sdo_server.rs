@@ -1,5 +1,5 @@
-//! The SDO server of a simulated device (CiA 301, 7.2.4): expedited and segmented transfers, where described
-//! block transfers too, one at a time.
+//! The SDO server of a simulated device (CiA 301, 7.2.4): expedited, segmented and, if the description says so, block
+//! transfers, one at a time.
 
 use super::abort::Abort;
 use super::sdo_block::{self, Block, Step};
@@ -8,28 +8,28 @@ use crate::canopen::object::ObjectId;
 use crate::device::description::{SdoStyle, SizeIndication};
 use std::time::Duration;
 
-/// How long the server waits for the next segment before it gives up.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Time limit for the next segment from the client.
+const SEGMENT_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The longest value that can be written.
-const LONGEST: usize = 1 << 20;
+const MAX_LENGTH: usize = 1 << 20;
 
 /// The answer to an upload of 1 to 4 bytes.
-const SIZED: [u8; 5] = [0x43, 0x4f, 0x4b, 0x47, 0x43];
+const UPLOAD_COMMANDS: [u8; 5] = [0x43, 0x4f, 0x4b, 0x47, 0x43];
 
-/// What the server reads and writes.
+/// The objects that the server reads and writes.
 pub(super) trait Dictionary {
     /// The value of an entry in wire order.
     fn upload(&mut self, object: ObjectId) -> Result<Vec<u8>, Abort>;
 
-    /// Whether the entry can be written, and how many bytes its type has, where it says.
+    /// The width of a writable entry in bytes; `None` if its type has no fixed width.
     fn width(&self, object: ObjectId) -> Result<Option<usize>, Abort>;
 
-    /// A value arrives.
+    /// Writes a value.
     fn download(&mut self, object: ObjectId, bytes: &[u8]) -> Result<(), Abort>;
 }
 
-/// The server and the transfer that it is in.
+/// The server with its present transfer.
 #[derive(Clone, Debug)]
 pub(super) struct SdoServer {
     style: SdoStyle,
@@ -40,7 +40,7 @@ pub(super) struct SdoServer {
 #[derive(Clone, Debug)]
 enum Transfer {
     None,
-    /// The client fetches segments.
+    /// The client reads segments.
     Upload {
         object: ObjectId,
         bytes: Vec<u8>,
@@ -48,7 +48,7 @@ enum Transfer {
         toggle: bool,
         until: Mono,
     },
-    /// The client sends segments.
+    /// The client writes segments.
     Download {
         object: ObjectId,
         announced: Option<usize>,
@@ -56,7 +56,7 @@ enum Transfer {
         toggle: bool,
         until: Mono,
     },
-    /// In blocks, either way.
+    /// A block transfer in either direction.
     Block {
         object: ObjectId,
         block: Block,
@@ -65,17 +65,17 @@ enum Transfer {
 }
 
 impl SdoServer {
-    /// `answers_60` is the deviation of [`Quirk::UploadAnswered60`](crate::device::quirk::Quirk).
+    /// `answers_60`: [`Quirk::UploadAnswered60`](crate::device::quirk::Quirk).
     pub(super) fn new(style: SdoStyle, answers_60: bool) -> SdoServer {
         SdoServer { style, answers_60, transfer: Transfer::None }
     }
 
-    /// Forgets the transfer, as a reset and a stop do.
+    /// Drops the transfer, as at a reset and in STOPPED.
     pub(super) fn forget(&mut self) {
         self.transfer = Transfer::None;
     }
 
-    /// When the server gives up on its client.
+    /// The time limit of the present transfer.
     pub(super) fn deadline(&self) -> Option<Mono> {
         match &self.transfer {
             Transfer::None => None,
@@ -85,7 +85,7 @@ impl SdoServer {
         }
     }
 
-    /// The deadline has passed: what is sent then.
+    /// Ends a transfer whose time limit has passed; returns the abort to send.
     pub(super) fn give_up(&mut self) -> Option<[u8; 8]> {
         let object = self.object()?;
         self.transfer = Transfer::None;
@@ -101,25 +101,25 @@ impl SdoServer {
         }
     }
 
-    /// A frame of this server is on the wire: the client's time begins with the last one.
+    /// Notes that a frame of this server was sent: the client's time limit starts with the last one.
     pub(super) fn sent(&mut self, now: Mono) {
         if let Transfer::Block { until, .. } = &mut self.transfer {
-            *until = now + PATIENCE;
+            *until = now + SEGMENT_TIMEOUT;
         }
     }
 
-    /// Whether a sub-block is on its way to the client: whatever the client sends now, the rest of it is void.
+    /// Whether a sub-block is being sent. Any frame from the client cancels the rest of it.
     pub(super) fn is_giving(&self) -> bool {
         matches!(self.transfer, Transfer::Block { block: Block::Giving { .. }, .. })
     }
 
-    /// A request, and the answers to it if there are any.
+    /// Handles a request and returns the answers.
     pub(super) fn request(&mut self, now: Mono, request: [u8; 8], memory: &mut dyn Dictionary) -> Vec<[u8; 8]> {
         let [command, low, high, sub, ..] = request;
         let addressed = ObjectId { index: u16::from(high) << 8 | u16::from(low), sub };
-        // Segments carry no address: an abort names the object of the transfer, or none.
+        // Segments contain no address: an abort names the object of the transfer, or 0000h.
         let in_transfer = self.object().unwrap_or(ObjectId::new(0, 0));
-        // Within a block transfer a segment can look like any other request.
+        // In a block transfer, a segment can look like any other request.
         if command != 0x80 && matches!(self.transfer, Transfer::Block { .. }) {
             match self.block(now, request, memory) {
                 Ok(Some(answers)) => return answers,
@@ -153,14 +153,14 @@ impl SdoServer {
         }
     }
 
-    /// A frame within a block transfer; `None` if it has no place there.
+    /// Handles a frame in a block transfer; `None` if it is not allowed there.
     fn block(&mut self, now: Mono, frame: [u8; 8], memory: &mut dyn Dictionary) -> Result<Option<Vec<[u8; 8]>>, Abort> {
         let Transfer::Block { object, block, .. } = std::mem::replace(&mut self.transfer, Transfer::None) else {
             return Ok(None);
         };
-        Ok(match block.step(frame, LONGEST)? {
+        Ok(match block.step(frame, MAX_LENGTH)? {
             Step::On(block, answers) => {
-                self.transfer = Transfer::Block { object, block, until: now + PATIENCE };
+                self.transfer = Transfer::Block { object, block, until: now + SEGMENT_TIMEOUT };
                 Some(answers)
             }
             Step::Arrived(bytes, answer) => {
@@ -186,7 +186,7 @@ impl SdoServer {
             return self.upload(now, object, memory);
         }
         let (block, answer) = sdo_block::offer(request, bytes)?;
-        self.transfer = Transfer::Block { object, block, until: now + PATIENCE };
+        self.transfer = Transfer::Block { object, block, until: now + SEGMENT_TIMEOUT };
         Ok(answer)
     }
 
@@ -201,7 +201,7 @@ impl SdoServer {
         let data = [request[4], request[5], request[6], request[7]];
         let announced = announced(request[0] & 0b10 != 0, data, memory.width(object)?)?;
         let (block, answer) = sdo_block::accept(request, announced);
-        self.transfer = Transfer::Block { object, block, until: now + PATIENCE };
+        self.transfer = Transfer::Block { object, block, until: now + SEGMENT_TIMEOUT };
         Ok(answer)
     }
 
@@ -209,12 +209,12 @@ impl SdoServer {
         self.transfer = Transfer::None;
         let bytes = memory.upload(object)?;
         let omitted = self.style.size == SizeIndication::Omitted;
-        // Four bytes without a size can hold a short text, but nothing shows that it is none at all.
+        // Without a size, four bytes can be a short text, but an empty text cannot be shown.
         if (1..=4).contains(&bytes.len()) || (bytes.is_empty() && omitted) {
             let command = match (self.answers_60, self.style.size) {
                 (true, _) => 0x60,
                 (false, SizeIndication::Omitted) => 0x42,
-                (false, SizeIndication::Indicated) => SIZED[bytes.len()],
+                (false, SizeIndication::Indicated) => UPLOAD_COMMANDS[bytes.len()],
             };
             let mut data = [0; 4];
             data[..bytes.len()].copy_from_slice(&bytes);
@@ -224,7 +224,7 @@ impl SdoServer {
             return Err(Abort::GENERAL);
         }
         let size = u32::try_from(bytes.len()).map_err(|_| Abort::MEMORY)?;
-        self.transfer = Transfer::Upload { object, bytes, sent: 0, toggle: false, until: now + PATIENCE };
+        self.transfer = Transfer::Upload { object, bytes, sent: 0, toggle: false, until: now + SEGMENT_TIMEOUT };
         Ok(frame(0x41, object, size.to_le_bytes()))
     }
 
@@ -244,7 +244,7 @@ impl SdoServer {
         answer[1..=part.len()].copy_from_slice(part);
         *sent += part.len();
         *toggle = !*toggle;
-        *until = now + PATIENCE;
+        *until = now + SEGMENT_TIMEOUT;
         if last {
             self.transfer = Transfer::None;
         }
@@ -268,7 +268,7 @@ impl SdoServer {
                 &data[..4 - usize::from(command >> 2 & 0b11)]
             } else {
                 let width = width.unwrap_or(4).min(4);
-                // What the type cannot hold is not cut off in silence.
+                // A value that is too long for the type is refused, not truncated.
                 if data[width..].iter().any(|&byte| byte != 0) {
                     return Err(Abort::LENGTH);
                 }
@@ -282,7 +282,7 @@ impl SdoServer {
         }
         let announced = announced(sized, data, width)?;
         self.transfer =
-            Transfer::Download { object, announced, bytes: Vec::new(), toggle: false, until: now + PATIENCE };
+            Transfer::Download { object, announced, bytes: Vec::new(), toggle: false, until: now + SEGMENT_TIMEOUT };
         Ok(frame(0x60, object, [0; 4]))
     }
 
@@ -296,12 +296,12 @@ impl SdoServer {
         }
         let len = 7 - usize::from(command >> 1 & 0b111);
         bytes.extend_from_slice(&request[1..=len]);
-        if bytes.len() > LONGEST {
+        if bytes.len() > MAX_LENGTH {
             return Err(Abort::MEMORY);
         }
         let answer = [0x20 | command & 0x10, 0, 0, 0, 0, 0, 0, 0];
         *toggle = !*toggle;
-        *until = now + PATIENCE;
+        *until = now + SEGMENT_TIMEOUT;
         if command & 1 != 0 {
             if announced.is_some_and(|announced| announced != bytes.len()) {
                 return Err(Abort::LENGTH);
@@ -315,13 +315,13 @@ impl SdoServer {
     }
 }
 
-/// The announced size, if there is one and it makes sense.
+/// The announced size, if there is one and it is possible.
 fn announced(sized: bool, data: [u8; 4], width: Option<usize>) -> Result<Option<usize>, Abort> {
     if !sized {
         return Ok(None);
     }
     let size = usize::try_from(u32::from_le_bytes(data)).map_err(|_| Abort::MEMORY)?;
-    if size > LONGEST {
+    if size > MAX_LENGTH {
         return Err(Abort::MEMORY);
     }
     if width.is_some_and(|width| width != size) {

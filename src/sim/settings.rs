@@ -1,4 +1,4 @@
-//! Node-ID and bit rate of a simulated device: what is in force, what waits to be, what survives without power.
+//! Node-ID and bit rate of a simulated device: active, pending and stored.
 
 use super::objects::Objects;
 use crate::canopen::id::NodeId;
@@ -15,7 +15,7 @@ const STANDARD: [(u8, u32); 8] =
 pub(super) enum Rate {
     /// This one, in bit/s.
     At(u32),
-    /// That of the bus.
+    /// The bit rate of the bus.
     Auto,
 }
 
@@ -26,31 +26,31 @@ pub(super) struct Pair {
     pub(super) rate: Rate,
 }
 
-/// The three pairs of CiA 305, and the objects in which the device shows and takes them.
+/// The three pairs of CiA 305, and the objects that contain and change them.
 #[derive(Clone, Debug)]
 pub(super) struct Settings {
-    /// In force.
+    /// Active now.
     pub(super) active: Pair,
-    /// In force after the next reset.
+    /// Active after the next reset.
     pub(super) pending: Pair,
-    /// In force after power on.
+    /// Active after the next power-on.
     pub(super) persistent: Pair,
-    /// The bit rate of the bus, where somebody has told it.
-    pub(super) wire: Option<u32>,
-    /// What stands in a request for which rate.
+    /// The bit rate of the bus, if it is known.
+    pub(super) bus_bit_rate: Option<u32>,
+    /// The codes of the bit rates.
     codes: Vec<(u8, Rate)>,
     node_at: Option<Place>,
     rate_at: Option<Place>,
 }
 
-/// An object that takes a setting.
+/// An object that sets node-ID or bit rate.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     object: ObjectId,
-    /// What has to be written for it to last; none where writing is enough.
+    /// The object that stores it; `None` if the write itself stores.
     store: Option<ObjectId>,
-    /// Whether only power on brings it into force.
-    needs_power: bool,
+    /// Whether only a power cycle activates it.
+    needs_power_cycle: bool,
 }
 
 impl Settings {
@@ -65,42 +65,42 @@ impl Settings {
         let place = |place: fn(&AssignEntry) -> Option<AssignPlace>| {
             let entry = way?;
             let object = place(entry)?.object;
-            let needs_power = entry.applies == Applies::Power;
-            objects.has(object).then_some(Place { object, store: entry.store, needs_power })
+            let needs_power_cycle = entry.applies == Applies::Power;
+            objects.has(object).then_some(Place { object, store: entry.store, needs_power_cycle })
         };
         Settings {
             active: pair,
             pending: pair,
             persistent: pair,
-            wire: None,
+            bus_bit_rate: None,
             codes,
             node_at: place(|entry| entry.node_id),
             rate_at: place(|entry| entry.bit_rate),
         }
     }
 
-    /// What is in force after power on.
+    /// Activates the stored pair, as at power-on.
     pub(super) fn power_on(&mut self) {
         self.pending = self.persistent;
         self.active = self.persistent;
     }
 
-    /// What is in force after a reset.
+    /// Activates the pending pair, as at a reset.
     pub(super) fn reset(&mut self) {
         self.active = self.pending;
     }
 
-    /// The bit rate of the bus; a device of which nothing else is said was made for it.
-    pub(super) fn tell_wire(&mut self, bit_rate: u32, is_given: bool) {
-        if self.wire.is_none() && !is_given {
+    /// Notes the bit rate of the bus. A device without a given bit rate takes it.
+    pub(super) fn set_bus_bit_rate(&mut self, bit_rate: u32, is_given: bool) {
+        if self.bus_bit_rate.is_none() && !is_given {
             for pair in [&mut self.active, &mut self.pending, &mut self.persistent] {
                 pair.rate = Rate::At(bit_rate);
             }
         }
-        self.wire = Some(bit_rate);
+        self.bus_bit_rate = Some(bit_rate);
     }
 
-    /// Takes a node-ID for later, FFh for none; `false` if it is neither.
+    /// Sets the pending node-ID, FFh for unconfigured; `false` if the number is not valid.
     pub(super) fn configure_node(&mut self, number: u8) -> bool {
         let node = NodeId::new(number).ok();
         let is_taken = node.is_some() || number == 0xff;
@@ -110,7 +110,7 @@ impl Settings {
         is_taken
     }
 
-    /// Takes a bit rate for later; `false` if the device has none of that code.
+    /// Sets the pending bit rate; `false` if the device has no such code.
     pub(super) fn configure_rate(&mut self, code: u8) -> bool {
         match self.rate(code) {
             Some(rate) => {
@@ -125,37 +125,36 @@ impl Settings {
         self.codes.iter().find(|(known, _)| *known == code).map(|(_, rate)| *rate)
     }
 
-    /// Whether an object may be written with this, as far as node-ID and bit rate go.
+    /// Whether a write of node-ID or bit rate is allowed.
     pub(super) fn allows(&self, object: ObjectId, bytes: &[u8]) -> bool {
         let is = |place: Option<Place>| place.is_some_and(|place| place.object == object);
         let number = bytes.first().copied().unwrap_or_default();
         if is(self.node_at) { NodeId::new(number).is_ok() } else { !is(self.rate_at) || self.rate(number).is_some() }
     }
 
-    /// `written` was written: the store command that keeps what stands in the objects, or an object that
-    /// needs none.
+    /// Handles the write of `written`: a store command, or an object that needs no store command.
     pub(super) fn keep(&mut self, written: ObjectId, objects: &Objects) {
         let number = |place: Option<Place>| {
             let place = place.filter(|place| place.store.unwrap_or(place.object) == written)?;
-            Some((*objects.bytes(place.object)?.first()?, place.needs_power))
+            Some((*objects.bytes(place.object)?.first()?, place.needs_power_cycle))
         };
         let (node, rate, shown) = (number(self.node_at), number(self.rate_at), self.shown_rate());
-        if let Some((number, needs_power)) = node
+        if let Some((number, needs_power_cycle)) = node
             && let Ok(node) = NodeId::new(number)
         {
             self.persistent.node = Some(node);
-            self.pending.node = if needs_power { self.pending.node } else { Some(node) };
+            self.pending.node = if needs_power_cycle { self.pending.node } else { Some(node) };
         }
-        // An object that shows the rate found does not turn automatic detection off.
-        if let Some((code, needs_power)) = rate.filter(|(code, _)| Some(*code) != shown)
+        // A write of the detected bit rate does not disable automatic detection.
+        if let Some((code, needs_power_cycle)) = rate.filter(|(code, _)| Some(*code) != shown)
             && let Some(rate) = self.rate(code)
         {
             self.persistent.rate = rate;
-            self.pending.rate = if needs_power { self.pending.rate } else { rate };
+            self.pending.rate = if needs_power_cycle { self.pending.rate } else { rate };
         }
     }
 
-    /// Shows in the objects what is in force.
+    /// Writes the active pair into the objects.
     pub(super) fn show(&self, objects: &mut Objects) {
         let node = self.active.node.map(NodeId::get);
         for (place, number) in [(self.node_at, node), (self.rate_at, self.shown_rate())] {
@@ -168,11 +167,11 @@ impl Settings {
         }
     }
 
-    /// The code of the bit rate in force; with automatic detection of the one found (MH-4, 4.3.9).
+    /// The code of the active bit rate; with automatic detection, of the rate detected (MH-4, 4.3.9).
     fn shown_rate(&self) -> Option<u8> {
         let rate = match self.active.rate {
             Rate::At(rate) => rate,
-            Rate::Auto => self.wire?,
+            Rate::Auto => self.bus_bit_rate?,
         };
         self.codes.iter().find(|(_, known)| *known == Rate::At(rate)).map(|(code, _)| *code)
     }

@@ -1,4 +1,4 @@
-//! What a simulated device is told when it is put together.
+//! The settings of a simulated device before it is switched on.
 
 use super::data::{SimChannel, SimData};
 use super::model::Overload;
@@ -13,54 +13,53 @@ use std::time::Duration;
 /// 1018h:4.
 pub(super) const SERIAL_NUMBER: ObjectId = ObjectId::new(0x1018, 4);
 
-/// What a device is told when it is put together.
+/// The settings of a simulated device before it is switched on.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// Its kind.
+    /// Its description.
     pub model: Arc<Model>,
-    /// How its kind is simulated.
+    /// The simulator's data for this kind of device.
     pub sim: SimData,
-    /// Its node-ID; none: it is unconfigured, and only LSS reaches it.
+    /// Its node-ID; `None`: it is unconfigured, and only LSS reaches it.
     pub node: Option<NodeId>,
-    /// Its bit rate in bit/s; none: that of the bus on which its power comes on first.
+    /// Its bit rate in bit/s; `None`: the rate of the bus at its first power-on.
     pub bit_rate: Option<u32>,
     /// Its serial number.
     pub serial: u32,
     /// Whether it becomes OPERATIONAL by itself.
     pub start: bool,
-    /// Objects that were set and saved before.
+    /// Objects with a stored value.
     pub set: Vec<(ObjectId, Scalar)>,
-    /// Its measuring channels.
+    /// Its measured quantities.
     pub channels: Vec<SimChannel>,
     /// Overloads by channel.
     pub overloads: Vec<(u8, Overload)>,
-    /// What makes the noise different from that of another run.
+    /// Seed of the noise.
     pub seed: u64,
-    /// What it does otherwise than it should.
+    /// Faults and deviations.
     pub oddities: Oddities,
 }
 
-/// What a device does otherwise than it should.
+/// Faults and deviations of a device.
 #[derive(Clone, Debug, Default)]
 pub struct Oddities {
-    /// How long it thinks before it answers SDO and LSS.
+    /// Response time of SDO and LSS.
     pub latency: Duration,
-    /// LSS services whose next answer is lost, once for each time that it stands here. The service that
-    /// switches selectively is 43h, the one that identifies 4Bh.
+    /// LSS services whose next answer is lost, once per entry. The selective switch is 43h, the identification 4Bh.
     pub lose: Vec<u8>,
-    /// LSS services whose next answer comes that much later, once.
+    /// LSS services whose next answer is delayed, once.
     pub late: BTreeMap<u8, Duration>,
     /// LSS services (11h, 13h, 17h) that are refused, with their error codes.
     pub refuse: BTreeMap<u8, u8>,
-    /// Whether it answers every fastscan frame once it is in configuration state, as CANopenNode does.
-    pub scans_for_ever: bool,
-    /// After what it does not come back until its power goes off and on.
-    pub gone_after: Vec<GoneAfter>,
+    /// Whether it answers every fastscan frame in configuration state, as CANopenNode does.
+    pub endless_fastscan: bool,
+    /// Events after which it is offline until a power cycle.
+    pub offline_after: Vec<OfflineAfter>,
 }
 
-/// After what a device does not come back.
+/// An event after which a device is offline until a power cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GoneAfter {
+pub enum OfflineAfter {
     /// A reset of the node or of the communication.
     Reset,
     /// The activation of another bit rate by LSS.
@@ -68,7 +67,7 @@ pub enum GoneAfter {
 }
 
 impl Setup {
-    /// A device as its description has it.
+    /// A device as described.
     pub fn new(model: Arc<Model>, node: NodeId) -> Setup {
         let sim = SimData::of(&model);
         let channels = sim.channels.clone();

@@ -1,5 +1,5 @@
-//! TPDOs of a simulated device (CiA 301, 7.2.2 and 7.5.2.35 to 7.5.2.38): the rules for their parameters,
-//! and when one is sent.
+//! TPDOs of a simulated device (CiA 301, 7.2.2 and 7.5.2.35 to 7.5.2.38): the rules for their parameters, and the
+//! causes of a transmission.
 
 use super::abort::Abort;
 use super::channels::Channels;
@@ -18,15 +18,15 @@ pub(super) struct Tpdo {
     number: u16,
     /// SYNCs since the last transmission.
     syncs: u8,
-    /// What was sent last, for "if changed".
+    /// The last transmission, for "if changed".
     sent: Option<Vec<u8>>,
     sent_at: Option<Mono>,
     /// When the event timer elapses.
     timer: Option<Mono>,
-    /// An event that waits for the inhibit time.
+    /// An event that waits for the end of the inhibit time.
     held_back: Option<Mono>,
     watches: Vec<Watch>,
-    /// When the values that can cause an event are looked at next.
+    /// The next time to compare the values that can cause an event.
     look: Option<Mono>,
 }
 
@@ -35,7 +35,7 @@ pub(super) struct Tpdo {
 struct Watch {
     object: ObjectId,
     delta: f64,
-    /// Lower and upper limit; both 0 are none.
+    /// Lower and upper limit; both 0 means none.
     limits: Option<(f64, f64)>,
     hysteresis: f64,
     /// The value of the last transmission.
@@ -44,12 +44,12 @@ struct Watch {
     above: bool,
 }
 
-/// Why a TPDO goes out.
+/// The cause of a transmission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cause {
-    /// Its turn, or its timer.
+    /// Its SYNC or its event timer.
     Due,
-    /// A SYNC; to be sent only if something changed.
+    /// A SYNC, if the values have changed.
     IfChanged,
 }
 
@@ -89,33 +89,33 @@ impl Tpdo {
         matches!(self.kind(objects), 254 | 255)
     }
 
-    /// The identifier, if the TPDO is valid.
+    /// The COB-ID, if the TPDO is valid.
     pub(super) fn cob_id(&self, objects: &Objects) -> Option<CanId> {
         let cob_id = objects.number(self.communication(1));
         let id = u16::try_from(cob_id & 0x7ff).ok()?;
         if is_valid(cob_id) { CanId::standard(id) } else { None }
     }
 
-    /// What is mapped at present.
+    /// The present mapping.
     pub(super) fn mapping(&self, objects: &Objects) -> Vec<ObjectId> {
         let map = 0x1a00 + self.number;
         let count = u8::try_from(objects.number(ObjectId::new(map, 0))).unwrap_or(0);
         (1..=count).map(|sub| mapped(objects.number(ObjectId::new(map, sub))).0).collect()
     }
 
-    /// Whether an index holds parameters of this TPDO.
+    /// Whether an index belongs to this TPDO.
     pub(super) fn is_configured_by(&self, index: u16) -> bool {
         index == 0x1800 + self.number || index == 0x1a00 + self.number
     }
 
-    /// The node has become OPERATIONAL, or a parameter was written: begins anew. Nothing is sent by that.
+    /// Restarts: the node is OPERATIONAL, or a parameter was written. This sends nothing.
     pub(super) fn start(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
         *self = Tpdo::new(self.number);
         self.timer = self.event_timer(objects).map(|period| now + period);
         self.watch(objects, channels, now);
     }
 
-    /// Works out which values can cause an event from now on.
+    /// Determines the values that can cause an event.
     pub(super) fn watch(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
         self.watches.clear();
         if self.is_event_driven(objects) && self.cob_id(objects).is_some() {
@@ -126,7 +126,7 @@ impl Tpdo {
         self.plan_look(objects, channels, now);
     }
 
-    /// The node has left OPERATIONAL.
+    /// Stops: the node has left OPERATIONAL.
     pub(super) fn stop(&mut self) {
         *self = Tpdo::new(self.number);
     }
@@ -136,7 +136,7 @@ impl Tpdo {
         self.look = self.watches.iter().filter_map(next).min().map(Mono::at);
     }
 
-    /// A SYNC has come: whether that is a reason to send.
+    /// Handles a SYNC; returns whether to send.
     pub(super) fn sync(&mut self, objects: &Objects) -> Option<Cause> {
         match self.kind(objects) {
             0 => Some(Cause::IfChanged),
@@ -148,7 +148,7 @@ impl Tpdo {
         }
     }
 
-    /// Time has come to `now`: whether timer or event is a reason to send.
+    /// Handles the time `now`; returns whether event timer or event cause a transmission.
     pub(super) fn wake(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) -> Option<Cause> {
         let mut event = self.held_back.is_some_and(|due| due <= now);
         if self.look.is_some_and(|due| due <= now) {
@@ -161,7 +161,7 @@ impl Tpdo {
         if !event {
             return None;
         }
-        // The timer counts from the transmission that it would have caused, so that it does not drift.
+        // The timer counts from its previous due time, so that it does not drift.
         let from = self.timer.filter(|due| *due <= now).unwrap_or(now);
         self.timer = self.event_timer(objects).map(|period| next_turn(from, period, now));
         let inhibit = Duration::from_micros(100) * objects.number(self.communication(3));
@@ -170,12 +170,12 @@ impl Tpdo {
         self.held_back.is_none().then_some(Cause::Due)
     }
 
-    /// When [`Tpdo::wake`] is due.
+    /// The next time at which [`Tpdo::wake`] has something to do.
     pub(super) fn next_wake(&self) -> Option<Mono> {
         [self.timer, self.held_back, self.look].into_iter().flatten().min()
     }
 
-    /// Takes note of a transmission; `false` if it is not to happen, since nothing has changed.
+    /// Notes a transmission; `false` if it must not happen because nothing changed.
     pub(super) fn note(
         &mut self,
         cause: Cause,
@@ -198,7 +198,7 @@ impl Tpdo {
 }
 
 impl Watch {
-    /// `None` where nothing can ever happen, so that nobody has to look.
+    /// `None` if no event is possible.
     fn new(objects: &Objects, channels: &mut Channels, object: ObjectId, time: Duration) -> Option<Watch> {
         let value = channels.number(objects, object, time)?;
         let parameter = |offset| objects.real(ObjectId::new(object.index.saturating_add(offset), object.sub));
@@ -221,7 +221,7 @@ impl Watch {
         })
     }
 
-    /// Whether the value has changed by delta, or has just passed a limit outwards.
+    /// Whether the value changed by delta, or has just passed a limit outwards.
     fn look(&mut self, objects: &Objects, channels: &mut Channels, time: Duration) -> bool {
         let Some(value) = channels.number(objects, self.object, time) else { return false };
         let mut event = self.delta > 0.0 && (value - self.reference).abs() >= self.delta;
@@ -235,7 +235,7 @@ impl Watch {
     }
 }
 
-/// Bit 31 of a COB-ID: the PDO does not exist.
+/// Bit 31 of a COB-ID: the PDO is not valid.
 fn is_valid(cob_id: u32) -> bool {
     cob_id & 0x8000_0000 == 0
 }
@@ -246,7 +246,7 @@ fn mapped(entry: u32) -> (ObjectId, u32) {
     (ObjectId::new(u16::from_le_bytes([low, high]), sub), bits.into())
 }
 
-/// Whether a write to the parameters of a TPDO is allowed; `None` where the object is none.
+/// Checks a write to the parameters of a TPDO; `None` if the object is not one of them.
 pub(super) fn check(
     objects: &Objects,
     remap: Remap,
@@ -267,7 +267,7 @@ fn check_communication(objects: &Objects, object: ObjectId, number: u32) -> Resu
     match object.sub {
         1 => {
             let id = CanId::Standard(u16::try_from(number & 0x7ff).unwrap_or(0));
-            // 29 bits are not supported; bits 11 to 28 belong to them.
+            // 29-bit identifiers are not supported; bits 11 to 28 belong to them.
             let misplaced = number & 0x3fff_f800 != 0;
             let moved = is_valid(old) && is_valid(number) && old & 0x7ff != number & 0x7ff;
             if misplaced || moved || (is_valid(number) && id.is_restricted()) {
@@ -275,7 +275,7 @@ fn check_communication(objects: &Objects, object: ObjectId, number: u32) -> Resu
             }
         }
         2 if (241..=253).contains(&number) => return Err(Abort::VALUE),
-        // Only while the PDO does not exist.
+        // Only while the PDO is not valid.
         3 if is_valid(old) && number != objects.number(object) => return Err(Abort::VALUE),
         _ => {}
     }

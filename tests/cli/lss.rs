@@ -220,7 +220,7 @@ fn who_is_there_and_who_he_is() {
     assert!(!services.iter().any(|service| ["11", "13", "15", "17"].contains(service)), "{services:?}");
     assert_eq!(done.frames_of("7E5").last(), Some(&"0400000000000000"), "left again");
     // One that takes part in configuration state, too, hides the others, which is said.
-    let hides = "[[device]]\nkind = \"mh4\"\nserial = 10\nlss = { scans_for_ever = true }\n";
+    let hides = "[[device]]\nkind = \"mh4\"\nserial = 10\nlss = { endless_fastscan = true }\n";
     let done =
         Bench::described(&format!("{hides}[[device]]\nkind = \"mh4\"\nserial = 20\n")).run("lss scan -f json").exit(0);
     assert_eq!((done.json().len(), done.json()[0]["serial"].clone()), (1, 10.into()), "{}", done.stdout);

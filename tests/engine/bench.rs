@@ -13,7 +13,7 @@ use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::value::DataType;
 use cangauge::device::catalog::Model;
 use cangauge::device::scalar::Scalar;
-use cangauge::sim::{Device, Direction, GoneAfter, Overload, Recorder, Setup, State};
+use cangauge::sim::{Device, Direction, OfflineAfter, Overload, Recorder, Setup, State};
 use cangauge::tasks::lss::LssAddress;
 use std::sync::Arc;
 use std::time::Duration;
@@ -69,8 +69,8 @@ fn setup(spec: &DeviceSpec) -> Setup {
             Vagary::LoseLss(service) => setup.oddities.lose.push(*service),
             Vagary::LateLss(service, ms) => drop(setup.oddities.late.insert(*service, Duration::from_millis(*ms))),
             Vagary::RefuseLss(service) => drop(setup.oddities.refuse.insert(*service, 1)),
-            Vagary::ScansForEver => setup.oddities.scans_for_ever = true,
-            Vagary::GoneAfterReset => setup.oddities.gone_after.push(GoneAfter::Reset),
+            Vagary::EndlessFastscan => setup.oddities.endless_fastscan = true,
+            Vagary::OfflineAfterReset => setup.oddities.offline_after.push(OfflineAfter::Reset),
             _ => {}
         }
     }

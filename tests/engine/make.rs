@@ -180,8 +180,8 @@ fn vagary(random: &mut Random) -> Vagary {
             for_ms: *random.pick(&[20, 500, 10_000]),
             every_us: *random.pick(&[550, 2_000, 20_000]),
         },
-        _ if random.percent(50) => Vagary::GoneAfterReset,
-        _ => Vagary::ScansForEver,
+        _ if random.percent(50) => Vagary::OfflineAfterReset,
+        _ => Vagary::EndlessFastscan,
     }
 }
 

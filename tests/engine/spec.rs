@@ -82,8 +82,8 @@ pub(crate) enum Vagary {
     LoseLss(u8),
     LateLss(u8, u64),
     RefuseLss(u8),
-    ScansForEver,
-    GoneAfterReset,
+    EndlessFastscan,
+    OfflineAfterReset,
     /// It sends emergencies that mean nothing, again and again.
     Babbles {
         from_ms: u64,
@@ -163,7 +163,7 @@ impl Spec {
     /// Whether anybody but the program changes what a device holds or does.
     pub(crate) fn is_meddled_with(&self) -> bool {
         self.acts().any(|act| !matches!(act, Act::Read { .. }))
-            || self.vagaries().any(|vagary| matches!(vagary, Vagary::ResetAt { .. } | Vagary::GoneAfterReset))
+            || self.vagaries().any(|vagary| matches!(vagary, Vagary::ResetAt { .. } | Vagary::OfflineAfterReset))
     }
 
     pub(crate) fn shares_node_ids(&self) -> bool {

@@ -1,4 +1,4 @@
-//! What one section says of an entry: type, access, default, limits, flags.
+//! The contents of one section: type, access, default, limits, flags.
 
 use super::ini::Section;
 use super::names::Described;
@@ -13,7 +13,7 @@ use crate::device::scalar::Scalar;
 /// The object type DOMAIN (CiA 301, table 42).
 const DOMAIN: i128 = 2;
 
-/// What a section says of an entry, or of all elements of an array.
+/// The contents of a section, for one entry or for all elements of an array.
 pub(super) struct Content {
     pub(super) data_type: DataType,
     pub(super) is_typed: bool,
@@ -27,7 +27,7 @@ pub(super) struct Content {
 }
 
 impl Content {
-    /// Sub-index 0 of an array or record, which no section describes: CiA 301 does.
+    /// Sub-index 0 of an array or record without a section; its type comes from CiA 301.
     pub(super) fn count(of: Option<u8>) -> Content {
         Content {
             data_type: DataType::Unsigned(1),
@@ -42,7 +42,7 @@ impl Content {
         }
     }
 
-    /// An estimate of what an entry takes beside its names.
+    /// An estimate of the memory of an entry, without its names.
     pub(super) fn bytes(&self) -> usize {
         let texts = [&self.default, &self.low, &self.high, &self.parameter_value];
         let length = |scalar: &Option<Scalar>| match scalar {
@@ -54,14 +54,14 @@ impl Content {
 }
 
 impl Reader<'_> {
-    /// What a section says.
+    /// Reads a section.
     pub(super) fn content(&mut self, section: &Section) -> Content {
         let (data_type, is_typed) = self.data_type(section);
         let mut scalar = |key: &str| {
             let item = section.get(&key.to_ascii_lowercase())?;
             self.scalar(&format!("[{}] {key}", section.shown), item.line, &item.value, data_type)
         };
-        // What an unknown type makes of a value is unknown too, and text and bytes have no limits.
+        // The form of a value depends on its type, so an unknown type has none. Text and bytes have no limits.
         let has_limits = data_type.width().is_some();
         let default = if is_typed { scalar("DefaultValue") } else { None };
         let parameter_value = if is_typed { scalar("ParameterValue") } else { None };
@@ -83,7 +83,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Limits that leave nothing, or nothing but 0, to write to an object cannot be meant.
+    /// Drops limits that allow no value, or only 0, for a writable object: they must be a mistake.
     fn limits(
         &mut self,
         section: &Section,
@@ -100,7 +100,7 @@ impl Reader<'_> {
             (Some(0.0), Some(0.0)) if access.is_writable() => "LowLimit and HighLimit are 0",
             _ => return [low, high],
         };
-        self.warn(section.line, format!("[{}] {what}; taken for no limits", section.shown));
+        self.warn(section.line, format!("[{}] {what}; ignored", section.shown));
         [None, None]
     }
 
@@ -114,18 +114,17 @@ impl Reader<'_> {
                 Some(reading.value)
             }
             Err(error) => {
-                self.warn(line, format!("{place}: {error}; left out"));
+                self.warn(line, format!("{place}: {error}; ignored"));
                 None
             }
         }
     }
 
-    /// The data type, and whether the file gives one that we know. Without, the entry has DOMAIN: its
-    /// object can still be read by its name, as bytes.
+    /// The data type, and whether the file states a known one. Otherwise the entry has DOMAIN and is read as bytes.
     fn data_type(&mut self, section: &Section) -> (DataType, bool) {
         let Some(item) = section.get("datatype") else {
             if number(section, "objecttype") != Some(DOMAIN) {
-                self.warn(section.line, format!("[{}] has no DataType; its value is taken for bytes", section.shown));
+                self.warn(section.line, format!("[{}] has no DataType; its value is read as bytes", section.shown));
                 return (DataType::Domain, false);
             }
             return (DataType::Domain, true);
@@ -136,7 +135,7 @@ impl Reader<'_> {
             Some(data_type) => (data_type, true),
             None => {
                 let text = format!(
-                    "[{}] DataType: {} is unknown; its value is taken for bytes",
+                    "[{}] DataType: {} is unknown; its value is read as bytes",
                     section.shown,
                     quoted(&item.value)
                 );
@@ -146,15 +145,15 @@ impl Reader<'_> {
         }
     }
 
-    /// A type that the file itself defines: CANFestival's editor writes `[A0]` and, as the default of
-    /// `[A0sub1]`, the type that it is made of.
+    /// A type that the file itself defines: CANFestival's editor writes `[A0]`, and the base type as the default of
+    /// `[A0sub1]`.
     fn defined_type(&self, code: u16) -> Option<DataType> {
         let section =
             self.ini.section(&format!("{code:x}sub1")).or_else(|| self.ini.section(&format!("{code:04x}sub1")))?;
         DataType::from_code(u16::try_from(number(section, "defaultvalue")?).ok()?)
     }
 
-    /// The access type. Where the file has none that we know, the device decides.
+    /// The access type. If the file states no known one, the device decides.
     fn access(&mut self, section: &Section) -> Access {
         let item = section.get("accesstype");
         if let Some(access) = item.and_then(|item| value::access(&item.value)) {
@@ -164,11 +163,11 @@ impl Reader<'_> {
             Some(item) => (item.line, format!("AccessType: {} is unknown", quoted(&item.value))),
             None => (section.line, "has no AccessType".to_owned()),
         };
-        self.warn(line, format!("[{}] {what}; taken for rw", section.shown));
+        self.warn(line, format!("[{}] {what}; read as rw", section.shown));
         Access::Rw
     }
 
-    /// An integer, with a warning where it is doubtful.
+    /// An integer, with a warning if it is doubtful.
     pub(super) fn integer(&mut self, section: &Section, key: &str) -> Option<i128> {
         let item = section.get(&key.to_ascii_lowercase())?;
         let reading = value::integer(&item.value)?;
@@ -188,7 +187,7 @@ impl Reader<'_> {
     }
 }
 
-/// A number that says what kind of object it is; what is doubtful about it is said elsewhere, or of no weight.
+/// A number that states the kind of an object. Warnings about it are issued elsewhere.
 pub(super) fn number(section: &Section, key: &str) -> Option<i128> {
     value::integer(&section.get(key)?.value).map(|number| number.value)
 }

@@ -5,7 +5,7 @@ use super::text::{quoted, shown};
 use super::{Commissioning, Info, Warning, value};
 use crate::canopen::id::NodeId;
 
-/// The bit rates of CiA 301 in kbit/s, as `BaudRate_10` … name them.
+/// The bit rates of CiA 301 in kbit/s, as in the keys `BaudRate_10` …
 const BIT_RATES: [u32; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
 
 pub(super) fn info(ini: &Ini, warnings: &mut Vec<Warning>) -> Info {
@@ -30,7 +30,7 @@ pub(super) fn info(ini: &Ini, warnings: &mut Vec<Warning>) -> Info {
     if let Some(item) = section.get("compactpdo")
         && value::integer(&item.value).is_some_and(|mask| mask.value != 0)
     {
-        let text = "CompactPDO: PDO objects that the file implies and does not describe are left out";
+        let text = "CompactPDO: PDO objects without a description in the file are missing";
         warnings.push(Warning::new(item.line, text));
     }
     info
@@ -59,7 +59,7 @@ fn node_id(section: &Section, warnings: &mut Vec<Warning>) -> Option<NodeId> {
     node
 }
 
-/// Kbit/s; some tools write bit/s, which no bit rate in kbit/s can be mistaken for.
+/// The bit rate in bit/s. The unit is kbit/s; some tools write bit/s, which is always above 1000.
 fn bit_rate(section: &Section, warnings: &mut Vec<Warning>) -> Option<u32> {
     let number = number(section, "Baudrate", warnings)?;
     if number <= 1000 {
@@ -67,10 +67,10 @@ fn bit_rate(section: &Section, warnings: &mut Vec<Warning>) -> Option<u32> {
     }
     let line = section.get("baudrate").map_or(section.line, |item| item.line);
     if number.is_multiple_of(1000) && number <= 1_000_000 {
-        warnings.push(Warning::new(line, format!("Baudrate: {number} kbit/s is no bit rate of CAN; read as bit/s")));
+        warnings.push(Warning::new(line, format!("Baudrate: {number} kbit/s is not a CAN bit rate; read as bit/s")));
         return Some(number);
     }
-    warnings.push(Warning::new(line, format!("Baudrate: {number} kbit/s is no bit rate of CAN")));
+    warnings.push(Warning::new(line, format!("Baudrate: {number} kbit/s is not a CAN bit rate")));
     None
 }
 
@@ -84,7 +84,7 @@ fn number(section: &Section, key: &str, warnings: &mut Vec<Warning>) -> Option<u
     let number = reading.as_ref().and_then(|reading| u32::try_from(reading.value).ok());
     let doubt = match (number, reading.and_then(|reading| reading.doubt)) {
         (Some(_), doubt) => doubt,
-        (None, _) => Some(format!("{} is no number of 32 bits", quoted(&item.value))),
+        (None, _) => Some(format!("{} is not a 32-bit number", quoted(&item.value))),
     };
     warnings.extend(doubt.map(|doubt| Warning::new(item.line, format!("[{}] {key}: {doubt}", section.shown))));
     number

@@ -1,11 +1,10 @@
-//! The form of an EDS file (CiA 306, clause 4): sections, keys, values, comments, each with its line.
+//! The syntax of an EDS file (CiA 306, clause 4): sections, keys, values, comments, each with its line.
 //!
-//! CiA 306 has no escapes, no quotes and no comments behind a value, so a value is all that follows the
-//! first `=`. Names are compared without regard to letter case and blanks: `[1018 Sub 1]`, `Supported Objects`.
+//! CiA 306 has no escapes, no quotes and no comments after a value: everything after the first `=` is the value. Letter
+//! case and blanks in names are ignored: `[1018 Sub 1]`, `Supported Objects`.
 //!
-//! A key or section that comes twice: the first one wins, and a second section adds only keys that the first
-//! lacks. Tools differ here (the INI function of Windows takes the first, CANchkEDS the last); what a person
-//! sees first is the first, and the warning names both lines.
+//! If a key or section occurs twice, the first one is used; a second section only adds missing keys. Tools differ here:
+//! Windows' INI function takes the first, CANchkEDS the last. The warning names both lines.
 
 use super::Warning;
 use super::text::{quoted, shown};
@@ -14,31 +13,31 @@ use std::collections::HashMap;
 /// The value of a key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Item {
-    /// Where it stands, counted from 1.
+    /// The line, counted from 1.
     pub(super) line: usize,
-    /// All that follows the `=`, without blanks around it.
+    /// Everything after the `=`, without blanks around it.
     pub(super) value: String,
 }
 
 /// A section and its keys.
 #[derive(Clone, Debug)]
 pub(super) struct Section {
-    /// For messages: as the file writes it, short and harmless.
+    /// The name as in the file, shortened and safe for messages.
     pub(super) shown: String,
-    /// In lower case and without blanks.
+    /// The name in lower case and without blanks.
     pub(super) name: String,
-    /// Where it begins, counted from 1.
+    /// The line of its header, counted from 1.
     pub(super) line: usize,
     items: HashMap<String, Item>,
 }
 
 impl Section {
-    /// The value of a key, in lower case and without blanks, if it is there and not empty.
+    /// The value of a key that is in lower case and without blanks; `None` if it is missing or empty.
     pub(super) fn get(&self, key: &str) -> Option<&Item> {
         self.items.get(key).filter(|item| !item.value.is_empty())
     }
 
-    /// The keys that are numbers (those of lists: `1=0x1000`), in ascending order.
+    /// The keys that are numbers (in lists: `1=0x1000`), in ascending order.
     pub(super) fn numbered(&self) -> Vec<(u32, &Item)> {
         let mut list: Vec<(u32, &Item)> = self
             .items
@@ -51,18 +50,18 @@ impl Section {
     }
 }
 
-/// A file as sections.
+/// A file as a list of sections.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ini {
     /// In the order of the file.
     pub(super) sections: Vec<Section>,
-    /// How many lines the file has.
+    /// The number of lines of the file.
     pub(super) lines: usize,
     places: HashMap<String, usize>,
 }
 
 impl Ini {
-    /// Reads what has the form of a section or a key; the rest becomes warnings.
+    /// Reads the sections and keys; other lines give warnings.
     pub(super) fn read(text: &str, warnings: &mut Vec<Warning>) -> Ini {
         let mut ini = Ini::default();
         let mut place = None;
@@ -80,7 +79,7 @@ impl Ini {
                 continue;
             }
             let Some(section) = place.and_then(|at: usize| ini.sections.get_mut(at)) else {
-                warnings.push(Warning::new(line, format!("{} stands before the first section", quoted(content))));
+                warnings.push(Warning::new(line, format!("{} is before the first section", quoted(content))));
                 continue;
             };
             match content.split_once('=') {
@@ -90,7 +89,7 @@ impl Ini {
                         section.items.entry(fold(key)).or_insert_with(|| Item { line, value: value.to_owned() });
                     if first.line != line && first.value != value && !repeated {
                         let text = format!(
-                            "[{}] has {} a second time; line {} counts",
+                            "[{}] has {} twice; line {} is used",
                             section.shown,
                             quoted(key.trim()),
                             first.line
@@ -101,14 +100,14 @@ impl Ini {
                 _ if is_prose(&section.name) => {}
                 _ => warnings.push(Warning::new(
                     line,
-                    format!("{} is no section, no key with a value and no comment", quoted(content)),
+                    format!("{} is not a section, a key with a value or a comment", quoted(content)),
                 )),
             }
         }
         ini
     }
 
-    /// The section that a header line opens, and whether it was there before.
+    /// The section of a header line, and whether it existed before.
     fn open(&mut self, header: &str, line: usize, warnings: &mut Vec<Warning>) -> (usize, bool) {
         let (name, rest) = header.split_once(']').unwrap_or_else(|| {
             warnings.push(Warning::new(line, format!("the section {} has no closing bracket", quoted(header))));
@@ -116,13 +115,12 @@ impl Ini {
         });
         let rest = rest.trim();
         if !rest.is_empty() && !is_comment(rest) {
-            warnings.push(Warning::new(line, format!("{} behind a section is ignored", quoted(rest))));
+            warnings.push(Warning::new(line, format!("{} after a section is ignored", quoted(rest))));
         }
         let shown = shown(name.trim());
         let name = fold(name);
         if let Some((at, first)) = self.places.get(&name).and_then(|at| Some((*at, self.sections.get(*at)?))) {
-            let text =
-                format!("[{shown}] comes a second time; what [{}] in line {} says counts", first.shown, first.line);
+            let text = format!("[{shown}] occurs twice; [{}] in line {} has priority", first.shown, first.line);
             warnings.push(Warning::new(line, text));
             return (at, true);
         }
@@ -132,28 +130,28 @@ impl Ini {
         (at, false)
     }
 
-    /// The section of a name in lower case and without blanks.
+    /// The section with a name in lower case and without blanks.
     pub(super) fn section(&self, name: &str) -> Option<&Section> {
         self.sections.get(*self.places.get(name)?)
     }
 }
 
-/// A name as names are compared.
+/// The form of a name that is compared: lower case, without blanks.
 pub(super) fn fold(name: &str) -> String {
     name.chars().filter(|character| !character.is_whitespace()).flat_map(char::to_lowercase).collect()
 }
 
-/// CiA 306 knows `;` only; `#` and `//` are what people write who know other formats better.
+/// CiA 306 has `;` only; people also write `#` and `//`.
 fn is_comment(text: &str) -> bool {
     text.starts_with([';', '#']) || text.starts_with("//")
 }
 
-/// Sections that say nothing to a machine: what is wrong in there is wrong for nobody.
+/// Sections with text for people: their lines give no warnings.
 fn is_prose(section: &str) -> bool {
     matches!(section, "fileinfo" | "comments")
 }
 
-/// A value without the comment behind it, where there is one.
+/// The value without a comment after it, if it has one.
 pub(super) fn without_comment(value: &str) -> Option<&str> {
     let end = [";", "#", "//"].iter().filter_map(|mark| value.find(mark)).min()?;
     Some(value[..end].trim_end())
@@ -185,31 +183,28 @@ mod tests {
     }
 
     #[test]
-    fn the_first_of_two_wins() {
+    fn the_first_of_two_equal_keys_is_used() {
         let (ini, warnings) = read("[A]\nx=1\nX=2\nx=1\n[B]\ny=1\n[ a ]\nx=3\nz=4\n");
         assert_eq!(value(&ini, "a", "x"), Some((2, "1")));
         assert_eq!(value(&ini, "a", "z"), Some((9, "4")));
         assert_eq!(
             warnings,
-            [
-                "line 3: [A] has \"X\" a second time; line 2 counts",
-                "line 7: [a] comes a second time; what [A] in line 1 says counts"
-            ]
+            ["line 3: [A] has \"X\" twice; line 2 is used", "line 7: [a] occurs twice; [A] in line 1 has priority"]
         );
     }
 
     #[test]
-    fn lines_without_form() {
+    fn malformed_lines_give_warnings() {
         let (ini, warnings) =
             read("x=1\n[FileInfo]\nrubbish\n[1000\nrubbish\n=5\nx=2\n[1001]x\n[]\n[Comments]\nrubbish");
         assert_eq!(
             warnings,
             [
-                "line 1: \"x=1\" stands before the first section",
+                "line 1: \"x=1\" is before the first section",
                 "line 4: the section \"1000\" has no closing bracket",
-                "line 5: \"rubbish\" is no section, no key with a value and no comment",
-                "line 6: \"=5\" is no section, no key with a value and no comment",
-                "line 8: \"x\" behind a section is ignored",
+                "line 5: \"rubbish\" is not a section, a key with a value or a comment",
+                "line 6: \"=5\" is not a section, a key with a value or a comment",
+                "line 8: \"x\" after a section is ignored",
             ]
         );
         assert_eq!(value(&ini, "1000", "x"), Some((7, "2")));

@@ -1,14 +1,13 @@
-//! EDS and DCF files (CiA 306): the object dictionary that a vendor ships with a device, and the settings
-//! of one device of the kind. Bytes in, result out; who opens the file, and where warnings go, is not known here.
+//! EDS and DCF files (CiA 306): the object dictionary that a vendor ships with a device, and the settings of one
+//! device. The module takes bytes and returns a result; it opens no file and prints no warning.
 //!
-//! Real files are seldom what CiA 306 asks for. What can be read in one way only is read without a word:
-//! letter case, blanks anywhere, every kind of line end, a byte order mark, UTF-8, Windows-1252, comments
-//! behind values, `R` and `RW`, `rwr`, both spellings of Commissioning, `0x180+$NODEID`, overlong lines.
-//! What is lost, guessed or contradicts itself is a [`Warning`] with its line: octal numbers, `0.0` for an
-//! integer, defaults that do not fit their type, unknown data types, keys given twice, sub-objects without
-//! an object. A file is refused only when it describes no object at all.
+//! Few real files follow CiA 306. Whatever has only one meaning is accepted silently: letter case, blanks, every kind
+//! of line end, a byte order mark, UTF-8, Windows-1252, comments after values, `R`, `RW` and `rwr`, both spellings of
+//! Commissioning, `0x180+$NODEID`, overlong lines. Whatever is lost, guessed or contradictory gives a [`Warning`] with
+//! its line: octal numbers, `0.0` for an integer, defaults that do not fit their type, unknown data types, duplicate
+//! keys, sub-objects without an object. A file is rejected only if it describes no object.
 //!
-//! How objects are called is told in `names.rs`.
+//! `names.rs` describes the names of objects.
 
 mod content;
 mod info;
@@ -26,61 +25,61 @@ use crate::canopen::object::ObjectId;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-/// What an EDS or DCF file says.
+/// The contents of an EDS or DCF file.
 #[derive(Clone, Debug, Default)]
 pub struct Eds {
-    /// The objects, each with its default as the file gives it.
+    /// The objects, each with its default from the file.
     pub dictionary: Dictionary,
-    /// Who made what.
+    /// Vendor, product and versions.
     pub info: Info,
     /// The settings of one device; only a DCF has them.
     pub commissioning: Option<Commissioning>,
-    /// The values that one device is to have in place of the defaults; only a DCF has them.
+    /// The values of one device that replace the defaults; only a DCF has them.
     pub parameter_values: BTreeMap<ObjectId, Scalar>,
-    /// What tools that read or write the whole dictionary are to leave out.
+    /// Objects that tools must skip when they read or write the whole dictionary.
     pub flags: BTreeMap<ObjectId, ObjectFlags>,
-    /// The objects of which the file does not say a data type that we know. Their entries have DOMAIN: they
-    /// can be read by name, as bytes; what to write to them is for the user, or for the device, to tell.
+    /// The objects whose data type is missing or unknown. Their entries have the type DOMAIN: they are read by name, as
+    /// bytes, and the user or the device must give the type for a write.
     pub untyped: BTreeSet<ObjectId>,
-    /// What was lost, guessed or contradictory, by line.
+    /// Warnings, in the order of the lines.
     pub warnings: Vec<Warning>,
 }
 
-/// `[DeviceInfo]`, and the version out of `[FileInfo]`. What the file leaves out or leaves empty is `None`.
+/// `[DeviceInfo]`, and the version from `[FileInfo]`. `None` for a missing or empty key.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Info {
-    /// Version of the EDS format; CiA 306 wants a file without one to be read as 3.0.
+    /// Version of the EDS format; 3.0 if the file gives none (CiA 306).
     pub eds_version: String,
-    /// Who makes the device.
+    /// The manufacturer.
     pub vendor_name: Option<String>,
     /// 1018h:1.
     pub vendor_number: Option<u32>,
-    /// What it is called.
+    /// The product name.
     pub product_name: Option<String>,
     /// 1018h:2.
     pub product_number: Option<u32>,
     /// 1018h:3.
     pub revision_number: Option<u32>,
-    /// What to ask the vendor for.
+    /// The order code.
     pub order_code: Option<String>,
-    /// The bit rates that it knows, in bit/s, ascending.
+    /// The supported bit rates in bit/s, ascending.
     pub bit_rates: Vec<u32>,
-    /// Whether it has LSS.
+    /// Whether the device supports LSS.
     pub lss_supported: Option<bool>,
 }
 
-/// `[DeviceCommissioning]`, which CiA 306 spells `[DeviceComissioning]`.
+/// `[DeviceCommissioning]`; CiA 306 spells it `[DeviceComissioning]`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Commissioning {
     /// The node-ID of the device.
     pub node_id: Option<NodeId>,
-    /// What the node is called in its network.
+    /// The name of the node in its network.
     pub node_name: Option<String>,
     /// The bit rate of the network in bit/s (the file has kbit/s).
     pub bit_rate: Option<u32>,
     /// The number of the network.
     pub net_number: Option<u32>,
-    /// What the network is called.
+    /// The name of the network.
     pub network_name: Option<String>,
     /// Whether this node manages the network.
     pub manager: Option<bool>,
@@ -91,18 +90,18 @@ pub struct Commissioning {
 /// `ObjFlags` of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ObjectFlags {
-    /// Bit 0: a tool that writes a whole configuration leaves it out (1010h, 1011h).
+    /// Bit 0: a tool that writes a whole configuration skips the object (1010h, 1011h).
     pub skip_write: bool,
-    /// Bit 1: a tool that reads a whole device leaves it out.
+    /// Bit 1: a tool that reads a whole device skips the object.
     pub skip_read: bool,
 }
 
 /// Something in a file that was lost, guessed or contradictory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
-    /// Where, counted from 1.
+    /// The line, counted from 1.
     pub line: usize,
-    /// What, in one sentence; file text in it is short and safe for a terminal.
+    /// One sentence; text from the file in it is short and safe for a terminal.
     pub text: String,
 }
 
@@ -118,22 +117,22 @@ impl fmt::Display for Warning {
     }
 }
 
-/// A file that is of no use.
+/// A file that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {reason}")]
 pub struct EdsError {
-    /// Where that became clear, counted from 1.
+    /// The line, counted from 1.
     pub line: usize,
-    /// Why.
+    /// The reason.
     pub reason: String,
 }
 
 /// Reads an EDS or DCF file.
 ///
-/// Time and memory grow with the length of `bytes`, whatever numbers stand in them.
+/// Time and memory grow with the length of `bytes` only, not with the numbers in the file.
 ///
 /// # Errors
-/// A file that describes no object.
+/// The file describes no object.
 pub fn read(bytes: &[u8]) -> Result<Eds, EdsError> {
     let text = text::decode(bytes);
     let mut warnings = Vec::new();
@@ -167,7 +166,7 @@ fn no_section(text: &str) -> EdsError {
     let (line, reason) = match first {
         None => (1, "the file is empty"),
         Some((line, content)) if content.trim_start().starts_with('<') => {
-            (line, "this is XML, perhaps an XDD or XDC file; an EDS or DCF file is wanted")
+            (line, "this is XML, perhaps an XDD or XDC file; expected an EDS or DCF file")
         }
         Some((line, _)) => (line, "no section such as [DeviceInfo] follows: not an EDS or DCF file"),
     };
@@ -175,13 +174,13 @@ fn no_section(text: &str) -> EdsError {
 }
 
 impl Eds {
-    /// The value that the device is to have: the parameter value of a DCF, else the default.
+    /// The value for the device: the parameter value of a DCF, else the default.
     pub fn value(&self, object: ObjectId) -> Option<&Scalar> {
         let default = || self.dictionary.get(object)?.default.as_ref();
         self.parameter_values.get(&object).or_else(default)
     }
 
-    /// The dictionary of the device as the DCF configures it: parameter values in place of defaults.
+    /// The dictionary with the parameter values of the DCF in place of the defaults.
     pub fn configured(&self) -> Dictionary {
         let mut dictionary = self.dictionary.clone();
         for (object, value) in &self.parameter_values {

@@ -1,34 +1,34 @@
-//! What the objects of an EDS file are called.
+//! Names of the objects in an EDS file.
 //!
-//! `ParameterName` in lower case, with one hyphen for everything between letters and digits:
-//! "Producer Heartbeat Time" is `producer-heartbeat-time`. From there on:
+//! A name is the `ParameterName` in lower case, with one hyphen for all characters between letters and digits:
+//! "Producer Heartbeat Time" is `producer-heartbeat-time`. Rules:
 //!
 //! - An object without sub-objects has its own name.
-//! - An element of an array is `object:1`, as in our own descriptions: `ai-input-pv:1`.
-//! - A member of a record has its own name where nothing else in the file has it (`vendor-id`), else it is
-//!   `object:1` too (`tpdo-1-parameter:1`; every PDO has a "COB-ID"). Sub-index 0, the count, is always `object:0`.
-//! - An object whose name another object has as well, or that could be taken for a hexadecimal index
-//!   ("Add", "Face"), gets its index: `reserved-2005`.
-//! - A sub-object is found under its other name too, where that is unique: `identity-object:1`, and `ai-input-pv-1`
-//!   for an array. So is an object with a name of the user's own in a DCF (`Denotation`).
+//! - An element of an array is `object:1`, as in device descriptions: `ai-input-pv:1`.
+//! - A member of a record has its own name if that is unique in the file (`vendor-id`), else `object:1`
+//! (`tpdo-1-parameter:1`; every PDO has a "COB-ID"). Sub-index 0, the count, is always `object:0`.
+//! - The index is appended to a name that two objects have, or that reads as a hexadecimal index ("Add", "Face"):
+//! `reserved-2005`.
+//! - A sub-object has a second name if that is unique: `identity-object:1`, and `ai-input-pv-1` in an array. So has an
+//! object with a user's name in a DCF (`Denotation`).
 //!
-//! No two entries share a name, and [`Dictionary::find`] finds each by its [`Entry::full_name`].
+//! No two entries have the same name, and [`Dictionary::find`] finds each by its [`Entry::full_name`].
 
 use crate::canopen::object::ObjectId;
 use crate::device::dictionary::{Dictionary, Entry};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// Letters in a name; CiA 306 allows as many in a `ParameterName`.
+/// Longest name in characters, as for `ParameterName` in CiA 306.
 const LONGEST: usize = 241;
 
 /// An entry that is yet to be named.
 #[derive(Clone, Debug)]
 pub(super) struct Described {
-    /// The entry; its name is the sub-object's own, as the file writes it, and empty without one.
+    /// The entry; its name is the sub-object's own name in the file, or empty.
     pub(super) entry: Entry,
-    /// What kind of object it belongs to.
+    /// The kind of its object.
     pub(super) kind: Kind,
-    /// What the user calls it.
+    /// The user's name for it.
     pub(super) denotation: Option<String>,
 }
 
@@ -37,13 +37,13 @@ pub(super) struct Described {
 pub(super) enum Kind {
     /// Without sub-objects.
     Variable,
-    /// With elements that are all alike.
+    /// With equal elements.
     Array,
-    /// With members, each of its own kind.
+    /// With members of different kinds.
     Record,
 }
 
-/// Names the entries, given what the file calls the objects.
+/// Names the entries; `objects` has the names of the objects in the file.
 pub(super) fn dictionary(objects: &BTreeMap<u16, String>, described: Vec<Described>) -> Dictionary {
     let slugs: BTreeMap<u16, String> = objects.iter().map(|(index, name)| (*index, slug(name))).collect();
     let objects = object_names(&slugs);
@@ -99,7 +99,7 @@ fn count<'a>(names: impl Iterator<Item = &'a str>) -> HashMap<String, u32> {
     counts
 }
 
-/// Whether a name can stand for one sub-object: there is one, no object has it, and it is no index.
+/// Whether a name is free for one sub-object: it is not empty, no object has it, and it is not an index.
 fn is_free(name: &str, taken: &HashSet<String>) -> bool {
     !name.is_empty() && !taken.contains(name) && !is_index(name)
 }
@@ -108,7 +108,7 @@ fn is_index(name: &str) -> bool {
     name.parse::<ObjectId>().is_ok()
 }
 
-/// One name for every object, no two alike: the names given, with the index behind those that need it.
+/// A unique name for every object: its own name, with the index appended if necessary.
 fn object_names(slugs: &BTreeMap<u16, String>) -> BTreeMap<u16, String> {
     let counts = count(slugs.values().map(String::as_str));
     let mut names = BTreeMap::new();
@@ -117,7 +117,7 @@ fn object_names(slugs: &BTreeMap<u16, String>) -> BTreeMap<u16, String> {
         let mut name = if nameless { self::nameless(*index) } else { slug.clone() };
         let others = counts.get(&name).copied().unwrap_or_default().saturating_sub(u32::from(!nameless));
         let mut clashes = others > 0 || is_index(&name);
-        // No other object's name gets this index; only a name given so by the file can be in the way.
+        // Only a name in the file that already ends with this index can clash again.
         while clashes {
             name = format!("{name}-{index:04x}");
             clashes = counts.contains_key(&name);
@@ -131,7 +131,7 @@ fn nameless(index: u16) -> String {
     format!("object-{index:04x}")
 }
 
-/// A name of a file in our form.
+/// A name of a file in lower case with hyphens.
 pub(super) fn slug(name: &str) -> String {
     let mut slug = String::new();
     let mut gap = false;
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_unique_gets_a_number() {
+    fn ambiguous_names_get_the_index() {
         let (dictionary, names) = names(
             &[(0x1800, "TPDO parameter"), (0x1801, "TPDO parameter"), (0x2000, "Limit"), (0x2001, "Add"), (0x2002, "")],
             vec![
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_imitate_the_way_out() {
+    fn names_that_already_end_with_an_index() {
         let objects = [
             (0x2005, "Reserved"),
             (0x2006, "Reserved"),
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn names_of_the_users_own() {
+    fn user_names_in_a_dcf() {
         let mut level = described(0x2000, 0, Kind::Variable, "");
         level.denotation = Some("Tank 5".to_owned());
         let mut other = described(0x2001, 0, Kind::Variable, "");

@@ -1,4 +1,4 @@
-//! From the sections of objects to entries of the object dictionary.
+//! Turns the sections of objects into entries of the object dictionary.
 
 use super::content::{Content, number};
 use super::ini::{Ini, Section};
@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The object dictionary before its entries have names.
 #[derive(Default)]
 pub(super) struct Objects {
-    /// What the file calls each object; empty when it does not say.
+    /// The name of each object in the file; empty if it has none.
     pub(super) names: BTreeMap<u16, String>,
     /// The entries.
     pub(super) described: Vec<Described>,
@@ -22,7 +22,7 @@ pub(super) struct Objects {
     pub(super) parameter_values: BTreeMap<ObjectId, Scalar>,
     /// `ObjFlags`.
     pub(super) flags: BTreeMap<ObjectId, ObjectFlags>,
-    /// The entries whose data type is not known.
+    /// The entries whose data type is unknown.
     pub(super) untyped: BTreeSet<ObjectId>,
 }
 
@@ -34,8 +34,8 @@ const VAR: i128 = 7;
 const ARRAY: i128 = 8;
 const RECORD: i128 = 9;
 
-/// How much the entries may take together, in bytes: room for a hundred thousand. Three lines of a file
-/// can ask for 254.
+/// The most memory that the entries may take, in bytes: enough for a hundred thousand. Three lines of a file can
+/// describe 254 entries.
 const MOST_BYTES: usize = 32 << 20;
 
 /// Reads every object.
@@ -48,7 +48,7 @@ pub(super) fn read(ini: &Ini, warnings: &mut Vec<Warning>) -> Objects {
     reader.objects
 }
 
-/// Reads one object after the other.
+/// Reads the objects one by one.
 pub(super) struct Reader<'a> {
     pub(super) ini: &'a Ini,
     warnings: &'a mut Vec<Warning>,
@@ -95,27 +95,28 @@ impl Reader<'_> {
     fn name(&mut self, index: u16, first: &Section, main: Option<&Section>) {
         let name = main.and_then(|main| main.get("parametername"));
         if name.is_none() {
-            let what = if main.is_some() { "has no ParameterName" } else { "stands without a section of its object" };
-            self.warn(first.line, format!("[{}] {what}; the object is called object-{index:04x}", first.shown));
+            let what = if main.is_some() { "has no ParameterName" } else { "has no section of its object" };
+            self.warn(first.line, format!("[{}] {what}; the object gets the name object-{index:04x}", first.shown));
         }
         self.objects.names.insert(index, name.map_or_else(String::new, |item| item.value.clone()));
     }
 
-    /// How many elements `CompactSubObj` says that there are, if it is given.
+    /// The number of elements in `CompactSubObj`, if it is given.
     fn elements(&mut self, main: &Section) -> Option<u8> {
         let item = main.get("compactsubobj")?;
         match self.integer(main, "CompactSubObj").and_then(|number| u8::try_from(number).ok()) {
             Some(0) => None,
             Some(last @ 1..=254) => Some(last),
             _ => {
-                let text = format!("[{}] CompactSubObj: {} is none of 1 to 254", main.shown, quoted(&item.value));
+                let text =
+                    format!("[{}] CompactSubObj: {} is not in the range 1 to 254", main.shown, quoted(&item.value));
                 self.warn(item.line, text);
                 None
             }
         }
     }
 
-    /// The elements of an array that its one section describes, but for those with a section of their own.
+    /// The elements of an array that one section describes, except those with their own section.
     fn elements_of(&mut self, index: u16, main: &Section, last: u8, parts: &Parts) {
         if !parts.subs.contains_key(&0) {
             self.push(ObjectId::new(index, 0), Kind::Array, main, "", &Content::count(Some(last)));
@@ -124,13 +125,13 @@ impl Reader<'_> {
         let title = main.get("parametername").map_or("", |item| item.value.as_str());
         let names = list(parts.names);
         for sub in (1..=last).filter(|sub| !parts.subs.contains_key(sub)) {
-            // CiA 306: without a name of its own, an element is called like the array with its number behind.
+            // CiA 306: an element without its own name has the name of the array with its number appended.
             let name = names.get(&sub).map_or_else(|| format!("{title}{sub}"), |item| item.value.clone());
             self.push(ObjectId::new(index, sub), Kind::Array, main, &name, &content);
         }
     }
 
-    /// Says where an object and its sub-objects contradict each other.
+    /// Warns if an object and its sub-objects contradict each other.
     fn check_subs(&mut self, index: u16, kind: Kind, main: &Section, object_type: Option<i128>, parts: &Parts) {
         if object_type == Some(VAR) {
             self.warn(main.line, format!("[{}] is a variable, but has sub-objects; they are used", main.shown));
@@ -150,7 +151,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The entry that a section of its own describes.
+    /// The entry that its own section describes.
     fn section(&mut self, object: ObjectId, kind: Kind, section: &Section) {
         let content = self.content(section);
         let name = section.get("parametername").map_or("", |item| item.value.as_str());
@@ -167,7 +168,7 @@ impl Reader<'_> {
         let Some(room) = self.room.checked_sub(content.bytes() + 2 * name.len() + 2 * parent) else {
             if self.room > 0 {
                 let text =
-                    format!("[{}]: from here on, objects are left out: they would take too much memory", section.shown);
+                    format!("[{}]: all further objects are skipped: they would take too much memory", section.shown);
                 self.warn(section.line, text);
             }
             self.room = 0;
@@ -227,7 +228,7 @@ impl Reader<'_> {
     }
 }
 
-/// A list by sub-index; the first of two with the same number counts.
+/// A list by sub-index; the first of two equal numbers is used.
 fn list(section: Option<&Section>) -> BTreeMap<u8, &super::ini::Item> {
     let mut list = BTreeMap::new();
     for (sub, item) in section.map(Section::numbered).unwrap_or_default() {

@@ -1,30 +1,30 @@
-//! Which section belongs to which object: `[1018]`, `[1018sub1]`, `[6130Name]`, `[6130Value]`, `[6130Denotation]`.
+//! Finds the sections of each object: `[1018]`, `[1018sub1]`, `[6130Name]`, `[6130Value]`, `[6130Denotation]`.
 
 use super::ini::{Ini, Section};
 use super::text::quoted;
 use super::{Warning, value};
 use std::collections::BTreeMap;
 
-/// Below, the object dictionary has the definitions of data types, which no device is asked for.
+/// Lower indices define data types, which devices do not have as objects.
 const FIRST_INDEX: u16 = 0x1000;
 
 /// The sections of one object.
 #[derive(Default)]
 pub(super) struct Parts<'a> {
-    /// Of the object itself.
+    /// The section of the object itself.
     pub(super) main: Option<&'a Section>,
-    /// Of its sub-objects.
+    /// The sections of its sub-objects.
     pub(super) subs: BTreeMap<u8, &'a Section>,
-    /// The list of names of its elements.
+    /// The list of element names.
     pub(super) names: Option<&'a Section>,
-    /// The list of values of its elements.
+    /// The list of element values.
     pub(super) values: Option<&'a Section>,
-    /// The list of the user's names of its elements.
+    /// The list of the user's names for elements.
     pub(super) denotations: Option<&'a Section>,
 }
 
 impl<'a> Parts<'a> {
-    /// The first section that describes something, or else the first that only belongs to a description.
+    /// The first section that describes something, else the first that belongs to the object.
     pub(super) fn first(&self) -> Option<&'a Section> {
         let described = self.main.or_else(|| self.subs.values().min_by_key(|sub| sub.line).copied());
         described.or(self.names).or(self.values).or(self.denotations)
@@ -37,12 +37,12 @@ enum Role {
     Names(u16),
     Values(u16),
     Denotations(u16),
-    /// It looks like a section of an object, but is none.
+    /// A malformed section of an object.
     Broken,
     Other,
 }
 
-/// The objects of a file, listed or not, with their sections.
+/// The objects of a file with their sections; unlisted objects are included.
 pub(super) fn objects<'a>(ini: &'a Ini, warnings: &mut Vec<Warning>) -> BTreeMap<u16, Parts<'a>> {
     let mut objects: BTreeMap<u16, Parts> = BTreeMap::new();
     for section in &ini.sections {
@@ -52,7 +52,7 @@ pub(super) fn objects<'a>(ini: &'a Ini, warnings: &mut Vec<Warning>) -> BTreeMap
             Role::Values(index) => objects.entry(index).or_default().values = Some(section),
             Role::Denotations(index) => objects.entry(index).or_default().denotations = Some(section),
             Role::Sub(index, sub) => {
-                // [1018sub1] and [1018sub01] are one section for us, but two for the reader of sections.
+                // [1018sub1] and [1018sub01] are the same sub-object but different sections.
                 let first = *objects.entry(index).or_default().subs.entry(sub).or_insert(section);
                 if first.line != section.line {
                     let text =
@@ -99,7 +99,7 @@ fn four_digits(index: &str) -> Option<u16> {
     ours.then(|| u16::from_str_radix(index, 16).ok()).flatten()
 }
 
-/// The lists of objects are for programs that cannot search. Here they only show what is missing.
+/// Warns about objects that are listed but not described, and the reverse.
 fn check_lists(ini: &Ini, objects: &BTreeMap<u16, Parts>, warnings: &mut Vec<Warning>) {
     let mut listed: BTreeMap<u16, usize> = BTreeMap::new();
     for section in
@@ -111,7 +111,7 @@ fn check_lists(ini: &Ini, objects: &BTreeMap<u16, Parts>, warnings: &mut Vec<War
                     listed.entry(index).or_insert(item.line);
                 }
                 None => {
-                    let text = format!("[{}] lists {}, which is no index", section.shown, quoted(&item.value));
+                    let text = format!("[{}] lists {}, which is not an index", section.shown, quoted(&item.value));
                     warnings.push(Warning::new(item.line, text));
                 }
             }
@@ -128,7 +128,7 @@ fn check_lists(ini: &Ini, objects: &BTreeMap<u16, Parts>, warnings: &mut Vec<War
         }));
     } else {
         warnings.extend(unlisted.map(|(index, line)| {
-            Warning::new(line, format!("object {index:04X}h is described, but in no list; it is used"))
+            Warning::new(line, format!("object {index:04X}h is described, but not listed; it is used"))
         }));
     }
 }

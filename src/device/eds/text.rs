@@ -1,17 +1,16 @@
-//! From the bytes of a file to text.
+//! Decodes the bytes of a file into text.
 
-/// What Windows-1252 has at 80h to 9Fh, where Latin-1 has control characters. Five places are empty.
+/// The characters of Windows-1252 at 80h to 9Fh; Latin-1 has control characters there. Five codes are unused.
 const CP1252_80: [char; 32] = [
     '€', '\u{fffd}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{fffd}', 'Ž', '\u{fffd}', '\u{fffd}',
     '‘', '’', '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{fffd}', 'ž', 'Ÿ',
 ];
 
-/// The text of a file, with every line ended by `\n`.
+/// The text of a file, with `\n` at the end of every line.
 ///
-/// CiA 306 allows ISO 646 only. Real files are UTF-8, with or without byte order mark, or what a Windows
-/// editor wrote: UTF-16 with its mark, else Windows-1252. Bytes that are not UTF-8 decide for the last.
-/// Control characters (a name must not move the cursor of a terminal) become U+FFFD; what DOS and a
-/// full disk leave at the end of a file, ^Z and zeros, is no text.
+/// CiA 306 allows ISO 646 only. Real files are UTF-8, with or without byte order mark, UTF-16 with a mark, or
+/// Windows-1252. A file that is not valid UTF-8 is read as Windows-1252. Control characters become U+FFFD, so that a
+/// name cannot move the cursor of a terminal. ^Z and zeros at the end of a file (DOS, a full disk) are removed.
 pub(super) fn decode(bytes: &[u8]) -> String {
     let text = match bytes {
         [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
@@ -48,7 +47,7 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
     char::decode_utf16(units).map(|unit| unit.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
 }
 
-/// A piece of a file for a message: short, and with nothing in it that a terminal would obey.
+/// A piece of a file for a message: short, and without control characters.
 pub(super) fn shown(text: &str) -> String {
     const LONGEST: usize = 40;
     let mut short: String = text.chars().take(LONGEST).collect();
@@ -58,7 +57,7 @@ pub(super) fn shown(text: &str) -> String {
     short.escape_debug().to_string()
 }
 
-/// The same between quotation marks.
+/// The same in quotation marks.
 pub(super) fn quoted(text: &str) -> String {
     format!("\"{}\"", shown(text))
 }
@@ -86,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn line_ends_and_rubbish_at_the_end() {
+    fn line_ends_and_garbage_at_the_end() {
         assert_eq!(decode(b"a\r\nb\rc\nd\x1a"), "a\nb\nc\nd");
         assert_eq!(decode(b"a\n\0\0\0"), "a\n");
         assert_eq!(decode(b"a\x1b[2Jb\t"), "a\u{fffd}[2Jb\t");
@@ -95,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn quotations_are_short_and_harmless() {
+    fn quotations_are_short_and_safe() {
         assert_eq!(quoted("0.0"), "\"0.0\"");
         assert_eq!(quoted("a\"b\u{202e}"), "\"a\\\"b\\u{202e}\"");
         assert_eq!(quoted(&"x".repeat(1000)).chars().count(), 43);

@@ -7,7 +7,7 @@ use crate::canopen::value::{DataType, ValueError, parse_hex};
 use crate::device::description::Access;
 use crate::device::scalar::Scalar;
 
-/// What was read, and what is doubtful about it.
+/// A value, and a doubt about it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Reading<T> {
     pub(super) value: T,
@@ -20,12 +20,12 @@ impl<T> Reading<T> {
     }
 }
 
-/// A value, else the value without the comment behind it: CiA 306 has no such comments, real files do.
+/// A value; if that fails, the value without a comment after it. CiA 306 has no such comments, real files do.
 fn tolerant<T>(text: &str, parse: impl Fn(&str) -> Option<T>) -> Option<T> {
     parse(text).or_else(|| without_comment(text).and_then(parse))
 }
 
-/// An integer: decimal, `0x…`, or octal with a leading zero; a comment behind it does not matter.
+/// An integer: decimal, `0x…`, or octal with a leading zero. A comment after it is ignored.
 pub(super) fn integer(text: &str) -> Option<Reading<i128>> {
     tolerant(text, plain_integer)
 }
@@ -64,7 +64,7 @@ fn hexadecimal(text: &str) -> Option<&str> {
     text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"))
 }
 
-/// A switch: `0`, `1`, or in words.
+/// A switch: `0`, `1`, or a word.
 pub(super) fn switch(text: &str) -> Option<bool> {
     tolerant(text, |text| match text.to_ascii_lowercase().as_str() {
         "true" | "yes" => Some(true),
@@ -73,8 +73,7 @@ pub(super) fn switch(text: &str) -> Option<bool> {
     })
 }
 
-/// An access type, in any letter case. `rwr` and `rww` say which PDO may carry the object; by SDO both
-/// are `rw`.
+/// An access type, in any letter case. `rwr` and `rww` restrict PDOs; by SDO both are `rw`.
 pub(super) fn access(text: &str) -> Option<Access> {
     tolerant(text, |text| match text.to_ascii_lowercase().as_str() {
         "ro" | "r" => Some(Access::Ro),
@@ -85,11 +84,10 @@ pub(super) fn access(text: &str) -> Option<Access> {
     })
 }
 
-/// A default, limit or parameter value of a type, in the form that [`Scalar::encode`] takes. `None` is an
-/// empty value.
+/// A default, limit or parameter value of a type, in the form that [`Scalar::encode`] takes. `None` for an empty value.
 ///
 /// # Errors
-/// Why the text is no value of the type.
+/// The reason why the text is not a value of the type.
 pub(super) fn scalar(text: &str, data_type: DataType) -> Result<Option<Reading<Scalar>>, String> {
     let text = text.trim();
     let is_text = matches!(data_type, DataType::VisibleString | DataType::UnicodeString);
@@ -110,7 +108,7 @@ pub(super) fn scalar(text: &str, data_type: DataType) -> Result<Option<Reading<S
         DataType::TimeOfDay | DataType::TimeDifference => tolerant(text, |text| time(text, data_type)),
     };
     let reading = reading.ok_or_else(form)?;
-    // The judge is the function that will put the value on the wire; a formula must fit every node-ID.
+    // The check uses the encoder itself; a formula must fit every node-ID.
     match reading.value.encode(data_type, NodeId::MAX) {
         Ok(_) => Ok(Some(reading)),
         Err(ValueError::Range { low, high, .. }) => {
@@ -129,8 +127,8 @@ fn truth(text: &str) -> Option<Reading<Scalar>> {
     Some(Reading::sure(Scalar::Integer(bit)))
 }
 
-/// An integer, a formula with `$NODEID`, or a number with nothing but zeros behind the point.
-/// `signed` is the width of a signed type, for which `0xFF…` is the bit pattern of a negative number.
+/// An integer, a formula with `$NODEID`, or a number with only zeros after the point. `signed` is the width of a signed
+/// type, in which `0xFF…` is the bit pattern of a negative number.
 fn number(text: &str, signed: Option<u8>) -> Option<Reading<Scalar>> {
     if text.to_ascii_uppercase().contains(NODE_ID) {
         return formula(text);
@@ -143,12 +141,12 @@ fn number(text: &str, signed: Option<u8>) -> Option<Reading<Scalar>> {
         return Some(Reading { value: integer_scalar(value), doubt });
     }
     let real: f64 = text.parse().ok()?;
-    // 2^53: from here on a REAL64 no longer tells neighbouring integers apart.
+    // 2^53: above it, a REAL64 cannot represent every integer.
     if real.fract() != 0.0 || real.abs() >= 9_007_199_254_740_992.0 {
         return None;
     }
     let value = format!("{real:.0}").parse().ok()?;
-    let doubt = format!("{} is no integer; read as {value}", quoted(text));
+    let doubt = format!("{} is not an integer; read as {value}", quoted(text));
     Some(Reading { value: integer_scalar(value), doubt: Some(doubt) })
 }
 
@@ -164,7 +162,7 @@ fn from_bit_pattern(value: i128, bytes: u8) -> i128 {
 
 const NODE_ID: &str = "$NODEID";
 
-/// `$NODEID+0x180` in the one form that [`Scalar::encode`] resolves, from any order of the terms.
+/// `$NODEID+0x180`, with the terms in any order.
 fn formula(text: &str) -> Option<Reading<Scalar>> {
     let mut nodes = 0;
     let mut sum: i128 = 0;
@@ -183,8 +181,8 @@ fn formula(text: &str) -> Option<Reading<Scalar>> {
     Some(Reading { value: Scalar::NodeIdPlus(sum), doubt })
 }
 
-/// A REAL: `1.5`, `1e3`, with the comma of a German tool, or hexadecimal; all `digits` of a hexadecimal
-/// number given, it is the bit pattern (nobody writes 3F800000h for a thousand million).
+/// A REAL: `1.5`, `1e3`, with a decimal comma, or hexadecimal. A hexadecimal number with all `digits` is a bit pattern:
+/// 3F800000h is 1.0.
 fn real(text: &str, digits: usize) -> Option<Reading<Scalar>> {
     if let Ok(number) = text.parse::<f64>() {
         return Some(Reading::sure(Scalar::Real(number)));
@@ -203,11 +201,11 @@ fn real(text: &str, digits: usize) -> Option<Reading<Scalar>> {
         (true, _) => f64::from_bits(value),
         (false, _) => value.to_string().parse().ok()?,
     };
-    let how = if hex.len() == digits { "is taken for the bit pattern of" } else { "is taken for" };
+    let how = if hex.len() == digits { "is taken for the bit pattern of" } else { "is read as" };
     Some(Reading { value: Scalar::Real(number), doubt: Some(format!("{} {how} {number}", quoted(text))) })
 }
 
-/// A time as the number that its 48 bits are; CiA 306 knows no other form.
+/// A time as the number in its 48 bits, the only form in CiA 306.
 fn time(text: &str, data_type: DataType) -> Option<Reading<Scalar>> {
     let number = u64::try_from(plain_integer(text)?.value).ok()?;
     let bytes = number.to_le_bytes();
@@ -246,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn a_leading_zero_is_octal_and_said() {
+    fn leading_zero_is_octal_with_a_warning() {
         let octal = integer("0100").expect("octal");
         assert_eq!(
             (octal.value, octal.doubt.as_deref()),
@@ -289,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn formulas_take_every_order() {
+    fn formula_terms_can_have_any_order() {
         for text in ["$NODEID+0x180", "0x180+$NODEID", "$nodeid + 384", "0x100 + $NodeID + 0x80", "$NODEID+0x180;TPDO1"]
         {
             assert_eq!(value(text, U32), Some((Scalar::NodeIdPlus(0x180), false)), "{text}");

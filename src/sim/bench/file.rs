@@ -1,4 +1,4 @@
-//! The TOML file of a bench, as it is written.
+//! The TOML file of a bench.
 
 use super::{BenchError, UNCONFIGURED, check_rate, read};
 use crate::bus::memory::Clock;
@@ -8,7 +8,7 @@ use crate::device::catalog::{self, Model};
 use crate::device::scalar::Scalar;
 use crate::sim::data::SimChannel;
 use crate::sim::model::{Direction, Overload};
-use crate::sim::setup::{GoneAfter, Oddities, Setup};
+use crate::sim::setup::{Oddities, OfflineAfter, Setup};
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -57,12 +57,12 @@ pub(super) struct DeviceEntry {
     pub(super) kind: String,
     pub(super) node: Option<NodeId>,
     #[serde(default)]
-    pub(super) twin: bool,
+    pub(super) duplicate_id: bool,
     bit_rate: Option<u32>,
     #[serde(default, deserialize_with = "duration")]
     latency: Duration,
     #[serde(default)]
-    gone_after: Vec<GoneName>,
+    offline_after: Vec<OfflineName>,
     #[serde(default)]
     lss: LssEntry,
     serial: Option<u32>,
@@ -78,16 +78,16 @@ pub(super) struct DeviceEntry {
 
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum GoneName {
+enum OfflineName {
     Reset,
     Activate,
 }
 
-impl From<GoneName> for GoneAfter {
-    fn from(name: GoneName) -> GoneAfter {
+impl From<OfflineName> for OfflineAfter {
+    fn from(name: OfflineName) -> OfflineAfter {
         match name {
-            GoneName::Reset => GoneAfter::Reset,
-            GoneName::Activate => GoneAfter::Activate,
+            OfflineName::Reset => OfflineAfter::Reset,
+            OfflineName::Activate => OfflineAfter::Activate,
         }
     }
 }
@@ -102,7 +102,7 @@ struct LssEntry {
     #[serde(default)]
     refuse: BTreeMap<Service, u8>,
     #[serde(default)]
-    scans_for_ever: bool,
+    endless_fastscan: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
@@ -139,12 +139,12 @@ struct OverloadEntry {
     channel: u8,
     #[serde(deserialize_with = "duration")]
     from: Duration,
-    #[serde(default = "for_ever", deserialize_with = "duration")]
+    #[serde(default = "no_end", deserialize_with = "duration")]
     until: Duration,
     direction: DirectionName,
 }
 
-fn for_ever() -> Duration {
+fn no_end() -> Duration {
     Duration::MAX
 }
 
@@ -164,7 +164,7 @@ impl DeviceEntry {
         DeviceEntry { kind: kind.to_owned(), node, ..DeviceEntry::default() }
     }
 
-    /// As people write it: `mh4@5`.
+    /// The short form: `mh4@5`.
     pub(super) fn name(&self) -> String {
         match self.node {
             Some(node) => format!("{}@{node}", self.kind),
@@ -172,7 +172,7 @@ impl DeviceEntry {
         }
     }
 
-    /// `before`: how many devices of this kind come before it; each has its own serial number.
+    /// `before`: the number of devices of this kind before it; each has its own serial number.
     pub(super) fn setup(&self, seed: u64, before: u32, beside: &Path) -> Result<Setup, BenchError> {
         let mut setup = Setup::new(self.model(beside)?, self.node.unwrap_or(NodeId::MIN));
         setup.node = self.node;
@@ -183,8 +183,8 @@ impl DeviceEntry {
             lose: self.lss.lose.clone(),
             late: self.lss.late.iter().map(|(service, late)| (service.0, late.0)).collect(),
             refuse: self.lss.refuse.iter().map(|(service, code)| (service.0, *code)).collect(),
-            scans_for_ever: self.lss.scans_for_ever,
-            gone_after: self.gone_after.iter().map(|name| GoneAfter::from(*name)).collect(),
+            endless_fastscan: self.lss.endless_fastscan,
+            offline_after: self.offline_after.iter().map(|name| OfflineAfter::from(*name)).collect(),
         };
         setup.serial = self.serial.unwrap_or(setup.serial.wrapping_add(before));
         setup.start = self.start;

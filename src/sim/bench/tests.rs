@@ -33,7 +33,7 @@ fn lists_of_devices() {
         ("mh4@0", "mh4@0: \"0\" is not a node-ID (1 to 127)"),
         ("mh4@5,", "\"\" is not DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) and no file FILE.toml"),
         ("mh4@5,dps@5", "two devices with node-ID 5"),
-        ("mh5@5", "there is no device \"mh5\" (mh4, d20, dps, mc1609, hydac-old, baumer, hydac, jumo, or FILE.toml)"),
+        ("mh5@5", "no device \"mh5\" (baumer, d20, dps, hydac, hydac-old, jumo, mc1609, mh4, or FILE.toml)"),
     ] {
         assert_eq!(refusal(Bench::parse(spec)), message);
     }
@@ -53,7 +53,7 @@ fn devices_without_a_node_id() {
 }
 
 #[test]
-fn what_is_wrong_with_a_file_is_told_with_its_line() {
+fn mistakes_in_a_file_have_their_line() {
     let text = |text: &str| refusal(Bench::from_toml(text, Path::new("")));
     let device = "[[device]]\nkind = \"mh4\"\nnode = 5\n";
     assert!(text("seed = 1\nsped = 2\n").starts_with("line 2: unknown field `sped`"));
@@ -69,7 +69,7 @@ fn what_is_wrong_with_a_file_is_told_with_its_line() {
     assert_eq!(text(&format!("{device}{device}")), "two devices with node-ID 5");
     assert!(text(&format!("{device}lss = {{ refuse = {{ \"0x117\" = 1 }} }}\n")).contains("is not a service"));
     assert!(text(&format!("{device}lss = {{ loose = [0x17] }}\n")).contains("unknown field `loose`"));
-    assert!(text(&format!("{device}gone_after = [\"lunch\"]\n")).contains("unknown variant `lunch`"));
+    assert!(text(&format!("{device}offline_after = [\"lunch\"]\n")).contains("unknown variant `lunch`"));
     assert_eq!(text(&format!("{device}set = {{ \"0x5000\" = 1 }}\n")), "mh4@5: mh4 has no object 0x5000:0");
     assert_eq!(
         text(&format!("{device}set = {{ \"1017\" = 70000 }}\n")),
@@ -92,7 +92,7 @@ fn hear(bus: &mut MemoryBus, until: Duration) -> Vec<String> {
 }
 
 #[test]
-fn everything_that_a_file_can_say() {
+fn every_key_of_a_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("bench.toml");
     let text = r#"
@@ -143,7 +143,7 @@ fn everything_that_a_file_can_say() {
 }
 
 #[test]
-fn what_goes_wrong_on_purpose() {
+fn configured_faults() {
     let text = r#"
         clock = "virtual"
         retime = false
@@ -152,20 +152,20 @@ fn what_goes_wrong_on_purpose() {
         kind = "mh4"
         node = 5
         latency = "1ms"
-        gone_after = ["reset"]
+        offline_after = ["reset"]
         lss = { lose = [0x11], late = { "0x13" = "50ms" }, refuse = { "0x17" = 1 } }
 
         [[device]]
         kind = "mh4"
         node = 5
-        twin = true
+        duplicate_id = true
         bit_rate = 125000
     "#;
     let bus = Bench::from_toml(text, Path::new("")).expect("a bench").open().expect("opened");
     assert!(bus.can_set_bit_rate().is_err());
     let rates: Vec<Option<u32>> = bus.stations::<Device>().map(Device::bit_rate).collect();
     assert_eq!(rates, [Some(250_000), Some(125_000)]);
-    // Now without the twin, who would disturb everybody.
+    // Without the second device of the same node-ID, which disturbs every answer.
     let alone = &text[..text.rfind("[[device]]").expect("two devices")];
     let mut bus = Bench::from_toml(alone, Path::new("")).expect("a bench").open().expect("opened");
     let lines = [
@@ -184,14 +184,14 @@ fn what_goes_wrong_on_purpose() {
 }
 
 #[test]
-fn a_record_that_cannot_be_written_is_an_error_of_the_file() {
+fn unwritable_record_is_a_file_error() {
     let text = "record = \"no/such/folder/truth.csv\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
     let bench = Bench::from_toml(text, Path::new("")).expect("a bench");
     assert!(matches!(bench.open(), Err(BenchError::Io { .. })));
 }
 
 #[test]
-fn devices_of_a_kind_have_serial_numbers_of_their_own() {
+fn devices_of_one_kind_have_different_serial_numbers() {
     let mut bus = Bench::parse("mh4@5,dps@6,mh4@7").expect("a list").open().expect("opened");
     let serial: ObjectId = "1018:4".parse().expect("an object");
     let serials: Vec<Option<Vec<u8>>> =
@@ -201,7 +201,7 @@ fn devices_of_a_kind_have_serial_numbers_of_their_own() {
 }
 
 #[test]
-fn a_description_of_the_users_own() {
+fn description_from_a_user_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let model = "name = \"own\"\ntitle = \"\"\nvendor = \"\"\nsource = \"\"\n[identify]\n[[object]]\nat = \"0x1000\"\n\
                  name = \"device-type\"\ntype = \"u32\"\naccess = \"ro\"\ndefault = 404\n";

@@ -1,4 +1,4 @@
-//! How a simulated device is given its node-ID and bit rate.
+//! How a simulated device takes its node-ID and bit rate.
 
 use super::{Device, Phase, RECONNECT};
 use crate::bus::memory::Outbox;
@@ -10,21 +10,21 @@ use crate::sim::data::SimState;
 use crate::sim::lss::Then;
 use crate::sim::nmt::State;
 use crate::sim::objects::Area;
-use crate::sim::setup::GoneAfter;
+use crate::sim::setup::OfflineAfter;
 
 impl Device {
-    /// An answer goes out once it has been thought over.
-    pub(super) fn answer(&mut self, frame: Frame, thought: Mono, now: Mono, out: &mut Outbox) {
-        if thought <= now && self.thinking.is_empty() {
+    /// Sends an answer once its response time has passed.
+    pub(super) fn answer(&mut self, frame: Frame, due_time: Mono, now: Mono, out: &mut Outbox) {
+        if due_time <= now && self.delayed.is_empty() {
             out.send(frame);
         } else {
-            let place = self.thinking.partition_point(|(due, _)| *due <= thought);
-            self.thinking.insert(place, (thought, frame));
+            let place = self.delayed.partition_point(|(due, _)| *due <= due_time);
+            self.delayed.insert(place, (due_time, frame));
         }
     }
 
-    /// Whether it listens to LSS in its present state.
-    pub(super) fn hears_lss(&self) -> bool {
+    /// Whether it answers LSS in its present state.
+    pub(super) fn accepts_lss(&self) -> bool {
         let state = match self.phase {
             Phase::Unconfigured => return true,
             Phase::Running(State::Stopped) => SimState::Stopped,
@@ -47,8 +47,8 @@ impl Device {
             if let Some(lost) = oddities.lose.iter().position(|lost| *lost == service) {
                 oddities.lose.remove(lost);
             } else {
-                let thought = now + oddities.latency + late;
-                self.answer(Frame::full(CanId::LSS_SLAVE, answer), thought, now, out);
+                let due_time = now + oddities.latency + late;
+                self.answer(Frame::full(CanId::LSS_SLAVE, answer), due_time, now, out);
             }
         }
         match reply.then {
@@ -60,25 +60,25 @@ impl Device {
             }
             Then::Activate(delay) => {
                 let after = self.state();
-                self.fall_silent(out);
+                self.drop_pending(out);
                 self.phase = Phase::Retiming { after, switch: Some(now + delay), until: now + delay + delay };
             }
         }
     }
 
-    /// The two delays of the activation of another bit rate.
+    /// Waits the two delays of the LSS activation and changes the bit rate between them.
     pub(super) fn retime(&mut self, now: Mono, out: &mut Outbox) {
         let Phase::Retiming { after, switch, until } = self.phase else { return };
         if switch.is_some_and(|switch| switch <= now) {
             self.memory.settings.active.rate = self.memory.settings.pending.rate;
-            let is_gone = self.setup.oddities.gone_after.contains(&GoneAfter::Activate);
+            let is_gone = self.setup.oddities.offline_after.contains(&OfflineAfter::Activate);
             self.phase = if is_gone { Phase::Off } else { Phase::Retiming { after, switch: None, until } };
         }
         if until <= now && self.phase != Phase::Off {
             self.phase = after.map_or(Phase::Unconfigured, Phase::Running);
             if after.is_some() {
                 self.restart_heartbeat(now);
-                self.look_for_overload(now);
+                self.update_overloads(now);
                 self.send_emergencies(now, out);
             }
             if self.is_operational() {

@@ -26,7 +26,7 @@ fn ms(milliseconds: u64) -> Mono {
     Mono::at(Duration::from_millis(milliseconds))
 }
 
-/// A built-in kind whose channels stand still at `base`.
+/// A built-in device whose channels are constant at `base`.
 fn still(kind: &str, node_id: u8, base: f64) -> Setup {
     let mut setup = Setup::new(catalog::by_name(kind).expect("built in"), node(node_id));
     for channel in &mut setup.channels {
@@ -46,8 +46,7 @@ fn hear(bus: &mut MemoryBus, until: Mono) -> Vec<String> {
     timed(bus, until).into_iter().map(|(_, frame)| frame).collect()
 }
 
-/// Every frame up to `until`, with the whole millisecond in which it was complete. What goes wrong on the wire is
-/// not of interest.
+/// Every frame up to `until`, with the millisecond in which it was complete. Bus errors are ignored.
 fn timed(bus: &mut MemoryBus, until: Mono) -> Vec<(u128, String)> {
     let mut heard = Vec::new();
     loop {
@@ -62,14 +61,14 @@ fn timed(bus: &mut MemoryBus, until: Mono) -> Vec<(u128, String)> {
     }
 }
 
-/// Sends, and hears what comes within 5 ms.
+/// Sends a frame and returns the frames of the next 5 ms.
 fn ask(bus: &mut MemoryBus, frame: &str) -> Vec<String> {
     bus.send(&frame.parse().expect("a frame")).expect("room");
     let until = bus.now().mono + Duration::from_millis(5);
     hear(bus, until)
 }
 
-/// Plays frames and the answers to them, all that come within 5 ms; `-` is silence.
+/// Sends frames and checks all answers of the next 5 ms; `-` means none.
 fn play(bus: &mut MemoryBus, lines: &[(&str, &str)]) {
     for (sent, expected) in lines {
         let heard = ask(bus, sent).join(" ");
@@ -86,7 +85,7 @@ fn state(bus: &mut MemoryBus) -> Option<State> {
 }
 
 #[test]
-fn each_boots_to_pre_operational_and_says_nothing_more() {
+fn each_device_boots_to_pre_operational_and_stays_silent() {
     for kind in ["mh4", "d20", "dps", "mc1609"] {
         let mut bus = bus([Setup::new(catalog::by_name(kind).expect("built in"), node(1))]);
         assert_eq!(hear(&mut bus, ms(60_000)), ["701#00"], "{kind}");
@@ -95,12 +94,12 @@ fn each_boots_to_pre_operational_and_says_nothing_more() {
 }
 
 #[test]
-fn the_nmt_states_and_what_is_possible_in_each() {
+fn nmt_states_allow_their_services_only() {
     let mut bus = bus([still("mh4", 5, 5.0)]);
     play(
         &mut bus,
         &[
-            // The boot-up was under way already.
+            // The boot-up was already being sent.
             ("000#0106", "705#00"),
             ("080#", "-"),
             ("605#4000100000000000", "585#4300100094018200"),
@@ -126,7 +125,7 @@ fn the_nmt_states_and_what_is_possible_in_each() {
 }
 
 #[test]
-fn resets_come_back_with_a_boot_up() {
+fn resets_end_with_a_boot_up() {
     let mut bus = bus([still("mh4", 5, 5.0)]);
     play(
         &mut bus,
@@ -134,7 +133,7 @@ fn resets_come_back_with_a_boot_up() {
             ("605#2B171000F4010000", "705#00 585#6017100000000000 705#7F"),
             ("605#233161010000AB00", "585#6031610100000000"),
             ("000#8105", "-"),
-            // Away: neither SDO nor NMT.
+            // During the reset it answers neither SDO nor NMT.
             ("605#4017100000000000", "-"),
             ("000#0105", "-"),
         ],
@@ -147,7 +146,7 @@ fn resets_come_back_with_a_boot_up() {
             ("605#4031610100000000", "585#4331610100004E00"),
             ("605#2B171000D0070000", "585#6017100000000000 705#7F"),
             ("605#233161010000AB00", "585#6031610100000000"),
-            // Only the communication begins anew.
+            // Only the communication restarts.
             ("000#8205", "-"),
         ],
     );
@@ -174,7 +173,7 @@ fn heartbeat_without_drift() {
 }
 
 #[test]
-fn guarding_answers_with_a_toggle_where_there_is_guarding() {
+fn guarding_answers_toggle_if_guarding_is_supported() {
     let mut d20 = bus([still("d20", 2, 5.0)]);
     play(
         &mut d20,
@@ -195,7 +194,7 @@ fn guarding_answers_with_a_toggle_where_there_is_guarding() {
             ("702#R1", "-"),
         ],
     );
-    // The toggle begins anew with the communication.
+    // The toggle bit restarts with the communication.
     play(&mut d20, &[("602#2217100000000000", "582#6017100000000000"), ("702#R1", "702#05")]);
     play(&mut d20, &[("000#8202", "-")]);
     let until = d20.now().mono + Duration::from_millis(20);
@@ -206,7 +205,7 @@ fn guarding_answers_with_a_toggle_where_there_is_guarding() {
 }
 
 #[test]
-fn overload_tells_itself_in_status_value_and_emergency() {
+fn overload_sets_status_value_and_emergency() {
     let overload = |from, until, direction| {
         (1, Overload { from: Duration::from_millis(from), until: Duration::from_millis(until), direction })
     };
@@ -256,12 +255,12 @@ fn an_overload_while_running() {
             ("605#4050610100000000", "585#4F50610103000000"),
             ("605#4030710100000000", "585#4B30710100800000"),
             ("605#4001100000000000", "585#4F01100081000000"),
-            // The communication begins anew: the error is still there and is no new one.
+            // The communication restarts: the error is still pending and not a new one.
             ("000#8205", "-"),
         ],
     );
     assert_eq!(hear(&mut bus, ms(700)), ["705#00"]);
-    // After a reset of the node it is told again.
+    // After a reset of the node it is sent again.
     play(&mut bus, &[("605#4001100000000000", "585#4F01100081000000"), ("000#8105", "-")]);
     assert_eq!(hear(&mut bus, ms(1000)), ["705#00", "085#01F0810103000000"]);
 }
@@ -275,7 +274,7 @@ fn dps_has_its_emergency_and_no_status() {
     assert_eq!(hear(&mut bus, ms(600)), ["77F#00", "0FF#0132050000000000"]);
     play(
         &mut bus,
-        // -5 psi: the number goes on.
+        // -5 psi: without a marker, the value is sent.
         &[("67F#4030610100000000", "5FF#4230610178ECFFFF"), ("67F#4050610100000000", "5FF#8050610100000206")],
     );
 }
@@ -346,14 +345,14 @@ fn strings_come_in_segments_or_at_once() {
             ("601#6000000000000000", "581#8000000001000405"),
         ],
     );
-    // A client that does not fetch its segments is given up after a second.
+    // A transfer without requests is aborted after a second.
     play(&mut bus, &[("601#4008100000000000", "581#4108100008000000")]);
     let until = bus.now().mono + Duration::from_secs(5);
     assert_eq!(hear(&mut bus, until), ["581#8008100000000405"]);
 }
 
 #[test]
-fn devices_that_start_by_themselves() {
+fn autonomous_start() {
     let mut setup = still("mh4", 5, 5.0);
     setup.set = vec![(id("1F80"), Scalar::Integer(8))];
     let mut autonomous = bus([setup]);
@@ -365,7 +364,7 @@ fn devices_that_start_by_themselves() {
 }
 
 #[test]
-fn what_cannot_be_set_is_told_in_words() {
+fn objects_that_cannot_be_set_give_an_error() {
     let mut setup = still("mh4", 5, 5.0);
     setup.set = vec![(id("5000"), Scalar::Integer(1))];
     assert_eq!(Device::new(setup).err().as_deref(), Some("mh4 has no object 0x5000:0"));
@@ -392,14 +391,15 @@ fn the_same_seed_gives_the_same_frames_and_another_gives_others() {
         heard
     };
     let first = run(1);
-    // 4 boot-ups, 2 TPDOs on each of 50 SYNCs, 4 rounds of 4 + 1 on the timers; those of 500 ms are still under way.
+    // 4 boot-ups, 2 TPDOs for each of 50 SYNCs, 4 rounds of 4 + 1 by event timers; those at 500 ms are not complete
+    // yet.
     assert_eq!(first.len(), 4 + 100 + 20);
     assert_eq!(first, run(1));
     assert_ne!(first, run(2));
 }
 
 #[test]
-fn a_tpdo_that_a_reset_overtakes_is_neither_sent_nor_recorded() {
+fn tpdo_pending_at_a_reset_is_neither_sent_nor_recorded() {
     let file = Shared::default();
     let recorder = Recorder::new(Box::new(file.clone())).expect("memory");
     let mut setup = Setup::new(catalog::by_name("mh4").expect("built in"), node(5));
@@ -407,7 +407,7 @@ fn a_tpdo_that_a_reset_overtakes_is_neither_sent_nor_recorded() {
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(Device::new(setup).expect("a device").recording(recorder.clone()));
     hear(&mut bus, ms(10));
-    // The reset waits behind the SYNC and wins the wire from the TPDO that the SYNC has caused.
+    // The reset waits for the SYNC and has priority over the TPDO that the SYNC causes.
     bus.send(&"080#".parse().expect("a frame")).expect("room");
     bus.send(&"000#8105".parse().expect("a frame")).expect("room");
     assert_eq!(hear(&mut bus, ms(200)), ["705#00"]);
@@ -420,7 +420,7 @@ fn a_tpdo_that_a_reset_overtakes_is_neither_sent_nor_recorded() {
 }
 
 #[test]
-fn the_record_goes_on_after_a_controller_was_off() {
+fn record_continues_after_the_controller_was_off() {
     let file = Shared::default();
     let recorder = Recorder::new(Box::new(file.clone())).expect("memory");
     let mut setup = still("dps", 33, 17.898);
@@ -429,7 +429,7 @@ fn the_record_goes_on_after_a_controller_was_off() {
     setup.channels.iter_mut().for_each(|channel| channel.noise = 0.5);
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(Device::new(setup).expect("a device").recording(recorder.clone()));
-    // Who is at another bit rate destroys what is sent, until one controller after the other is off.
+    // A device at another bit rate destroys every frame, until one controller after the other is bus-off.
     let mut other = still("mc1609", 11, 1.0);
     other.bit_rate = Some(500_000);
     other.set = vec![(id("0x1017"), Scalar::Integer(1000))];
@@ -452,7 +452,7 @@ fn the_record_goes_on_after_a_controller_was_off() {
 }
 
 #[test]
-fn turns_do_not_drift_and_are_not_made_up_for() {
+fn periods_do_not_drift_and_missed_ones_are_skipped() {
     let second = Duration::from_secs(1);
     assert_eq!(next_turn(ms(1000), second, ms(1000)), ms(2000));
     assert_eq!(next_turn(ms(1000), second, ms(1999)), ms(2000));
@@ -460,7 +460,7 @@ fn turns_do_not_drift_and_are_not_made_up_for() {
     assert_eq!(next_turn(ms(1000), second, ms(90_500)), ms(91_500));
 }
 
-/// A file in memory that the test keeps a hold of.
+/// A file in memory that the test can read.
 #[derive(Clone, Default)]
 struct Shared(Arc<Mutex<Vec<u8>>>);
 
@@ -476,7 +476,7 @@ impl std::io::Write for Shared {
 }
 
 #[test]
-fn the_record_has_every_value_at_the_moment_its_frame_is_complete() {
+fn record_has_the_time_of_the_complete_frame() {
     let file = Shared::default();
     let recorder = Recorder::new(Box::new(file.clone())).expect("memory");
     let mut setup = still("mh4", 5, 5.0);
@@ -520,7 +520,7 @@ mod garbage {
     use proptest::prelude::*;
 
     fn frame() -> impl Strategy<Value = Frame> {
-        // Mostly at the identifiers that the devices listen to.
+        // Most frames have identifiers that the devices receive.
         let id = prop_oneof![
             3 => prop::sample::select(vec![0x000u16, 0x080, 0x601, 0x602, 0x603, 0x67f, 0x701, 0x702, 0x7e5]),
             1 => 0u16..0x800,
@@ -536,7 +536,7 @@ mod garbage {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
-        /// Whatever is sent, nobody panics, time goes on, and after a reset every device is as delivered.
+        /// Any frames: no panic, time advances, and after a reset every device has its factory defaults.
         #[test]
         fn any_traffic_is_survived(frames in prop::collection::vec(frame(), 1..60)) {
             let kinds = [("mh4", 1), ("d20", 2), ("mc1609", 3), ("dps", 127)];

@@ -12,12 +12,12 @@ struct Bed {
 }
 
 impl Bed {
-    fn new(kind: &str, node: Option<u8>, knows: SimLss) -> Bed {
+    fn new(kind: &str, node: Option<u8>, supported: SimLss) -> Bed {
         let model = catalog::by_name(kind).expect("built in");
         let node = node.map(|node| NodeId::new(node).expect("a node-ID"));
         let objects = Objects::new(&model, NodeId::MIN);
         let settings = Settings::new(&model.description, &objects, Pair { node, rate: Rate::At(250_000) });
-        Bed { slave: Slave::new(knows, BTreeMap::new(), false), settings, identity: IDENTITY }
+        Bed { slave: Slave::new(supported, BTreeMap::new(), false), settings, identity: IDENTITY }
     }
 
     fn ask(&mut self, request: &str) -> Reply {
@@ -27,7 +27,7 @@ impl Bed {
         self.slave.request(bytes, self.identity, &mut self.settings)
     }
 
-    /// Requests and the answers to them, both without the zeros at the end; `-` is silence.
+    /// Requests and their answers, without trailing zeros; `-` means no answer.
     fn play(&mut self, lines: &[(&str, &str)]) {
         for (request, expected) in lines {
             let reply = self.ask(request);
@@ -43,7 +43,7 @@ fn all() -> SimLss {
 }
 
 #[test]
-fn nothing_is_configured_or_told_in_waiting_state() {
+fn waiting_state_ignores_configuration_and_inquiry() {
     let mut bed = Bed::new("mh4", Some(5), all());
     for request in ["1107", "130004", "15E803", "17", "5A", "5B", "5C", "5D", "5E", "4C", "5100000000800000", "0402"] {
         assert_eq!(bed.ask(request), Reply::default(), "{request}");
@@ -52,7 +52,7 @@ fn nothing_is_configured_or_told_in_waiting_state() {
 }
 
 #[test]
-fn every_service_of_the_configuration_state() {
+fn configuration_state_supports_every_service() {
     let mut bed = Bed::new("mh4", Some(5), all());
     bed.play(&[
         ("0401", "-"),
@@ -80,25 +80,25 @@ fn every_service_of_the_configuration_state() {
 }
 
 #[test]
-fn the_devices_own_table_of_bit_rates_counts() {
+fn bit_rate_codes_follow_the_device_table() {
     let mut bed = Bed::new("dps", Some(5), all());
     bed.play(&[("0401", "-"), ("130005", "13"), ("130001", "1301"), ("130009", "1301")]);
     assert_eq!(bed.settings.pending.rate, Rate::At(100_000));
     let mut bed = Bed::new("mh4", Some(5), all());
     bed.play(&[("0401", "-"), ("130009", "13")]);
     assert_eq!(bed.settings.pending.rate, Rate::Auto);
-    // Where no table is known: that of CiA 305.
+    // Without a known table: the table of CiA 305.
     let mut bed = Bed::new("d20", Some(5), all());
     bed.play(&[("0401", "-"), ("130008", "13"), ("130005", "1301"), ("130009", "1301")]);
     assert_eq!(bed.settings.pending.rate, Rate::At(10_000));
 }
 
 #[test]
-fn only_the_whole_address_in_its_order_selects() {
+fn only_the_complete_address_in_order_selects() {
     let address = ["4062030000", "4150314400", "4200000100", "43224E0000"];
     let mut bed = Bed::new("mh4", Some(5), all());
     bed.play(&[(address[0], "-"), (address[1], "-"), (address[2], "-"), (address[3], "44"), ("5E", "5E05")]);
-    // In configuration state it takes no address; another's does not put it back.
+    // In configuration state it ignores addresses; another device's address does not change that.
     bed.play(&[(address[0], "-"), (address[1], "-"), (address[2], "-"), (address[3], "-"), ("5E", "5E05")]);
     for (part, wrong) in [(0, "4061030000"), (1, "4150314401"), (2, "4201000100"), (3, "43234E0000")] {
         bed.play(&[("0400", "-")]);
@@ -106,10 +106,10 @@ fn only_the_whole_address_in_its_order_selects() {
             bed.play(&[(if index == part { wrong } else { right }, "-")]);
         }
     }
-    // It may begin anew at any time.
+    // The address can restart at any time.
     bed.play(&[(address[0], "-"), (address[1], "-"), (address[0], "-"), (address[1], "-")]);
     bed.play(&[(address[2], "-"), (address[3], "44"), ("0400", "-")]);
-    // A part missing, twice, or something between.
+    // A part is missing, repeated or interrupted.
     for order in [&[0, 1, 3][..], &[0, 1, 1, 2, 3], &[1, 2, 3], &[0, 2, 1, 3]] {
         order.iter().for_each(|&part| bed.play(&[(address[part], "-")]));
     }
@@ -138,7 +138,7 @@ fn identification_by_range() {
     ask(&mut bed, 0, 20002, "4F");
 }
 
-/// The search as CiA 305 has it: the upper bits of each part, then the whole part with the one to go on with.
+/// The search of CiA 305: the upper bits of each part, then the complete part with the next part's number.
 fn fastscan(bed: &mut Bed) -> Identity {
     let mut found = [0; 4];
     bed.play(&[("5100000000800000", "4F")]);
@@ -160,13 +160,13 @@ fn fastscan(bed: &mut Bed) -> Identity {
 }
 
 #[test]
-fn fastscan_finds_the_unconfigured() {
+fn fastscan_finds_an_unconfigured_device() {
     for identity in [IDENTITY, [0, 0, 0, 0], [u32::MAX; 4], [1, 0x8000_0000, 0x7fff_ffff, 0xaaaa_5555]] {
         let mut bed = Bed { identity, ..Bed::new("mh4", None, all()) };
         bed.play(&[("4C", "50")]);
         assert_eq!(fastscan(&mut bed), identity);
         assert!(bed.slave.is_configuring());
-        // Found, it is silent, and takes a node-ID when it is sent back to waiting.
+        // Once found it is silent; it takes a node-ID when it returns to waiting state.
         bed.play(&[("5100000000800000", "-"), ("4C", "50"), ("5E", "5EFF"), ("110C", "11"), ("4C", "-")]);
         assert_eq!(bed.ask("0400").then, Then::Boot);
         bed.play(&[("5100000000800000", "-")]);
@@ -174,7 +174,7 @@ fn fastscan_finds_the_unconfigured() {
 }
 
 #[test]
-fn fastscan_leaves_whoever_does_not_fit() {
+fn fastscan_skips_devices_that_do_not_match() {
     let mut bed = Bed::new("mh4", None, all());
     // The second part before the first; a part and a bit that do not exist.
     bed.play(&[
@@ -189,7 +189,7 @@ fn fastscan_leaves_whoever_does_not_fit() {
 }
 
 #[test]
-fn one_that_answers_fastscan_for_ever() {
+fn endless_fastscan_answers_every_frame() {
     let mut bed = Bed::new("mh4", None, all());
     bed.slave = Slave::new(all(), BTreeMap::new(), true);
     fastscan(&mut bed);
@@ -197,7 +197,7 @@ fn one_that_answers_fastscan_for_ever() {
 }
 
 #[test]
-fn what_a_slave_does_not_know_it_does_not_answer() {
+fn unsupported_services_are_not_answered() {
     let model = catalog::by_name("dps").expect("built in");
     let mut bed = Bed::new("dps", Some(127), crate::sim::data::SimData::of(&model).lss);
     bed.play(&[("0401", "-"), ("5A", "-"), ("5E", "-"), ("46", "-"), ("4C", "-"), ("117E", "11"), ("17", "17")]);

@@ -43,7 +43,7 @@ fn memory() -> Memory {
     ]))
 }
 
-/// Plays request and answer lines; `-` is silence, several answers stand side by side.
+/// Requests and their answers; `-` means none, several answers stand side by side.
 fn transcript(server: &mut SdoServer, memory: &mut Memory, lines: &[(&str, &str)]) {
     for (request, answer) in lines {
         let bytes: [u8; 8] = parse_hex(request).expect("bytes").try_into().expect("eight");
@@ -120,13 +120,13 @@ fn segmented_upload() {
             ("4008100000000000", "4108100008000000"),
             ("6000000000000000", "004D482D342D4341"),
             ("7000000000000000", "1D4E000000000000"),
-            // Over: another segment is a wrong command.
+            // The transfer has ended: a further segment is an invalid command.
             ("6000000000000000", "8000000001000405"),
-            // Toggle wrong: the transfer is over and the abort names the object.
+            // Wrong toggle bit: the transfer ends, and the abort names the object.
             ("4008100000000000", "4108100008000000"),
             ("7000000000000000", "8008100000000305"),
             ("6000000000000000", "8000000001000405"),
-            // Nothing at all cannot be expedited.
+            // An empty value cannot be expedited.
             ("4000200000000000", "4100200000000000"),
             ("6000000000000000", "0F00000000000000"),
             // A new request replaces the transfer; an abort of the client ends it without an answer.
@@ -162,10 +162,10 @@ fn segmented_download() {
             ("2017100000000000", "6017100000000000"),
             ("0B01020000000000", "2000000000000000"),
             ("4017100000000000", "4B17100001020000"),
-            // Announced and delivered differ.
+            // The announced and the delivered size differ.
             ("2100200009000000", "6000200000000000"),
             ("0B41420000000000", "8000200010000706"),
-            // Announced does not fit the type.
+            // The announced size does not fit the type.
             ("2117100004000000", "8017100010000706"),
             // Toggle wrong.
             ("2100200009000000", "6000200000000000"),
@@ -213,7 +213,7 @@ fn block_download() {
         &mut server,
         &mut memory,
         &[
-            // Without CRC and size. The first segment lost, the second doubled: nothing in order.
+            // Without CRC and size. The first segment is lost, the second repeated: none is in order.
             ("C000200000000000", "A00020007F000000"),
             ("0241424344454647", "-"),
             ("0241424344454647", "-"),
@@ -231,7 +231,7 @@ fn block_download() {
         &mut server,
         &mut memory,
         &[
-            // Nothing at all.
+            // An empty value.
             ("C600200000000000", "A40020007F000000"),
             ("8100000000000000", "A2017F0000000000"),
             ("DD00000000000000", "A100000000000000"),
@@ -248,7 +248,7 @@ fn block_download() {
             ("0141424344454647", "-"),
             ("8000200000000405", "-"),
             ("8248490000000000", "-"),
-            // An end without a beginning, and a new request instead of the end.
+            // An end request without a transfer, and a new request instead of the end request.
             ("C100000000000000", "8000000001000405"),
             ("C600200001000000", "A40020007F000000"),
             ("8141000000000000", "A2017F0000000000"),
@@ -270,19 +270,19 @@ fn block_upload() {
             ("A300000000000000", "0131323334353637 8238390000000000"),
             ("A2027F0000000000", "D5C3310000000000"),
             ("A100000000000000", "-"),
-            // Sub-blocks of one, none taken, then a larger one; no CRC.
+            // Sub-blocks of one segment, none accepted, then a larger one; no CRC.
             ("A000200001000000", "C200200009000000"),
             ("A300000000000000", "0131323334353637"),
             ("A200010000000000", "0131323334353637"),
             ("A201050000000000", "8138390000000000"),
             ("A201050000000000", "D500000000000000"),
             ("A100000000000000", "-"),
-            // As to a normal read up to the threshold.
+            // Up to the threshold, as in a normal read.
             ("A40020007F090000", "4100200009000000"),
             ("6000000000000000", "0031323334353637"),
             ("7000000000000000", "1B38390000000000"),
             ("A40020007F080000", "C600200009000000"),
-            // More acknowledged than sent; no block size, at the start and later; no such object.
+            // More segments acknowledged than sent; no block size, at the start and later; no such object.
             ("A300000000000000", "0131323334353637 8238390000000000"),
             ("A2037F0000000000", "8000200003000405"),
             ("A400200000000000", "8000200002000405"),
@@ -291,7 +291,7 @@ fn block_upload() {
             ("A300000000000000", "0131323334353637 8238390000000000"),
             ("A201000000000000", "8000200002000405"),
             ("A40099297F000000", "8000992900000206"),
-            // A start without a beginning.
+            // A start request without a transfer.
             ("A300000000000000", "8000000001000405"),
         ],
     );
@@ -307,18 +307,18 @@ fn block_upload() {
         ],
     );
     transcript(&mut server, &mut memory, &[("A40020007F000000", "C600200000000000")]);
-    server.sent(Mono::at(PATIENCE));
-    assert_eq!(server.deadline(), Some(Mono::at(2 * PATIENCE)));
+    server.sent(Mono::at(SEGMENT_TIMEOUT));
+    assert_eq!(server.deadline(), Some(Mono::at(2 * SEGMENT_TIMEOUT)));
     assert_eq!(server.give_up(), Some([0x80, 0x00, 0x20, 0, 0, 0, 0x04, 0x05]));
     assert_eq!(server.deadline(), None);
 }
 
 #[test]
-fn a_client_that_stays_away_is_given_up() {
+fn silent_client_is_aborted_after_the_time_limit() {
     let mut server = SdoServer::new(SdoStyle::default(), false);
     assert_eq!(server.deadline(), None);
     transcript(&mut server, &mut memory(), &[("4008100000000000", "4108100008000000")]);
-    assert_eq!(server.deadline(), Some(Mono::at(PATIENCE)));
+    assert_eq!(server.deadline(), Some(Mono::at(SEGMENT_TIMEOUT)));
     assert_eq!(server.give_up(), Some([0x80, 0x08, 0x10, 0, 0, 0, 0x04, 0x05]));
     assert_eq!(server.deadline(), None);
     assert_eq!(server.give_up(), None);
@@ -342,7 +342,7 @@ proptest! {
         let mut memory = memory();
         let mut server = SdoServer::new(SdoStyle { block: true, ..SdoStyle::default() }, false);
         for (mut request, kind) in requests {
-            // Now and then something that leads on.
+            // Some frames continue the transfer.
             let head = [request[0], 0xc6, 0xa4, 0xa2, 0xa3, 0x81][kind];
             request[0] = head;
             if head == 0xc6 || head == 0xa4 {

@@ -54,7 +54,7 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
             && !retimes
             && !spec.vagaries().any(|vagary| {
                 // Who babbles may fill the bus.
-                matches!(vagary, Vagary::Hang { .. } | Vagary::GoneAfterReset | Vagary::Babbles { .. })
+                matches!(vagary, Vagary::Hang { .. } | Vagary::OfflineAfterReset | Vagary::Babbles { .. })
             })
         {
             broken.push(("names the cause", format!("the bus works: {}", told())));

@@ -104,7 +104,7 @@ def device(rng, place):
     if rng.random() < 0.1:
         service = rng.choice(LSS_SERVICES)
         lss = [rng.choice((f"lose = [{service}]", f'late = {{ "{service}" = "{rng.choice((60, 300, 900))}ms" }}',
-                           f'refuse = {{ "{rng.choice((0x11, 0x13, 0x17))}" = 1 }}', "scans_for_ever = true"))]
+                           f'refuse = {{ "{rng.choice((0x11, 0x13, 0x17))}" = 1 }}', "endless_fastscan = true"))]
     made = {
         "kind": kind,
         # Never two the same: all different modulo 11.

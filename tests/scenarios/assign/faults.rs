@@ -38,7 +38,7 @@ fn whatever_goes_wrong_with_one_service() {
         ", lss = { refuse = { '0x11' = 1 } }",
         ", lss = { refuse = { '0x17' = 1 } }",
         ", lss = { refuse = { '0x17' = 2 } }",
-        ", gone_after = ['reset']",
+        ", offline_after = ['reset']",
         ", latency = '90ms'",
     ];
     for kind in ["mh4", "dps", "d20", "mc1609"] {
@@ -104,7 +104,7 @@ fn a_lost_acknowledge_of_a_store_is_no_success() {
 
 #[test]
 fn one_that_does_not_come_back() {
-    let mut bus = bus(&bench("mh4", ", gone_after = ['reset']"));
+    let mut bus = bus(&bench("mh4", ", offline_after = ['reset']"));
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::NoAnswer);
     assert!(done.failure().1.contains("node-ID 12 configured, stored"), "{}", done.failure().1);
@@ -141,7 +141,7 @@ impl Station for Newcomer {
 
 #[test]
 fn another_one_that_shows_itself_in_its_place() {
-    let mut bus = bus(&bench("mh4", ", gone_after = ['reset']"));
+    let mut bus = bus(&bench("mh4", ", offline_after = ['reset']"));
     bus.attach(Newcomer { awake: false });
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::Unexpected);

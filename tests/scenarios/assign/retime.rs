@@ -57,7 +57,7 @@ fn without_the_host_nothing_is_reset() {
 
 #[test]
 fn one_that_is_gone_comes_back_with_power() {
-    let mut bus = bus("device = [{ kind = 'mh4', node = 5, gone_after = ['activate'] }]");
+    let mut bus = bus("device = [{ kind = 'mh4', node = 5, offline_after = ['activate'] }]");
     let done = retimed(&mut bus, "5");
     assert_eq!(done.failure().0, Kind::NoAnswer);
     assert!(done.failure().1.contains("this side is back at 250k"), "{}", done.failure().1);

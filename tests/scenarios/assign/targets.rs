@@ -19,7 +19,7 @@ const ALL: &str = "device = [
 ]";
 
 const TWINS: &str = "device = [
-    { kind = 'dps', node = 5, serial = 100, twin = true }, { kind = 'dps', node = 5, serial = 200, twin = true },
+    { kind = 'dps', node = 5, serial = 100, duplicate_id = true }, { kind = 'dps', node = 5, serial = 200, duplicate_id = true },
     { kind = 'mh4', node = 6 },
 ]";
 
@@ -157,7 +157,7 @@ fn two_devices_with_one_node_id() {
 #[test]
 fn one_of_two_with_one_node_id_that_tells_it() {
     let twins = "device = [
-        { kind = 'mh4', node = 5, serial = 100, twin = true }, { kind = 'mh4', node = 5, serial = 200, twin = true },
+        { kind = 'mh4', node = 5, serial = 100, duplicate_id = true }, { kind = 'mh4', node = 5, serial = 200, duplicate_id = true },
     ]";
     let mut bus = bus(twins);
     let mut expected = all_held(&bus);
@@ -206,7 +206,7 @@ fn only_is_refused_where_another_one_shows_itself() {
         "device = [{ kind = 'mh4', node = 5 }, { kind = 'dps', node = 6 }]",
         "device = [{ kind = 'mh4', node = 5 }, { kind = 'mh4' }]",
         "device = [{ kind = 'mh4' }, { kind = 'mh4' }]",
-        "device = [{ kind = 'mh4', node = 5, twin = true }, { kind = 'mh4', node = 5, twin = true }]",
+        "device = [{ kind = 'mh4', node = 5, duplicate_id = true }, { kind = 'mh4', node = 5, duplicate_id = true }]",
         "device = [{ kind = 'dps', node = 5 }, { kind = 'mh4' }]",
     ];
     for bench in two {

@@ -42,7 +42,7 @@ fn three_without_a_node_id_one_after_the_other() {
 fn who_answers_every_fastscan_frame_in_configuration_state() {
     let mut bus = bus(r#"
         device = [
-            { kind = "mh4", serial = 99, lss = { scans_for_ever = true } },
+            { kind = "mh4", serial = 99, lss = { endless_fastscan = true } },
             { kind = "mh4", serial = 100 },
         ]
     "#);

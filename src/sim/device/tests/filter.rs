@@ -1,4 +1,4 @@
-//! Filters as a master sees them.
+//! Filters as the master sees them.
 
 use super::*;
 
@@ -38,7 +38,7 @@ fn the_mean_since_the_last_pdo_is_quieter_than_the_samples() {
         let spread = spread(&values[1..]);
         assert!((50..=200).contains(&spread), "{spread}: {values:?}");
     }
-    // A moving average of one step is none.
+    // A moving average with constant 1 does not filter.
     let values = on_sync(&mut mc1609(&[("61A0:1", 1), ("61A1:1", 1)]), "185", 40);
     assert!(spread(&values) > 700, "{values:?}");
     let values = on_sync(&mut mc1609(&[("61A0:1", 1), ("61A1:1", 100)]), "185", 40);
@@ -46,7 +46,7 @@ fn the_mean_since_the_last_pdo_is_quieter_than_the_samples() {
 }
 
 #[test]
-fn a_filter_that_is_written_begins_at_once() {
+fn filter_acts_as_soon_as_it_is_written() {
     let mut setup = still("mh4", 5, 5.0);
     setup.channels[0].noise = 1.0;
     let mut bus = bus([setup]);
@@ -63,10 +63,10 @@ fn a_filter_that_is_written_begins_at_once() {
     play(&mut bus, &[("605#2FA0610101000000", "585#60A0610100000000")]);
     let smooth: Vec<f32> = (0..20).map(|_| read(&mut bus)).collect();
     assert!(smooth.windows(2).all(|pair| (pair[0] - pair[1]).abs() < 0.02), "{smooth:?}");
-    // What autozero takes for zero is what is shown.
+    // Autozero uses the filtered value.
     play(&mut bus, &[("605#232561017A65726F", "585#6025610100000000")]);
     assert!(read(&mut bus).abs() < 0.02);
-    // After a reset there is none: nothing was stored.
+    // After a reset there is no filter: nothing was stored.
     ask(&mut bus, "000#8105");
     let until = bus.now().mono + Duration::from_millis(200);
     hear(&mut bus, until);

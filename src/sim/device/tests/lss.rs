@@ -1,11 +1,11 @@
-//! Node-ID and bit rate: what a device takes, when it takes it, and what it keeps.
+//! Node-ID and bit rate: what a device accepts, when it becomes active, and what is stored.
 
 use super::*;
 use std::collections::BTreeMap;
 
 const AWAY: Duration = Duration::from_millis(200);
 
-/// What comes until it has booted again.
+/// The frames until the device has booted again.
 fn later(bus: &mut MemoryBus) -> Vec<String> {
     let until = bus.now().mono + AWAY;
     hear(bus, until)
@@ -57,7 +57,7 @@ fn the_frames_of_a_dps_on_a_network() {
 }
 
 #[test]
-fn another_bit_rate_after_two_delays_of_silence() {
+fn bit_rate_changes_after_two_silent_delays() {
     let mut bus = bus([Setup { set: vec![(id("1017"), Scalar::Integer(100))], ..still("mh4", 5, 1.0) }]);
     play(
         &mut bus,
@@ -69,14 +69,14 @@ fn another_bit_rate_after_two_delays_of_silence() {
             ("605#4000100000000000", "-"),
         ],
     );
-    // 250 kbit/s again, so that what it says can be heard.
+    // Back to 250 kbit/s, so that its frames can be received.
     assert_eq!(timed(&mut bus, ms(2100)), [(2010, "705#7F".to_owned())]);
     assert!(!device(&mut bus).is_configuring());
     play(&mut bus, &[("605#4000100000000000", "585#4300100094018200")]);
 }
 
 #[test]
-fn a_bit_rate_that_is_not_stored_is_gone_with_the_power() {
+fn unstored_bit_rate_is_lost_at_power_off() {
     let mut bus = bus([still("mh4", 5, 1.0)]);
     play(
         &mut bus,
@@ -90,10 +90,10 @@ fn a_bit_rate_that_is_not_stored_is_gone_with_the_power() {
 }
 
 #[test]
-fn a_node_id_that_is_not_stored_lives_until_power_off() {
+fn unstored_node_id_is_lost_at_power_off() {
     let mut bus = bus([still("mh4", 5, 1.0)]);
     play(&mut bus, &[("7E5#0401000000000000", "705#00"), ("7E5#1107000000000000", "7E4#1100000000000000")]);
-    // Until the reset it is the old one.
+    // The old node-ID is active until the reset.
     play(&mut bus, &[("605#4020230000000000", "585#4320230005000000"), ("000#8205", "-")]);
     assert_eq!(later(&mut bus), ["707#00"]);
     assert!(!device(&mut bus).is_configuring(), "a reset ends the configuration state");
@@ -104,7 +104,7 @@ fn a_node_id_that_is_not_stored_lives_until_power_off() {
 }
 
 #[test]
-fn without_a_node_id_there_is_only_lss() {
+fn unconfigured_device_answers_lss_only() {
     let mut bus = bus([unconfigured("mh4")]);
     assert_eq!(later(&mut bus), [""; 0]);
     assert_eq!((device(&mut bus).node(), device(&mut bus).state()), (None, None));
@@ -130,7 +130,7 @@ fn without_a_node_id_there_is_only_lss() {
 }
 
 #[test]
-fn a_node_id_can_be_taken_away() {
+fn node_id_can_be_removed() {
     let mut bus = bus([still("mh4", 5, 1.0)]);
     play(&mut bus, &[("7E5#0401000000000000", "705#00"), ("7E5#11FF000000000000", "7E4#1100000000000000")]);
     play(&mut bus, &[("7E5#1700000000000000", "7E4#1700000000000000"), ("000#8205", "-")]);
@@ -139,7 +139,7 @@ fn a_node_id_can_be_taken_away() {
 }
 
 #[test]
-fn lss_is_heard_in_the_states_that_the_description_names() {
+fn lss_works_in_the_listed_states_only() {
     let mut bus = bus([still("d20", 5, 1.0)]);
     let select = ["7E5#4047000000000000", "7E5#4100000000000000", "7E5#4200000000000000", "7E5#4333750000000000"];
     let identity =
@@ -171,20 +171,20 @@ fn a_bit_rate_by_object() {
 }
 
 #[test]
-fn with_automatic_detection_a_read_gives_the_rate_found() {
+fn automatic_detection_reads_back_the_detected_rate() {
     let mut bus = bus([still("mh4", 5, 1.0)]);
     play(&mut bus, &[("605#2321230009736574", "705#00 585#6021230000000000")]);
     play(&mut bus, &[("605#2310100173617665", "585#6010100100000000"), ("000#8105", "-")]);
     later(&mut bus);
     assert_eq!((device(&mut bus).bit_rate(), device(&mut bus).stored().1), (None, None));
     play(&mut bus, &[("605#4021230000000000", "585#4321230003000000")]);
-    // Saving something else does not turn it off.
+    // Storing another group does not disable it.
     play(&mut bus, &[("605#2310100173617665", "585#6010100100000000")]);
     assert_eq!(device(&mut bus).stored().1, None);
 }
 
 #[test]
-fn answers_can_be_lost_late_and_thought_over() {
+fn answers_can_be_lost_late_and_slow() {
     let mut setup = still("mh4", 5, 1.0);
     setup.oddities.lose = vec![0x11];
     setup.oddities.late = BTreeMap::from([(0x17, Duration::from_millis(20))]);
@@ -202,10 +202,10 @@ fn answers_can_be_lost_late_and_thought_over() {
 }
 
 #[test]
-fn some_do_not_come_back() {
-    for (gone, last) in [(GoneAfter::Reset, "000#8105"), (GoneAfter::Activate, "7E5#1500000000000000")] {
+fn offline_after_a_reset_or_an_activation() {
+    for (gone, last) in [(OfflineAfter::Reset, "000#8105"), (OfflineAfter::Activate, "7E5#1500000000000000")] {
         let mut setup = still("mh4", 5, 1.0);
-        setup.oddities.gone_after = vec![gone];
+        setup.oddities.offline_after = vec![gone];
         let mut bus = bus([setup, still("mh4", 6, 1.0)]);
         hear(&mut bus, ms(1));
         play(&mut bus, &[("7E5#0401000000000000", "-")]);
@@ -220,7 +220,7 @@ fn some_do_not_come_back() {
 }
 
 #[test]
-fn those_that_keep_what_is_written_by_itself() {
+fn devices_that_store_a_written_node_id_themselves() {
     let mut bus = bus([still("hydac-old", 5, 1.0)]);
     ask(&mut bus, "605#2301200007736574");
     assert_eq!((device(&mut bus).node(), device(&mut bus).stored().0), (Some(node(5)), Some(node(7))));
@@ -229,7 +229,7 @@ fn those_that_keep_what_is_written_by_itself() {
 }
 
 #[test]
-fn those_that_keep_it_by_1010h() {
+fn devices_that_store_the_node_id_by_1010h() {
     let mut bus = bus([still("baumer", 5, 1.0)]);
     play(
         &mut bus,
@@ -247,7 +247,7 @@ fn those_that_keep_it_by_1010h() {
 }
 
 #[test]
-fn those_that_keep_it_by_a_sub_index_of_its_own() {
+fn devices_that_store_the_node_id_by_their_own_sub_index() {
     let entry = |at: &str, name: &str, kind: &str, more: &str| {
         format!("[[object]]\nat = \"{at}\"\nname = \"{name}\"\ntype = \"{kind}\"\naccess = \"rw\"\n{more}\n")
     };

@@ -1,9 +1,9 @@
-//! What a device keeps, forgets and is taught: storing, restoring, node-ID, zero.
+//! Stored values: store, restore, node-ID, autozero.
 
 use super::*;
 
 #[test]
-fn storing_restoring_and_what_a_reset_does_to_each() {
+fn store_restore_and_reset() {
     let mut bus = bus([still("mh4", 5, 5.0)]);
     let reset = |bus: &mut MemoryBus| {
         ask(bus, "000#8105");
@@ -34,7 +34,7 @@ fn storing_restoring_and_what_a_reset_does_to_each() {
     play(&mut bus, &[("605#4031610100000000", "585#4331610100004E00")]);
 }
 
-/// Why a restore without a reset ends with a warning: nothing shows it, and the store takes it back.
+/// The reason for the warning after a restore without a reset: nothing shows it, and a store cancels it.
 #[test]
 fn a_store_between_restore_and_reset_keeps_the_old_values() {
     for (kind, answers) in [("mh4", "43"), ("d20", "42"), ("dps", "42")] {
@@ -53,7 +53,7 @@ fn a_store_between_restore_and_reset_keeps_the_old_values() {
         ask(&mut bus, "605#2210100173617665");
         assert_eq!(reset(&mut bus, "000#8105"), ["705#00"]);
         assert_eq!(read(&mut bus), format!("585#{answers}316101{kpa}"), "{kind}: the store took the restore back");
-        // Without the store it holds.
+        // Without the store, the restore is effective.
         ask(&mut bus, "605#221110016C6F6164");
         assert_eq!(reset(&mut bus, "000#8105"), ["705#00"]);
         assert_eq!(read(&mut bus), as_delivered, "{kind}");
@@ -61,7 +61,7 @@ fn a_store_between_restore_and_reset_keeps_the_old_values() {
 }
 
 #[test]
-fn saving_everything_loses_the_identifiers_of_an_mh4() {
+fn mh4_store_all_resets_the_cob_ids() {
     for (sub, after) in [("01", "4300180185010040"), ("02", "43001801AA010040")] {
         let mut bus = bus([still("mh4", 5, 5.0)]);
         ask(&mut bus, "605#23001801850100C0");
@@ -76,7 +76,7 @@ fn saving_everything_loses_the_identifiers_of_an_mh4() {
 }
 
 #[test]
-fn a_node_id_with_its_signature_is_taken_at_the_reset_after_saving() {
+fn signed_node_id_is_active_after_store_and_reset() {
     let mut bus = bus([still("mh4", 5, 5.0)]);
     play(
         &mut bus,
@@ -118,7 +118,7 @@ fn autozero_and_the_extremes() {
 }
 
 #[test]
-fn the_scaling_factor_counts() {
+fn scaling_factor_is_applied() {
     let mut bus = bus([still("mh4", 5, 1.5)]);
     play(
         &mut bus,
@@ -130,7 +130,7 @@ fn the_scaling_factor_counts() {
     );
 }
 
-/// What a reset brings, from the boot-up on.
+/// The frames after a reset, from the boot-up on.
 fn reset(bus: &mut MemoryBus, command: &str) -> Vec<String> {
     ask(bus, command);
     let until = bus.now().mono + Duration::from_millis(150);
@@ -138,7 +138,7 @@ fn reset(bus: &mut MemoryBus, command: &str) -> Vec<String> {
 }
 
 #[test]
-fn a_d20_stores_and_restores_as_pages_12_and_13_have_it() {
+fn d20_stores_and_restores_as_on_pages_12_and_13() {
     let mut bus = bus([still("d20", 1, 0.5)]);
     play(
         &mut bus,
@@ -167,7 +167,7 @@ fn a_d20_stores_and_restores_as_pages_12_and_13_have_it() {
 }
 
 #[test]
-fn a_dps_zeroes_as_table_30_has_it_and_keeps_no_pdo_settings() {
+fn dps_autozero_follows_table_30_and_pdo_settings_are_not_stored() {
     let mut bus = bus([still("dps", 127, 0.5)]);
     play(
         &mut bus,

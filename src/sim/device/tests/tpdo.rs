@@ -1,9 +1,9 @@
-//! What makes a device send its TPDOs, and what stands in them.
+//! The causes of TPDOs, and their contents.
 
 use super::*;
 
 #[test]
-fn mh4_is_silent_until_somebody_sends_sync() {
+fn mh4_is_silent_without_sync() {
     let mut bus = bus([Setup::new(catalog::by_name("mh4").expect("built in"), node(5))]);
     assert_eq!(ask(&mut bus, "000#0105"), ["705#00"]);
     assert_eq!(hear(&mut bus, ms(60_000)), Vec::<String>::new());
@@ -54,7 +54,7 @@ fn dps_remaps_as_its_table_26_prints() {
 }
 
 #[test]
-fn d20_remaps_by_the_count_alone() {
+fn d20_mapping_needs_only_the_count_at_zero() {
     let mut bus = bus([still("d20", 2, 5.0)]);
     play(
         &mut bus,
@@ -79,12 +79,12 @@ fn d20_remaps_by_the_count_alone() {
 }
 
 #[test]
-fn mh4_remaps_only_while_the_pdo_is_off() {
+fn mh4_mapping_needs_an_invalid_pdo() {
     let mut bus = bus([still("mh4", 1, 5.0)]);
     play(
         &mut bus,
         &[
-            // 3.4.2, and each step out of order before it.
+            // 3.4.2, preceded by each step out of order.
             ("601#2F001A0000000000", "701#00 581#80001A0000000106"),
             ("601#2300180182010040", "581#8000180130000906"),
             ("601#23001801810100C0", "581#6000180100000000"),
@@ -118,13 +118,13 @@ fn every_nth_sync_and_if_changed() {
     assert_eq!(ask(&mut bus, "000#0105"), Vec::<String>::new());
     let answers: Vec<usize> = (0..9).map(|_| ask(&mut bus, "080#").len()).collect();
     assert_eq!(answers, [0, 0, 0, 1, 0, 0, 0, 1, 0]);
-    // Started anew, the count begins anew.
+    // After a restart the count restarts.
     ask(&mut bus, "000#8005");
     ask(&mut bus, "000#0105");
     let answers: Vec<usize> = (0..4).map(|_| ask(&mut bus, "080#").len()).collect();
     assert_eq!(answers, [0, 0, 0, 1]);
     play(&mut bus, &[("605#2F00180200000000", "585#6000180200000000")]);
-    // A moving value has changed with every SYNC; two SYNCs within one sample of 640 us have not.
+    // A moving value changes with every SYNC, except between two SYNCs within one sample of 640 us.
     assert_eq!(ask(&mut bus, "080#").len(), 1);
     assert_eq!(ask(&mut bus, "080#").len(), 1);
     for _ in 0..3 {
@@ -133,7 +133,7 @@ fn every_nth_sync_and_if_changed() {
     let until = bus.now().mono + Duration::from_millis(5);
     let changed = hear(&mut bus, until).len();
     assert!(changed < 3, "{changed}");
-    // Types that CiA reserves, and types that this device does not offer.
+    // Types that CiA reserves, and types that this device does not support.
     for kind in ["F1", "FB", "FC", "FD"] {
         assert_eq!(ask(&mut bus, &format!("605#2F001802{kind}000000")), ["585#8000180230000906"]);
     }
@@ -176,7 +176,7 @@ fn pressure(frame: &str) -> f32 {
 }
 
 #[test]
-fn passing_a_limit_outwards_sends_once() {
+fn passing_a_limit_sends_once() {
     let mut setup = still("mh4", 5, 5.0);
     setup.channels[0].amplitude = 1.0;
     setup.channels[0].period_s = 1.0;
@@ -196,8 +196,8 @@ fn passing_a_limit_outwards_sends_once() {
 }
 
 #[test]
-fn the_hysteresis_keeps_a_limit_from_being_passed_again() {
-    // 5 ± 1 never comes back by 2: each limit is passed once and for all.
+fn hysteresis_prevents_repeated_events() {
+    // 5 ± 1 never returns by 2: each limit is passed once.
     let mut setup = still("mh4", 5, 5.0);
     setup.channels[0].amplitude = 1.0;
     setup.channels[0].period_s = 1.0;
@@ -213,7 +213,7 @@ fn the_hysteresis_keeps_a_limit_from_being_passed_again() {
 }
 
 #[test]
-fn what_can_cause_an_event_can_change_while_running() {
+fn event_causes_can_change_while_operational() {
     let mut setup = still("mh4", 5, 5.0);
     setup.channels[0].amplitude = 1.05;
     setup.channels[0].period_s = 1.0;
@@ -226,7 +226,7 @@ fn what_can_cause_an_event_can_change_while_running() {
     assert_eq!(hear(&mut bus, ms(2000)).len(), 7);
 }
 
-/// A device with an inhibit time, which none of the built-in ones has.
+/// A device with an inhibit time; no built-in device has one.
 const INHIBITED: &str = r#"
     name = "inhibited"
     title = ""
@@ -282,7 +282,7 @@ const INHIBITED: &str = r#"
 "#;
 
 #[test]
-fn the_inhibit_time_keeps_events_apart() {
+fn inhibit_time_separates_events() {
     let run = |inhibit: i64| {
         let model = Arc::new(Model::from_toml(INHIBITED).expect("a description"));
         let mut setup = Setup::new(model, node(5));
@@ -300,14 +300,14 @@ fn the_inhibit_time_keeps_events_apart() {
     let gaps: Vec<u128> = heard[1..].windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
     assert!(heard.len() > 8 && gaps.iter().all(|gap| *gap >= 200), "{gaps:?}");
     assert!(gaps.contains(&200), "what was held back is sent as soon as it may: {gaps:?}");
-    // It changes only while the PDO is off.
+    // It can be changed only while the PDO is not valid.
     play(&mut held, &[("605#2B00180300000000", "585#8000180330000906")]);
     ask(&mut held, "605#2300180185010080");
     assert!(ask(&mut held, "605#2B00180300000000").contains(&"585#6000180300000000".to_owned()));
 }
 
 #[test]
-fn an_invalid_pdo_is_not_sent_and_a_moved_one_is_where_it_was_moved() {
+fn invalid_pdo_is_not_sent_and_a_new_cob_id_is_used() {
     let mut bus = bus([still("mh4", 5, 5.0)]);
     play(
         &mut bus,
@@ -317,7 +317,7 @@ fn an_invalid_pdo_is_not_sent_and_a_moved_one_is_where_it_was_moved() {
             ("080#", "-"),
             ("605#23001801AA010040", "585#6000180100000000"),
             ("080#", "1AA#0000A04000"),
-            // Restricted, 29 bits, a mapping written by mistake.
+            // Restricted, 29 bits, and a mapping entry by mistake.
             ("605#23001801AA0100C0", "585#6000180100000000"),
             ("605#2300180181050040", "585#8000180130000906"),
             ("605#2300180185010060", "585#8000180130000906"),
