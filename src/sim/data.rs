@@ -171,6 +171,16 @@ mod tests {
     }
 
     #[test]
+    fn a_value_with_a_default_is_constant() {
+        let text = "name='x'\ntitle=''\nvendor=''\n[[signal]]\nname='flow'\nchannel=1\nvalue='0x2000:1'\n[[object]]\n\
+                    at='0x2000:1'\nname='volume-flow'\ntype='r32'\naccess='ro'\npdo=true\n";
+        let channels = |text: &str| SimData::of(&Model::from_toml(text).expect("a description")).channels;
+        assert_eq!(channels(&format!("{text}default=12.5")), []);
+        let [channel] = &channels(text)[..] else { panic!("one channel") };
+        assert_eq!((channel.start, channel.base, channel.end), (0.0, 50.0, 100.0));
+    }
+
+    #[test]
     fn a_device_without_a_file_moves_in_the_middle_of_its_range() {
         let dps = by_name("dps").expect("built in");
         let [channel] = &SimData::generic(&dps).channels[..] else { panic!("one channel") };

@@ -164,6 +164,26 @@ fn the_description_can_be_said() {
 }
 
 #[test]
+fn mistakes_in_a_description_have_their_line() {
+    let bench = still();
+    let head = "name = \"mine\"\ntitle = \"Transmitter\"\nvendor = \"Maker\"\n\n";
+    let signal = |name: &str| format!("[[signal]]\nname = \"{name}\"\nchannel = 1\nvalue = \"0x6130:1\"\n\n");
+    let refuses = |text: String, message: &str| {
+        std::fs::write(bench.path("mine.toml"), text).expect("written");
+        bench.run("read 5 --device mine.toml").refuses(message);
+        bench.finish(&mut bench.command(&["-b", "sim:mine.toml@5", "read", "5"])).refuses(message);
+    };
+    let two = head.to_owned() + &signal("pressure") + &signal("temperature");
+    refuses(two, "mine.toml:12: channel: two signals have the channel 1");
+    let again = head.to_owned() + &signal("pressure") + &signal("pressure").replace("= 1", "= 2");
+    refuses(again, "mine.toml:11: name: two signals have the name \"pressure\"");
+    let none = head.to_owned() + &signal("pressure").replace("= 1", "= 0");
+    refuses(none, "mine.toml:7: channel: 0 is not in the range 1 to 199");
+    let unknown = head.to_owned() + "[sdo]\nsizes = \"omitted\"\n";
+    refuses(unknown, "mine.toml:6: unknown key \"sizes\" (known: size, expedited_only, block, aborts)");
+}
+
+#[test]
 fn who_has_it_not_is_excused_where_everybody_was_asked() {
     let done = Bench::of("mh4@1,mc1609@3").run("read all pressure -f json").exit(0);
     assert_eq!(done.stdout.lines().count(), 1, "{}", done.stdout);
