@@ -9,15 +9,15 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssignEntry {
     /// The method.
-    pub way: AssignWay,
+    pub way: AssignKind,
     /// The NMT state that the method requires; `None` for any.
     pub state: Option<AssignState>,
     /// Whether to retry in STOPPED if the device does not answer LSS.
     pub retry_stopped: bool,
     /// The object for the node-ID.
-    pub node_id: Option<AssignPlace>,
+    pub node_id: Option<AssignObject>,
     /// The object for the index of the bit rate.
-    pub bit_rate: Option<AssignPlace>,
+    pub bit_rate: Option<AssignObject>,
     /// The object that stores both, written with "save"; `None` if the device stores them by itself. LSS has its own
     /// store service.
     pub store: Option<ObjectId>,
@@ -35,7 +35,7 @@ impl AssignEntry {
     /// LSS as in CiA 305, for devices of which nothing else is known.
     pub fn lss() -> AssignEntry {
         AssignEntry {
-            way: AssignWay::Lss,
+            way: AssignKind::Lss,
             state: None,
             retry_stopped: false,
             node_id: None,
@@ -51,7 +51,7 @@ impl AssignEntry {
 
 /// The method by which a device takes its node-ID and bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AssignWay {
+pub enum AssignKind {
     /// LSS (CiA 305).
     Lss,
     /// Manufacturer-specific objects, written by SDO.
@@ -79,7 +79,7 @@ pub enum Applies {
 
 /// An object that takes a node-ID or the index of a bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AssignPlace {
+pub struct AssignObject {
     /// The object.
     pub object: ObjectId,
     /// Its type.
@@ -88,7 +88,7 @@ pub struct AssignPlace {
     pub signature: bool,
 }
 
-impl AssignPlace {
+impl AssignObject {
     /// The bytes that set `number`.
     ///
     /// # Errors
@@ -159,7 +159,7 @@ impl RateTable {
 }
 
 /// A bit rate in short form: `250k`, `1M`.
-pub fn spoken_rate(bit_rate: u32) -> String {
+pub fn short_bit_rate(bit_rate: u32) -> String {
     match bit_rate {
         mega if mega > 0 && mega.is_multiple_of(1_000_000) => format!("{}M", mega / 1_000_000),
         kilo if kilo > 0 && kilo.is_multiple_of(1_000) => format!("{}k", kilo / 1_000),
@@ -169,12 +169,12 @@ pub fn spoken_rate(bit_rate: u32) -> String {
 
 impl Description {
     /// The preferred method: the first that a document confirms.
-    pub fn assign_way(&self) -> Option<&AssignEntry> {
+    pub fn preferred_assign(&self) -> Option<&AssignEntry> {
         self.assign.iter().find(|entry| !entry.unverified)
     }
 
     /// The method of this kind, if the device has it.
-    pub fn assign_by(&self, way: AssignWay) -> Option<&AssignEntry> {
+    pub fn assign_of_kind(&self, way: AssignKind) -> Option<&AssignEntry> {
         self.assign.iter().find(|entry| entry.way == way)
     }
 }
@@ -206,20 +206,20 @@ mod tests {
     #[test]
     fn numbers_are_written_with_their_signature() {
         let mh4 = description("mh4");
-        assert_eq!(mh4.assign_way().map(|entry| entry.way), Some(AssignWay::Lss));
-        let objects = mh4.assign_by(AssignWay::Objects).expect("2320h and 2321h");
+        assert_eq!(mh4.preferred_assign().map(|entry| entry.way), Some(AssignKind::Lss));
+        let objects = mh4.assign_of_kind(AssignKind::Objects).expect("2320h and 2321h");
         assert_eq!(objects.node_id.map(|place| place.encode(3)), Some(Ok(b"\x03set".to_vec())));
         // HYDAC and Baumer take plain numbers without a signature.
         let baumer = description("baumer");
-        let objects = baumer.assign_way().expect("2100h and 2101h");
+        let objects = baumer.preferred_assign().expect("2100h and 2101h");
         assert_eq!(objects.node_id.map(|place| place.encode(3)), Some(Ok(vec![3])));
     }
 
     #[test]
     fn unverified_methods_are_not_preferred() {
         let d20 = description("d20");
-        assert_eq!(d20.assign_way().map(|entry| (entry.way, entry.retry_stopped)), Some((AssignWay::Lss, true)));
-        assert_eq!(d20.assign_by(AssignWay::Objects).map(|entry| entry.unverified), Some(true));
+        assert_eq!(d20.preferred_assign().map(|entry| (entry.way, entry.retry_stopped)), Some((AssignKind::Lss, true)));
+        assert_eq!(d20.assign_of_kind(AssignKind::Objects).map(|entry| entry.unverified), Some(true));
     }
 
     #[test]
@@ -228,8 +228,8 @@ mod tests {
             let Description { name, assign, .. } = &model.description;
             assert!(!assign.is_empty(), "{name}");
             for entry in assign {
-                let places: Vec<AssignPlace> = entry.node_id.into_iter().chain(entry.bit_rate).collect();
-                assert_eq!(places.is_empty(), entry.way == AssignWay::Lss, "{name}");
+                let places: Vec<AssignObject> = entry.node_id.into_iter().chain(entry.bit_rate).collect();
+                assert_eq!(places.is_empty(), entry.way == AssignKind::Lss, "{name}");
                 for place in places {
                     // An unverified object is not described.
                     let described = model.dictionary.get(place.object);

@@ -3,7 +3,7 @@
 use super::objects::Objects;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::device::assign::{Applies, AssignEntry, AssignPlace, AssignWay};
+use crate::device::assign::{Applies, AssignEntry, AssignKind, AssignObject};
 use crate::device::description::Description;
 
 /// The bit timing table 0 of CiA 305, in bit/s; 5 is reserved.
@@ -61,8 +61,8 @@ impl Settings {
             codes = STANDARD.map(|(code, rate)| (code, Rate::At(rate))).to_vec();
         }
         codes.extend(description.auto_bit_rate.map(|code| (code, Rate::Auto)));
-        let way = description.assign.iter().find(|entry| entry.way == AssignWay::Objects);
-        let place = |place: fn(&AssignEntry) -> Option<AssignPlace>| {
+        let way = description.assign.iter().find(|entry| entry.way == AssignKind::Objects);
+        let place = |place: fn(&AssignEntry) -> Option<AssignObject>| {
             let entry = way?;
             let object = place(entry)?.object;
             let needs_power_cycle = entry.applies == Applies::Power;

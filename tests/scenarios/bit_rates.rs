@@ -75,7 +75,7 @@ fn the_program_follows_a_device_and_the_rate_is_kept_only_when_it_is_stored() {
 
 #[test]
 fn a_device_that_does_not_come_back_acknowledges_nothing() {
-    let mut bus = bench("[[device]]\nkind = \"mh4\"\nnode = 5\ngone_after = [\"activate\"]\n");
+    let mut bus = bench("[[device]]\nkind = \"mh4\"\nnode = 5\noffline_after = [\"activate\"]\n");
     events(&mut bus, Duration::from_millis(100));
     activate(&mut bus);
     events(&mut bus, Duration::from_secs(2));
@@ -114,7 +114,8 @@ fn a_running_bus_is_heard_at_its_own_rate_only_and_not_disturbed() {
 
 #[test]
 fn two_that_answer_together_with_different_serial_numbers_are_seen() {
-    let mut bus = bench("[[device]]\nkind = \"mh4\"\nnode = 5\n[[device]]\nkind = \"mh4\"\nnode = 5\ntwin = true\n");
+    let mut bus =
+        bench("[[device]]\nkind = \"mh4\"\nnode = 5\n[[device]]\nkind = \"mh4\"\nnode = 5\nduplicate_id = true\n");
     // What they say alike comes once, as on a wire.
     let (frames, faults) = events(&mut bus, Duration::from_millis(100));
     assert_eq!((frames, faults), (vec!["705#00".to_owned()], vec![]));

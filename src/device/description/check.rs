@@ -3,7 +3,7 @@
 use super::table::Table;
 use super::*;
 use crate::canopen::value::DataType;
-use crate::device::assign::AssignWay;
+use crate::device::assign::AssignKind;
 use std::collections::BTreeSet;
 
 /// The tables of the file, for the lines of mistakes. Each list has the order of the list in [`Description`].
@@ -193,7 +193,7 @@ fn assign(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>)
         let places = [("node_id", entry.node_id), ("bit_rate", entry.bit_rate)];
         let places = places.into_iter().filter_map(|(key, place)| Some((key, place?)));
         let has_place = entry.node_id.is_some() || entry.bit_rate.is_some();
-        if has_place == (entry.way == AssignWay::Lss) {
+        if has_place == (entry.way == AssignKind::Lss) {
             table.mistake("way", "way: \"objects\" needs node_id or bit_rate, and \"lss\" has neither");
         }
         // Objects that only other documents mention are marked as unverified and are not described.

@@ -2,7 +2,7 @@
 
 use super::table::{Source, Table};
 use super::*;
-use crate::device::assign::AssignPlace;
+use crate::device::assign::AssignObject;
 use toml::de::DeTable;
 
 /// Reads a description.
@@ -140,11 +140,11 @@ fn assign_entry(table: &mut Table<'_>) -> Option<AssignEntry> {
     Some(AssignEntry { way: way?, state, retry_stopped, node_id, bit_rate, store, applies, unverified, page, doubt })
 }
 
-fn assign_place(table: &mut Table<'_>) -> Option<AssignPlace> {
+fn assign_place(table: &mut Table<'_>) -> Option<AssignObject> {
     let (object, data_type) = (table.required("object"), table.required("type"));
     let signature = table.or_default("signature");
     table.finish();
-    Some(AssignPlace { object: object?, data_type: data_type?, signature })
+    Some(AssignObject { object: object?, data_type: data_type?, signature })
 }
 
 fn startup_entry(table: &mut Table<'_>) -> Option<Startup> {

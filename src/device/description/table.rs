@@ -287,7 +287,7 @@ words!(super::ErrorHistory {
     "code-low-bytes-swapped" => CodeLowBytesSwapped,
     "code-high" => CodeHigh,
 });
-words!(crate::device::assign::AssignWay { "lss" => Lss, "objects" => Objects });
+words!(crate::device::assign::AssignKind { "lss" => Lss, "objects" => Objects });
 words!(crate::device::assign::AssignState { "pre-operational" => PreOperational, "stopped" => Stopped });
 words!(crate::device::assign::Applies { "reset" => Reset, "power" => Power });
 words!(crate::device::quirk::Quirk {

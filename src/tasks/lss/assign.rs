@@ -13,7 +13,7 @@ use super::ways::{PlannedRate, Rate, plan_rate, way};
 use super::{Note, Target, Tell, Via};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
-use crate::device::assign::{AssignEntry, AssignWay, RateSource, RateTable};
+use crate::device::assign::{AssignEntry, AssignKind, RateSource, RateTable};
 use crate::device::catalog::Model;
 use crate::master::{Lss, LssError, Master};
 use crate::node::Overrides;
@@ -146,7 +146,7 @@ fn carry_out(
     // Reset, it would come back at a bit rate at which nobody here hears it.
     let new = job.id.filter(|_| follows || !host.is_left_behind());
     let booted = match way.way {
-        AssignWay::Lss => {
+        AssignKind::Lss => {
             let session = by_lss(master, job, subject, way, rate.filter(|_| !follows), done, tell)?;
             // A reset puts the NMT state to rights by itself.
             if new.is_none() {
@@ -154,7 +154,7 @@ fn carry_out(
             }
             new.is_some_and(|new| session.booted.contains(&new))
         }
-        AssignWay::Objects => {
+        AssignKind::Objects => {
             by_objects(master, subject, way, job.store, done)?;
             false
         }

@@ -8,7 +8,7 @@ use super::ways::place;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::DownloadSize;
-use crate::device::assign::{AssignEntry, AssignPlace};
+use crate::device::assign::{AssignEntry, AssignObject};
 use crate::device::description::SizeIndication;
 use crate::master::{Error, Master, Request, SdoError, SdoFailure};
 use crate::tasks::{Failure, Kind};
@@ -43,7 +43,7 @@ pub(super) fn by_objects(
     result
 }
 
-type Number = Option<(AssignPlace, u8)>;
+type Number = Option<(AssignObject, u8)>;
 
 fn write_all(
     master: &mut Master<'_>,
@@ -76,7 +76,7 @@ fn write(
     master: &mut Master<'_>,
     subject: &Subject,
     node: NodeId,
-    at: AssignPlace,
+    at: AssignObject,
     number: u8,
     stage: &mut Stage,
 ) -> Result<(), Failure> {
@@ -109,8 +109,8 @@ fn size(subject: &Subject) -> DownloadSize {
 }
 
 /// What the object holds: its lowest byte. A device that does not tell cannot be put back, no more.
-fn read(master: &mut Master<'_>, node: NodeId, at: Option<AssignPlace>) -> Result<Before, Error> {
-    let Some(object) = at.map(|at: AssignPlace| -> ObjectId { at.object }) else { return Ok(None) };
+fn read(master: &mut Master<'_>, node: NodeId, at: Option<AssignObject>) -> Result<Before, Error> {
+    let Some(object) = at.map(|at: AssignObject| -> ObjectId { at.object }) else { return Ok(None) };
     match master.transfer_one(Request::read(node, object))? {
         Ok(answer) => Ok(answer.uploaded.and_then(|uploaded| uploaded.bytes.first().copied())),
         Err(SdoError { .. }) => Ok(None),

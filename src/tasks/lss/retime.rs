@@ -12,7 +12,7 @@ use super::{Note, Tell};
 use crate::bus::{Filters, Mono};
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::NmtCommand;
-use crate::device::assign::{Applies, AssignEntry, AssignWay, RateTable, spoken_rate};
+use crate::device::assign::{Applies, AssignEntry, AssignKind, RateTable, short_bit_rate};
 use crate::master::{Happening, Master};
 use crate::tasks::host::{by_hand, not_set};
 use crate::tasks::{Failure, Kind};
@@ -81,7 +81,7 @@ impl<'a> Retiming<'a> {
         let old = master.bus().bit_rate().ok_or_else(|| refuse("the interface has no bit rate"))?;
         let name = master.bus().name().to_owned();
         master.bus().can_set_bit_rate().map_err(|error| not_set(error, &by_hand(&name, Some(new))))?;
-        if way.way == AssignWay::Objects && (way.applies == Applies::Power || !job.store) {
+        if way.way == AssignKind::Objects && (way.applies == Applies::Power || !job.store) {
             let why =
                 if job.store { "it takes the new rate at power on" } else { "it takes the new rate after storing" };
             return Err(refuse(why));
@@ -97,10 +97,10 @@ impl<'a> Retiming<'a> {
     /// A device that is not heard at the new rate. The host is then back at the old one.
     pub(super) fn carry_out(&self, master: &mut Master<'_>, done: &mut Done, tell: Tell<'_>) -> Result<bool, Failure> {
         match self.way.way {
-            AssignWay::Lss => self.by_lss(master, done, tell)?,
-            AssignWay::Objects => self.by_storing(master, done, tell)?,
+            AssignKind::Lss => self.by_lss(master, done, tell)?,
+            AssignKind::Objects => self.by_storing(master, done, tell)?,
         }
-        Ok(self.job.id.is_none() || self.way.way == AssignWay::Objects)
+        Ok(self.job.id.is_none() || self.way.way == AssignKind::Objects)
     }
 
     fn by_lss(&self, master: &mut Master<'_>, done: &mut Done, tell: Tell<'_>) -> Result<(), Failure> {
@@ -123,7 +123,7 @@ impl<'a> Retiming<'a> {
             (Err(failure), Some(_)) => return Err(self.go_back(master, failure, (master.now(), None), done, tell)),
         };
         let begun = activated.unwrap_or_else(|| master.now());
-        let (name, new) = (subject.name(), spoken_rate(self.new));
+        let (name, new) = (subject.name(), short_bit_rate(self.new));
         tell(Note::Step(format!("{name} goes to {new} in {DELAY_MS} ms, this side too")));
         let followed = self.follow(master, begun);
         let followed = followed.map_err(|failure| self.go_back(master, failure, (begun, before), done, tell));
@@ -159,7 +159,7 @@ impl<'a> Retiming<'a> {
         if is_there(master, self.subject, self.subject.node)? {
             return Ok(());
         }
-        let message = format!("it does not answer at {}", spoken_rate(self.new));
+        let message = format!("it does not answer at {}", short_bit_rate(self.new));
         Err(self.subject.failure(Kind::NoAnswer, message))
     }
 
@@ -172,7 +172,7 @@ impl<'a> Retiming<'a> {
         done: &mut Done,
         tell: Tell<'_>,
     ) -> Failure {
-        let (subject, old, new) = (self.subject, spoken_rate(self.old), spoken_rate(self.new));
+        let (subject, old, new) = (self.subject, short_bit_rate(self.old), short_bit_rate(self.new));
         if master.bus().bit_rate() != Some(self.old)
             && let Err(error) = set(master, self.old)
         {
@@ -204,7 +204,7 @@ impl<'a> Retiming<'a> {
 
     /// The way of devices that have to store before the new rate is in force.
     fn by_storing(&self, master: &mut Master<'_>, done: &mut Done, tell: Tell<'_>) -> Result<(), Failure> {
-        let (subject, new) = (self.subject, spoken_rate(self.new));
+        let (subject, new) = (self.subject, short_bit_rate(self.new));
         tell(Note::Warning(format!(
             "{} stores before it goes to {new}: there is no way back from here",
             subject.name()
@@ -222,7 +222,7 @@ impl<'a> Retiming<'a> {
             return Ok(());
         }
         let back = match set(master, self.old) {
-            Ok(()) => format!("this side is back at {}", spoken_rate(self.old)),
+            Ok(()) => format!("this side is back at {}", short_bit_rate(self.old)),
             Err(error) => format!("this side is at {new}: {error}"),
         };
         done.retimed = false;

@@ -7,7 +7,7 @@ use super::{Note, Target, Tell, Via};
 use crate::bus::Filters;
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
-use crate::device::assign::AssignWay;
+use crate::device::assign::AssignKind;
 use crate::device::catalog::{self, Model};
 use crate::master::Master;
 use crate::node::Overrides;
@@ -69,9 +69,9 @@ impl Subject {
 
     /// Whether it is LSS by which it takes its node-ID.
     fn uses_lss(&self, via: Via) -> bool {
-        let way = self.model.as_ref().and_then(|model| model.description.assign_way());
+        let way = self.model.as_ref().and_then(|model| model.description.preferred_assign());
         match via {
-            Via::Auto => way.is_none_or(|way| way.way == AssignWay::Lss),
+            Via::Auto => way.is_none_or(|way| way.way == AssignKind::Lss),
             Via::Lss => true,
             Via::Sdo => false,
         }

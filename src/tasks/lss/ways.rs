@@ -3,7 +3,7 @@
 use super::subject::Subject;
 use super::{Note, Tell, Via};
 use crate::canopen::object::ObjectId;
-use crate::device::assign::{AssignEntry, AssignPlace, AssignWay, RateSource, RateTable, spoken_rate};
+use crate::device::assign::{AssignEntry, AssignKind, AssignObject, RateSource, RateTable, short_bit_rate};
 use crate::device::description::Description;
 use crate::device::quirk::Quirk;
 use crate::tasks::{Failure, Kind};
@@ -42,7 +42,7 @@ impl PlannedRate {
 impl fmt::Display for PlannedRate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.bits {
-            Some(bits) => f.write_str(&spoken_rate(bits)),
+            Some(bits) => f.write_str(&short_bit_rate(bits)),
             None if self.is_auto => f.write_str("auto"),
             None => write!(f, "index {}", self.index),
         }
@@ -61,10 +61,10 @@ const STORE_ALL: ObjectId = ObjectId::new(0x1010, 1);
 pub(super) fn way(subject: &Subject, via: Via, store: bool, tell: Tell<'_>) -> Result<AssignEntry, Failure> {
     let description = subject.model.as_ref().map(|model| &model.description);
     let entry = match via {
-        Via::Auto => description.and_then(Description::assign_way).cloned(),
-        Via::Lss => description.and_then(|description| description.assign_by(AssignWay::Lss)).cloned(),
+        Via::Auto => description.and_then(Description::preferred_assign).cloned(),
+        Via::Lss => description.and_then(|description| description.assign_of_kind(AssignKind::Lss)).cloned(),
         Via::Sdo => {
-            let entry = description.and_then(|description| description.assign_by(AssignWay::Objects)).cloned();
+            let entry = description.and_then(|description| description.assign_of_kind(AssignKind::Objects)).cloned();
             Some(entry.ok_or_else(|| {
                 let message = "no source at hand says which objects of this device take node-ID and bit rate";
                 subject
@@ -74,7 +74,7 @@ pub(super) fn way(subject: &Subject, via: Via, store: bool, tell: Tell<'_>) -> R
         }
     };
     let entry = entry.unwrap_or_else(AssignEntry::lss);
-    if entry.way == AssignWay::Objects && (subject.node.is_none() || !subject.alone) {
+    if entry.way == AssignKind::Objects && (subject.node.is_none() || !subject.alone) {
         let message =
             "its objects cannot be reached: SDO under its node-ID does not reach it alone; nothing was changed";
         return Err(subject.failure(Kind::CheckFailed, message).hint("connect it alone, or by LSS: --via lss"));
@@ -99,18 +99,22 @@ pub(super) fn way(subject: &Subject, via: Via, store: bool, tell: Tell<'_>) -> R
 ///
 /// # Errors
 /// [`Kind::Usage`] with the list of what the device offers.
-pub(super) fn plan_rate(description: Option<&Description>, rate: Rate, way: AssignWay) -> Result<PlannedRate, Failure> {
+pub(super) fn plan_rate(
+    description: Option<&Description>,
+    rate: Rate,
+    way: AssignKind,
+) -> Result<PlannedRate, Failure> {
     let table = RateTable::of(description);
     let title = description.map_or("CiA 305", |description| &description.title);
     let refuse = |what: String| {
-        let mut list: Vec<String> = table.rates().into_iter().map(spoken_rate).collect();
+        let mut list: Vec<String> = table.rates().into_iter().map(short_bit_rate).collect();
         list.extend(table.auto().map(|_| "auto".to_owned()));
         let list = list.join(", ");
         let source = if table.source == RateSource::Standard { "the table of CiA 305" } else { "its table" };
         Failure::new(Kind::Usage, format!("{title} has no bit rate {what}: nothing was changed"))
             .hint(format!("{source} has {list}; another by its index: --table-index N"))
     };
-    if way == AssignWay::Objects && table.source == RateSource::Standard && !matches!(rate, Rate::Index(..)) {
+    if way == AssignKind::Objects && table.source == RateSource::Standard && !matches!(rate, Rate::Index(..)) {
         let message = format!("the codes that {title} has for bit rates are not known: nothing was changed");
         return Err(Failure::new(Kind::Usage, message).hint("look it up in its manual: --table-index N"));
     }
@@ -125,7 +129,7 @@ pub(super) fn plan_rate(description: Option<&Description>, rate: Rate, way: Assi
         Rate::Bits(bits) => table
             .index_of(bits)
             .map(|index| PlannedRate { index, bits: Some(bits), is_auto: false })
-            .ok_or_else(|| refuse(spoken_rate(bits))),
+            .ok_or_else(|| refuse(short_bit_rate(bits))),
     }
 }
 
@@ -135,9 +139,9 @@ pub(super) fn plan_rate(description: Option<&Description>, rate: Rate, way: Assi
 /// [`Kind::Usage`] with the list of what the device offers.
 pub fn check_rate(description: &Description, rate: Rate, via: Via) -> Result<(), Failure> {
     let way = match via {
-        Via::Auto => description.assign_way().map_or(AssignWay::Lss, |entry| entry.way),
-        Via::Lss => AssignWay::Lss,
-        Via::Sdo => AssignWay::Objects,
+        Via::Auto => description.preferred_assign().map_or(AssignKind::Lss, |entry| entry.way),
+        Via::Lss => AssignKind::Lss,
+        Via::Sdo => AssignKind::Objects,
     };
     plan_rate(Some(description), rate, way).map(|_| ())
 }
@@ -148,16 +152,16 @@ pub fn check_rate(description: &Description, rate: Rate, via: Via) -> Result<(),
 /// [`Kind::Usage`] where only what is stored comes into force, or where it lasts as soon as it is written.
 pub fn check_store(description: &Description, store: bool, via: Via) -> Result<(), Failure> {
     let entry = match via {
-        Via::Auto => description.assign_way(),
+        Via::Auto => description.preferred_assign(),
         Via::Lss => None,
-        Via::Sdo => description.assign_by(AssignWay::Objects),
+        Via::Sdo => description.assign_of_kind(AssignKind::Objects),
     };
     let checked = entry.map_or(Ok(()), |entry| check_lasts(entry, store));
     checked.map_err(|message| Failure::new(Kind::Usage, message).hint(STORE_IT))
 }
 
 fn check_lasts(entry: &AssignEntry, store: bool) -> Result<(), String> {
-    if store || entry.way != AssignWay::Objects {
+    if store || entry.way != AssignKind::Objects {
         return Ok(());
     }
     let why = match entry.store {
@@ -171,7 +175,7 @@ fn check_lasts(entry: &AssignEntry, store: bool) -> Result<(), String> {
 ///
 /// # Errors
 /// A device that has none for it.
-pub(super) fn place(subject: &Subject, place: Option<AssignPlace>, what: &str) -> Result<AssignPlace, Failure> {
+pub(super) fn place(subject: &Subject, place: Option<AssignObject>, what: &str) -> Result<AssignObject, Failure> {
     place.ok_or_else(|| {
         let message = format!("no source at hand says which object takes its {what}: nothing was changed");
         subject.failure(Kind::CheckFailed, message).hint("by LSS: --via lss")

@@ -5,7 +5,7 @@ use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
-use cangauge::device::assign::spoken_rate;
+use cangauge::device::assign::short_bit_rate;
 use cangauge::master::{Master, Timing};
 use cangauge::node::Overrides;
 use cangauge::output::failure::ErrorMessage;
@@ -389,6 +389,6 @@ fn a_bit_rate_that_the_device_does_not_have_is_refused_with_the_list() {
         (Some((Some(100_000), 5)), Confirmed::Acknowledge)
     );
     let stored = bus.stations::<Device>().map(|device| device.stored().1).collect::<Vec<_>>();
-    assert_eq!(stored[3].map(spoken_rate).as_deref(), Some("100k"));
+    assert_eq!(stored[3].map(short_bit_rate).as_deref(), Some("100k"));
     assert_eq!(all_held(&bus)[..3], before[..3]);
 }
