@@ -3,7 +3,6 @@
 use super::Global;
 use super::args::{BusSpec, Nodes};
 use super::exit::{FileError, IntoFailure};
-use super::read::everybody;
 use crate::bus::Bus;
 use crate::bus::claim::{ClaimError, Claims, IfHeld, Part};
 use crate::bus::interrupt::Interrupts;
@@ -14,7 +13,7 @@ use crate::canopen::id::NodeId;
 use crate::device::catalog::{self, Model};
 use crate::device::eds;
 use crate::master::Master;
-use crate::node::Overrides;
+use crate::node::{Overrides, targets};
 use crate::sim::{Bench, BenchError};
 use crate::tasks::{Failure, Kind};
 use std::fs::File;
@@ -203,10 +202,18 @@ fn model(what: &str, eds: bool, global: &Global) -> anyhow::Result<Arc<Model>> {
     Ok(Arc::new(Model::from_toml(&text).map_err(|error| Failure::new(Kind::Usage, error.in_file(what)))?))
 }
 
-/// The nodes meant; `all` are those that a scan finds.
+/// The nodes meant; for `all` see [`targets`].
 pub(super) fn nodes(master: &mut Master<'_>, global: &Global, nodes: &Nodes) -> anyhow::Result<Vec<NodeId>> {
     match nodes {
         Nodes::These(nodes) => Ok(nodes.clone()),
-        Nodes::All => everybody(master, global),
+        Nodes::All => {
+            let timing = global.timing(super::scan::SCAN_TIMEOUT);
+            let nodes = targets::all(master, timing.timeout, 1 + timing.retries).or_fail()?;
+            if nodes.is_empty() {
+                let failure = Failure::new(Kind::NoAnswer, "no node answered");
+                return Err(failure.hint("find the cause: cangauge scan").into());
+            }
+            Ok(nodes)
+        }
     }
 }

@@ -4,9 +4,7 @@ use super::args::{Nodes, SignalArg};
 use super::exit::{IntoFailure, several, stdout};
 use super::{Format, Global, open};
 use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
-use crate::master::Master;
 use crate::measure::decode::Wanted;
 use crate::measure::sample::{Number, Sample, Status};
 use crate::output::failure::ErrorMessage;
@@ -161,18 +159,4 @@ fn print(shown: &[Shown], format: Format, bare: bool) -> io::Result<Option<Failu
     }
     out.flush()?;
     Ok(None)
-}
-
-/// Kept here so that every command resolves `all` alike.
-pub(super) fn everybody(master: &mut Master<'_>, global: &Global) -> anyhow::Result<Vec<NodeId>> {
-    let all: Vec<NodeId> = NodeId::all().collect();
-    let timing = global.timing(std::time::Duration::from_millis(200));
-    let found =
-        crate::tasks::scan::scan(master, &all, timing.timeout, 1 + timing.retries, &Default::default()).or_fail()?;
-    let nodes: Vec<NodeId> =
-        found.into_iter().filter(|found| found.failure.is_none()).map(|found| found.node).collect();
-    if nodes.is_empty() {
-        return Err(Failure::new(Kind::NoAnswer, "nobody answered").hint("cangauge scan tells more").into());
-    }
-    Ok(nodes)
 }

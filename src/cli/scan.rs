@@ -16,7 +16,7 @@ use std::time::Duration;
 const LISTEN: Duration = Duration::from_secs(3);
 
 /// The wait after the last request.
-const WAIT: Duration = Duration::from_millis(200);
+pub(super) const SCAN_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// List every node that answers, with its state, identity and recognised device
 ///
@@ -52,8 +52,8 @@ impl Scan {
                 let long = if master.bus().is_live() { LISTEN } else { Duration::MAX };
                 listen(master, &nodes, global.timeout.map_or(long, |timeout| timeout.0)).or_fail()?
             } else {
-                let wait = global.timing(WAIT).timeout;
-                let rounds = 1 + global.timing(WAIT).retries;
+                let wait = global.timing(SCAN_TIMEOUT).timeout;
+                let rounds = 1 + global.timing(SCAN_TIMEOUT).retries;
                 scan(master, &nodes, wait, rounds, &overrides).or_fail()?
             };
             Ok((found, master.now().since(begun)))
@@ -79,10 +79,10 @@ impl Scan {
 
 fn nobody(passive: bool) -> Failure {
     if passive {
-        return Failure::new(Kind::NoAnswer, "nobody showed itself")
-            .hint("without heartbeats and TPDOs a node is silent; ask: cangauge scan");
+        return Failure::new(Kind::NoAnswer, "no node sent anything")
+            .hint("a node without heartbeat and TPDOs sends nothing; ask it: cangauge scan");
     }
-    Failure::new(Kind::NoAnswer, "nobody answered").hint(
+    Failure::new(Kind::NoAnswer, "no node answered").hint(
         "check the sensor's power, the bit rate, the wiring and the 120 ohm terminators; without hardware: --bus sim",
     )
 }

@@ -5,6 +5,7 @@
 //! - [`write`]: writes an object in the form that the node accepts, and says how it was confirmed;
 //! - [`wait`]: receives frames until a deadline, with one policy for Ctrl-C, link down and the end of a recording;
 //! - [`state`]: NMT states, commands, reset and the restart;
+//! - [`scan`] and [`targets`]: the nodes on the bus, and those that `all` means;
 //! - [`names`]: the objects, types and signals behind names.
 //!
 //! Errors are types ([`Error`]); their texts are in `output`.
@@ -13,8 +14,10 @@ mod error;
 mod facts;
 pub mod names;
 pub mod read;
+pub mod scan;
 pub mod state;
 pub mod survey;
+pub mod targets;
 pub mod wait;
 pub mod write;
 

@@ -340,3 +340,46 @@ pub fn identify_late(master: &mut Master<'_>, node: &mut Node) -> Result<(), Err
     }
     Ok(())
 }
+
+/// Like [`survey_nodes`], with one result for each node: a node that fails does not affect the others.
+///
+/// # Errors
+/// Bus errors and Ctrl-C.
+pub fn survey_each(
+    master: &mut Master<'_>,
+    nodes: &[NodeId],
+    overrides: &Overrides,
+) -> Result<Vec<Result<Node, SdoError>>, Error> {
+    each(master, nodes, &mut |master, nodes| survey_nodes(master, nodes, overrides))
+}
+
+/// Like [`identify`], with one result for each node: a node that fails does not affect the others.
+///
+/// # Errors
+/// Bus errors and Ctrl-C.
+pub fn identify_each(
+    master: &mut Master<'_>,
+    nodes: &[NodeId],
+    overrides: &Overrides,
+) -> Result<Vec<Result<Node, SdoError>>, Error> {
+    each(master, nodes, &mut |master, nodes| identify(master, nodes, overrides))
+}
+
+/// Reads all nodes in parallel; if one of them fails, each alone.
+fn each(
+    master: &mut Master<'_>,
+    nodes: &[NodeId],
+    read: &mut dyn FnMut(&mut Master<'_>, &[NodeId]) -> Result<Vec<Node>, Error>,
+) -> Result<Vec<Result<Node, SdoError>>, Error> {
+    match read(master, nodes) {
+        Ok(all) => return Ok(all.into_iter().map(Ok).collect()),
+        Err(Error::Sdo(error)) if nodes.len() == 1 => return Ok(vec![Err(error)]),
+        Err(Error::Sdo(_)) => {}
+        Err(error) => return Err(error),
+    }
+    let mut results = Vec::new();
+    for node in nodes {
+        results.extend(each(master, &[*node], read)?);
+    }
+    Ok(results)
+}

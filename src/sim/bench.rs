@@ -16,6 +16,7 @@
 //! bit_rate = 125000          # at a different bit rate than the bus, the device neither receives nor sends
 //! latency = "300us"          # response time
 //! offline_after = ["reset"]  # after this, the device is offline until a power cycle; or "activate"
+//! answers_only = ["0x1000"]  # no answer to SDO requests for any other object
 //! serial = 4711
 //! start = true               # becomes OPERATIONAL by itself
 //! set = { "0x1017" = 100, "0x1800:5" = 100 }   # stored values

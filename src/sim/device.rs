@@ -268,6 +268,11 @@ impl Device {
     }
 
     fn serve(&mut self, request: [u8; 8], now: Mono, out: &mut Outbox) {
+        let object = ObjectId::from_multiplexer([request[1], request[2], request[3]]);
+        let answered = &self.setup.oddities.answers_only;
+        if !answered.is_empty() && !answered.contains(&object) {
+            return;
+        }
         let pre_operational = self.phase == Phase::Running(State::PreOperational);
         let mut access = self.memory.at(now.since_start(), pre_operational);
         let was_giving = self.sdo.is_giving();

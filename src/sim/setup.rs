@@ -53,6 +53,8 @@ pub struct Oddities {
     pub refuse: BTreeMap<u8, u8>,
     /// Whether it answers every fastscan frame in configuration state, as CANopenNode does.
     pub endless_fastscan: bool,
+    /// If not empty, only SDO requests for these objects are answered.
+    pub answers_only: Vec<ObjectId>,
     /// Events after which it is offline until a power cycle.
     pub offline_after: Vec<OfflineAfter>,
 }

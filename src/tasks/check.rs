@@ -12,9 +12,10 @@ use crate::measure::expression::bind::AvailableSignals;
 use crate::measure::expression::evaluator::Evaluator;
 use crate::measure::expression::verdict::{MissingData, Outcome, Reason, Verdict};
 use crate::measure::sample::{Sample, Source};
+use crate::node::survey::survey_each;
 use crate::node::{Node, Overrides};
 use crate::tasks::log::{self, Mode, Note, Observer, RecordingReport, Remark, log};
-use crate::tasks::read::{Target, requests, sample, surveyed, targets};
+use crate::tasks::read::{Target, requests, sample, targets};
 use crate::tasks::{Failure, Kind};
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
@@ -110,12 +111,12 @@ pub fn check(
 fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<CheckReport, Failure> {
     master.listen_to(&options.nodes)?;
     let (mut known, mut failures, mut missing) = (Vec::new(), Vec::new(), Vec::new());
-    for (&node, result) in options.nodes.iter().zip(surveyed(master, &options.nodes, &options.overrides)?) {
+    for (&node, result) in options.nodes.iter().zip(survey_each(master, &options.nodes, &options.overrides)?) {
         match result {
             Ok(node) => known.push(node),
             Err(failure) => {
                 missing.push(MissingData { node, signal: None, reason: Reason::Failed(failures.len()) });
-                failures.push(failure);
+                failures.push(failure.into());
             }
         }
     }

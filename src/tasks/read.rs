@@ -14,7 +14,7 @@ use crate::measure::layout::Signal;
 use crate::measure::sample::{Sample, Source};
 use crate::node::Node;
 use crate::node::Overrides;
-use crate::node::survey::survey_nodes;
+use crate::node::survey::survey_each;
 use crate::tasks::{Failure, Kind};
 
 /// One thing to be read of a node: how, and what it is.
@@ -161,35 +161,11 @@ pub fn read(
     overrides: &Overrides,
 ) -> Result<Vec<Result<Readings, Failure>>, Error> {
     master.listen_to(nodes)?;
-    let planned: Vec<Result<Vec<Target>, Failure>> = surveyed(master, nodes, overrides)?
-        .into_iter()
-        .map(|instrument| instrument.and_then(|instrument| targets(&instrument, wanted, &mut 0)))
-        .collect();
+    let planned: Vec<Result<Vec<Target>, Failure>> =
+        survey_each(master, nodes, overrides)?.into_iter().map(|node| targets(&node?, wanted, &mut 0)).collect();
     let asked = planned.iter().flatten().flatten().flat_map(requests).collect();
     let mut answers = master.transfer(asked, &mut |_| {})?.into_iter();
     Ok(planned.into_iter().map(|targets| readings(targets?, &mut answers)).collect())
-}
-
-/// Every node's instrument; where one of them does not answer, each is asked for itself.
-///
-/// # Errors
-/// What stops everything.
-pub(super) fn surveyed(
-    master: &mut Master<'_>,
-    nodes: &[NodeId],
-    overrides: &Overrides,
-) -> Result<Vec<Result<Node, Failure>>, Error> {
-    match survey_nodes(master, nodes, overrides) {
-        Ok(all) => return Ok(all.into_iter().map(Ok).collect()),
-        Err(Error::Sdo(error)) if nodes.len() == 1 => return Ok(vec![Err(error.into())]),
-        Err(Error::Sdo(_)) => {}
-        Err(error) => return Err(error),
-    }
-    let mut each = Vec::new();
-    for node in nodes {
-        each.extend(surveyed(master, &[*node], overrides)?);
-    }
-    Ok(each)
 }
 
 /// The samples of one node's targets, out of the answers to [`requests`]. All of its answers are taken,

@@ -6,6 +6,7 @@ mod autozero;
 mod bus;
 mod check;
 mod examples;
+mod half_dead;
 mod hostile;
 mod info;
 mod log;

@@ -77,7 +77,7 @@ fn nobody_is_exit_3() {
     let bench = Bench::of("mh4@5");
     bench.run("scan 6-9").fails(
         3,
-        "cangauge: nobody answered\n\
+        "cangauge: no node answered\n\
          hint: check the sensor's power, the bit rate, the wiring and the 120 ohm terminators; \
          without hardware: --bus sim\n",
     );

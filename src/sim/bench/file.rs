@@ -62,6 +62,8 @@ pub(super) struct DeviceEntry {
     #[serde(default, deserialize_with = "duration")]
     latency: Duration,
     #[serde(default)]
+    answers_only: Vec<ObjectId>,
+    #[serde(default)]
     offline_after: Vec<OfflineName>,
     #[serde(default)]
     lss: LssEntry,
@@ -184,6 +186,7 @@ impl DeviceEntry {
             late: self.lss.late.iter().map(|(service, late)| (service.0, late.0)).collect(),
             refuse: self.lss.refuse.iter().map(|(service, code)| (service.0, *code)).collect(),
             endless_fastscan: self.lss.endless_fastscan,
+            answers_only: self.answers_only.clone(),
             offline_after: self.offline_after.iter().map(|name| OfflineAfter::from(*name)).collect(),
         };
         setup.serial = self.serial.unwrap_or(setup.serial.wrapping_add(before));

@@ -1,0 +1,202 @@
+//! Finds the nodes on the bus.
+
+use super::wait::{Policy, wait};
+use crate::bus::{Filters, Mono, Received};
+use crate::canopen::emcy::Emergency;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::nmt::{Life, NmtState};
+use crate::canopen::object::ObjectId;
+use crate::master::{Error, Happening, Master, Request, SdoFailure, Ticket};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
+
+/// The bits on the wire of a full transmit queue of 10 frames, each with its answer.
+const FULL_QUEUE_BITS: u64 = 10 * 2 * 135;
+
+/// The time from the first requests to their repetition.
+const REPEAT_INTERVAL: Duration = Duration::from_millis(50);
+
+/// How long to wait for heartbeats after the last requests.
+const HEARTBEAT_TIMEOUT: Duration = Duration::from_millis(200);
+
+/// The nodes that showed themselves.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Presence {
+    /// Nodes that answered an SDO request.
+    pub answered: BTreeSet<NodeId>,
+    /// Nodes that showed another sign of life, with their state if a heartbeat showed it.
+    pub states: BTreeMap<NodeId, Option<NmtState>>,
+    /// Frames with the identifier of a TPDO of the predefined connection set, by the node that it belongs to there.
+    pub tpdos: BTreeMap<NodeId, BTreeSet<CanId>>,
+    booted: BTreeSet<NodeId>,
+}
+
+impl Presence {
+    /// Every node with a sign of life.
+    pub fn nodes(&self) -> BTreeSet<NodeId> {
+        self.answered.iter().chain(self.states.keys()).copied().collect()
+    }
+
+    /// The state of a node, if a heartbeat showed it.
+    pub fn state(&self, node: NodeId) -> Option<NmtState> {
+        self.states.get(&node).copied().flatten()
+    }
+
+    fn on_frame(&mut self, received: &Received) {
+        match Life::parse(&received.frame) {
+            Some((node, Life::State(state))) => {
+                self.states.insert(node, Some(state));
+            }
+            Some((node, Life::BootUp)) => {
+                self.states.entry(node).or_insert(None);
+                self.booted.insert(node);
+            }
+            None if received.frame.is_remote() => {}
+            None => {
+                // The late answer to a request that was given up.
+                self.answered.extend(received.frame.id().sdo_response_node());
+                if let Some(node) = tpdo_node(received.frame.id()) {
+                    self.tpdos.entry(node).or_default().insert(received.frame.id());
+                }
+            }
+        }
+    }
+
+    /// Also counts emergencies and TPDOs, by the identifiers of the predefined connection set.
+    fn on_any_frame(&mut self, received: &Received) {
+        self.on_frame(received);
+        let frame = &received.frame;
+        let emergency = frame.id().emergency_node().filter(|_| Emergency::parse(frame).is_some());
+        if let (Some(node), false) = (emergency.or(tpdo_node(frame.id())), frame.is_remote()) {
+            self.states.entry(node).or_insert(None);
+        }
+    }
+}
+
+/// The node that sends a TPDO with this identifier in the predefined connection set (CiA 301, 7.3.5).
+fn tpdo_node(id: CanId) -> Option<NodeId> {
+    match id {
+        CanId::Standard(number) if matches!(number & 0x780, 0x180 | 0x280 | 0x380 | 0x480) => {
+            u8::try_from(number & 0x7f).ok().and_then(|number| NodeId::new(number).ok())
+        }
+        _ => None,
+    }
+}
+
+/// Asks every node for its device type (1000h), all in parallel.
+///
+/// A heartbeat, a boot-up message or a late answer counts as well. Nodes without an answer are asked `rounds` times;
+/// `timeout` is the wait after the last request. Returns 200 ms after the last requests at the earliest if states are
+/// still unknown.
+///
+/// The caller sets the filters: with [`Master::listen_to`] no TPDOs are received.
+///
+/// # Errors
+/// Bus errors and Ctrl-C.
+pub fn find(master: &mut Master<'_>, nodes: &[NodeId], timeout: Duration, rounds: u32) -> Result<Presence, Error> {
+    // On a slow bus a request stays in the queue for longer than the time-out.
+    let bit_rate = master.bus().bit_rate().filter(|&rate| rate > 0);
+    let queue = bit_rate.map_or(0, |rate| FULL_QUEUE_BITS * 1_000_000 / u64::from(rate));
+    let timeout = timeout + Duration::from_micros(queue);
+    let mut presence = Presence::default();
+    let mut asked_at = master.now();
+    let rounds = rounds.max(1);
+    // One more round for nodes that booted in the meantime and missed the request.
+    for round in 0..=rounds {
+        let is_missing =
+            |node: &&NodeId| !presence.answered.contains(node) && (round < rounds || presence.booted.contains(node));
+        let missing: Vec<NodeId> = nodes.iter().filter(is_missing).copied().collect();
+        if missing.is_empty() {
+            continue;
+        }
+        asked_at = master.now();
+        ask(master, &missing, timeout, round + 1 >= rounds, &mut presence)?;
+    }
+    wait_for_states(master, asked_at + timeout.min(HEARTBEAT_TIMEOUT), &mut presence)?;
+    Ok(presence)
+}
+
+/// Asks nodes once, and waits for their answers: in the last round all of them, else until it is time to repeat.
+fn ask(
+    master: &mut Master<'_>,
+    nodes: &[NodeId],
+    timeout: Duration,
+    is_last: bool,
+    presence: &mut Presence,
+) -> Result<(), Error> {
+    let mut open: BTreeMap<Ticket, NodeId> = BTreeMap::new();
+    for &node in nodes {
+        open.insert(master.start(Request::read(node, DEVICE_TYPE).once().within(timeout)), node);
+    }
+    let begin = master.now();
+    let mut until = begin + REPEAT_INTERVAL;
+    if is_last {
+        until = until + timeout * 10 + Duration::from_secs(10);
+    }
+    loop {
+        let waited = wait(master, until, Policy::Command, |_, event| {
+            match event {
+                Happening::Sdo(ticket, result) => {
+                    let has_answered = result.as_ref().map_or_else(
+                        |error| !matches!(error.failure, SdoFailure::NoAnswer { .. } | SdoFailure::Cancelled),
+                        |_| true,
+                    );
+                    let node = open.remove(&ticket).filter(|_| has_answered);
+                    presence.answered.extend(node);
+                    if open.is_empty() {
+                        return ControlFlow::Break(());
+                    }
+                }
+                Happening::Frame(received) => presence.on_frame(&received),
+                _ => {}
+            }
+            ControlFlow::Continue(())
+        })?;
+        // On a slow bus the requests are still being sent.
+        let is_sending = waited == super::wait::Waited::Deadline && !is_last && master.is_sending();
+        if !is_sending {
+            break;
+        }
+        until = until + REPEAT_INTERVAL;
+    }
+    master.forget(open.keys().copied());
+    Ok(())
+}
+
+/// Waits for the heartbeats of the nodes that answered.
+fn wait_for_states(master: &mut Master<'_>, until: Mono, presence: &mut Presence) -> Result<(), Error> {
+    let is_complete = |presence: &Presence| presence.answered.iter().all(|&node| presence.state(node).is_some());
+    if is_complete(presence) {
+        return Ok(());
+    }
+    wait(master, until, Policy::Command, |_, event| {
+        if let Happening::Frame(received) = event {
+            presence.on_frame(&received);
+            if is_complete(presence) {
+                return ControlFlow::Break(());
+            }
+        }
+        ControlFlow::Continue(())
+    })?;
+    Ok(())
+}
+
+/// Listens for `duration` without sending anything.
+///
+/// # Errors
+/// Bus errors. Ctrl-C ends it early.
+pub fn listen(master: &mut Master<'_>, duration: Duration) -> Result<Presence, Error> {
+    master.listen(&Filters::All)?;
+    let mut presence = Presence::default();
+    let until = master.now() + duration;
+    wait(master, until, Policy::Observe, |_, event| {
+        if let Happening::Frame(received) = event {
+            presence.on_any_frame(&received);
+        }
+        ControlFlow::<()>::Continue(())
+    })?;
+    Ok(presence)
+}

@@ -1,0 +1,48 @@
+//! Which nodes `all` means.
+//!
+//! They are the nodes that a scan finds, and those with another sign of life meanwhile: a heartbeat, a boot-up message, a
+//! TPDO, a late answer. A node that answers only in part belongs to them. It is for the command to succeed with each of
+//! them or to report it as failed: no node is left out without a message.
+
+use super::read::{Item, read_values};
+use super::scan::{self, Presence};
+use crate::bus::Filters;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::pdo::{CobId, TpdoNumber};
+use crate::canopen::value::DataType;
+use crate::master::{Error, Master};
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+/// The nodes on the bus, in ascending order. `timeout` and `rounds` as in [`scan::find`].
+///
+/// # Errors
+/// Bus errors and Ctrl-C.
+pub fn all(master: &mut Master<'_>, timeout: Duration, rounds: u32) -> Result<Vec<NodeId>, Error> {
+    let every: Vec<NodeId> = NodeId::all().collect();
+    master.listen(&Filters::All)?;
+    let presence = scan::find(master, &every, timeout, rounds)?;
+    let mut nodes = presence.nodes();
+    nodes.extend(nodes_by_tpdo(master, &presence)?);
+    Ok(nodes.into_iter().collect())
+}
+
+/// Nodes whose only sign of life is a TPDO.
+///
+/// Its identifier may have been given to a TPDO of another node, so the TPDOs of the nodes that answer are read first.
+fn nodes_by_tpdo(master: &mut Master<'_>, presence: &Presence) -> Result<Vec<NodeId>, Error> {
+    let known = presence.nodes();
+    let unknown: Vec<_> = presence.tpdos.iter().filter(|(node, _)| !known.contains(node)).collect();
+    if unknown.is_empty() {
+        return Ok(Vec::new());
+    }
+    let numbers = || (1..=4).filter_map(TpdoNumber::new);
+    let items: Vec<Item> = presence
+        .answered
+        .iter()
+        .flat_map(|&node| numbers().map(move |number| (node, number.communication(1), DataType::Unsigned(4))))
+        .collect();
+    let words = read_values(master, &items)?.into_iter().filter_map(|word| word.ok()?.as_u64());
+    let used: BTreeSet<CanId> = words.filter_map(|word| Some(CobId(u32::try_from(word).ok()?).can_id())).collect();
+    Ok(unknown.into_iter().filter(|(_, ids)| !ids.is_subset(&used)).map(|(&node, _)| node).collect())
+}
