@@ -1,10 +1,10 @@
-//! Puts together the bench that a [`Spec`] describes.
+//! Builds the bench of a [`Spec`].
 
 use crate::carry_out::node;
 use crate::command::Command;
-use crate::kinds::{ATTIC, KEPT, model, stuff};
-use crate::spec::{DeviceSpec, Fault, Other, Spec, Vagary};
-use crate::station::{Babbler, Rival, Unruly, write};
+use crate::kinds::{LARGE_KIND, LARGE_OBJECTS, filler, model};
+use crate::spec::{DeviceFault, DeviceSpec, Fault, Other, Spec};
+use crate::station::{Babbler, FaultyDevice, SecondMaster, write};
 use cangauge::bus::Mono;
 use cangauge::bus::faults::FaultPlan;
 use cangauge::bus::memory::{BIT_RATE, Clock, MemoryBus};
@@ -18,9 +18,9 @@ use cangauge::tasks::lss::LssAddress;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What a device holds.
+/// The state of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Holds {
+pub(crate) struct DeviceState {
     pub(crate) node: Option<u8>,
     pub(crate) bit_rate: Option<u32>,
     pub(crate) stored: (Option<u8>, Option<u32>),
@@ -28,10 +28,10 @@ pub(crate) struct Holds {
     pub(crate) configuring: bool,
 }
 
-pub(crate) fn holds(device: &Device) -> Holds {
+pub(crate) fn device_state(device: &Device) -> DeviceState {
     let number = |node: Option<NodeId>| node.map(NodeId::get);
     let (node, rate) = device.stored();
-    Holds {
+    DeviceState {
         node: number(device.node()),
         bit_rate: device.bit_rate(),
         stored: (number(node), rate),
@@ -59,25 +59,25 @@ fn setup(spec: &DeviceSpec) -> Setup {
         let channel = setup.channels.first().map_or(1, |channel| channel.channel);
         setup.overloads = vec![(channel, Overload { from, until, direction: Direction::High })];
     }
-    if spec.kind == ATTIC {
-        let kept = KEPT.map(|(object, length)| (object, stuff(length, spec.serial.into())));
+    if spec.kind == LARGE_KIND {
+        let kept = LARGE_OBJECTS.map(|(object, length)| (object, filler(length, spec.serial.into())));
         setup.set.extend(kept.map(|(object, bytes)| (object, Scalar::Text(as_text(&model, object, &bytes)))));
     }
     setup.oddities.latency = Duration::from_micros(spec.latency_us);
-    for vagary in &spec.vagaries {
-        match vagary {
-            Vagary::LoseLss(service) => setup.oddities.lose.push(*service),
-            Vagary::LateLss(service, ms) => drop(setup.oddities.late.insert(*service, Duration::from_millis(*ms))),
-            Vagary::RefuseLss(service) => drop(setup.oddities.refuse.insert(*service, 1)),
-            Vagary::EndlessFastscan => setup.oddities.endless_fastscan = true,
-            Vagary::OfflineAfterReset => setup.oddities.offline_after.push(OfflineAfter::Reset),
+    for device_fault in &spec.device_faults {
+        match device_fault {
+            DeviceFault::LoseLss(service) => setup.oddities.lose.push(*service),
+            DeviceFault::LateLss(service, ms) => drop(setup.oddities.late.insert(*service, Duration::from_millis(*ms))),
+            DeviceFault::RefuseLss(service) => drop(setup.oddities.refuse.insert(*service, 1)),
+            DeviceFault::EndlessFastscan => setup.oddities.endless_fastscan = true,
+            DeviceFault::OfflineAfterReset => setup.oddities.offline_after.push(OfflineAfter::Reset),
             _ => {}
         }
     }
     setup
 }
 
-/// Bytes as a description writes them.
+/// Bytes in the notation of a description.
 fn as_text(model: &Model, object: ObjectId, bytes: &[u8]) -> String {
     match model.dictionary.get(object).map(|entry| entry.data_type) {
         Some(DataType::VisibleString) => String::from_utf8_lossy(bytes).into_owned(),
@@ -111,7 +111,7 @@ pub(crate) fn plan(faults: &[Fault]) -> FaultPlan {
     plan
 }
 
-/// The LSS address of a device, as its own dictionary has it.
+/// The LSS address of a device, from its own dictionary.
 pub(crate) fn identity(spec: &DeviceSpec) -> LssAddress {
     let mut device = Device::new(setup(spec)).expect("a device");
     let mut part = |sub| {
@@ -121,13 +121,13 @@ pub(crate) fn identity(spec: &DeviceSpec) -> LssAddress {
     LssAddress::new([part(1), part(2), part(3), part(4)])
 }
 
-/// The bus with everybody on it, switched on.
+/// The bus with all participants, switched on.
 pub(crate) fn bench(spec: &Spec, recorder: &Recorder) -> MemoryBus {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(BIT_RATE).with_queue_length(spec.queue);
     for (place, device) in spec.devices.iter().enumerate() {
         let made = Device::new(setup(device)).expect("a device").recording(recorder.clone());
         let unsaved = device.node.zip(device.unsaved_heartbeat).map(|(id, time)| write(id, 0x1017, 0, time.into(), 2));
-        let mut station = Unruly::new(made, place, &device.vagaries, unsaved);
+        let mut station = FaultyDevice::new(made, place, &device.device_faults, unsaved);
         if let Command::SdoWrite { node, object, .. } = &spec.command {
             station.watched = (device.node == Some(*node)).then_some(*object);
         }
@@ -135,7 +135,7 @@ pub(crate) fn bench(spec: &Spec, recorder: &Recorder) -> MemoryBus {
     }
     for other in &spec.others {
         match other {
-            Other::Master { plan } => bus.attach(Rival::new(plan)),
+            Other::Master { plan } => bus.attach(SecondMaster::new(plan)),
             Other::Babbler { every_us, seed, nasty } => bus.attach(Babbler::new(*every_us, *seed, *nasty)),
         }
     }

@@ -1,4 +1,4 @@
-//! What the program does: each command as the command line carries it out, and what it says.
+//! Runs a command as the command line does, and keeps its result.
 
 use crate::bench::identity;
 use crate::command::{Command, How, Measuring, Target};
@@ -27,16 +27,16 @@ use cangauge::tasks::{Failure, autozero, check, detect, nmt, read, restore, scan
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// What a command claims when it ends well.
+/// What a successful command claims.
 #[derive(Clone, Debug)]
-pub(crate) enum Said {
+pub(crate) enum Claim {
     Nothing,
     /// Node and serial number.
     Found(Vec<(u8, Option<u32>)>),
-    /// Node, object and bytes as they were sent.
+    /// Node, object, and the bytes as received.
     Values(Vec<(u8, ObjectId, Vec<u8>)>),
     States(Vec<(u8, Option<NmtState>)>),
-    /// Whether all went well.
+    /// Whether the probe succeeded.
     Probed(bool),
     Assigned {
         new: Option<u8>,
@@ -48,24 +48,24 @@ pub(crate) enum Said {
     Stored,
     /// The bit rate of the bus.
     Detected(Option<u32>),
-    /// Whether somebody answers.
+    /// Whether a slave answers.
     Identified(bool),
-    /// All that was expected is so.
+    /// All expressions are satisfied.
     Held,
 }
 
-/// What a command tells while it goes on.
+/// What a command reports while it runs.
 #[derive(Default)]
-pub(crate) struct Heard {
-    /// Rows of a recording, as the simulator's own record would write them.
+pub(crate) struct Observations {
+    /// Rows of a recording, in the format of the simulator's own record.
     pub(crate) rows: Vec<String>,
-    /// What became of nodes.
+    /// Changes of nodes.
     pub(crate) seen: Vec<Seen>,
-    /// What came of expectations.
+    /// Results of expressions.
     pub(crate) verdicts: Vec<Verdict>,
 }
 
-impl Heard {
+impl Observations {
     fn take(&mut self, samples: &[Sample], sources: &[Source]) {
         for sample in samples {
             let source = &sources[sample.source];
@@ -78,7 +78,7 @@ impl Heard {
     }
 }
 
-impl Observer for Heard {
+impl Observer for Observations {
     fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
         self.take(samples, sources);
         ControlFlow::Continue(())
@@ -99,7 +99,7 @@ fn nodes(ids: &[u8]) -> Vec<NodeId> {
     ids.iter().copied().map(node).collect()
 }
 
-/// What the user says of a node.
+/// The descriptions that the user names.
 fn described(spec: &Spec, id: u8, how: How) -> Overrides {
     let device = spec.devices.iter().find(|device| device.node == Some(id) && how.described);
     device.map(|device| (node(id), model(device.kind))).into_iter().collect()
@@ -118,20 +118,20 @@ fn target(spec: &Spec, target: &Target) -> lss::Target {
     }
 }
 
-/// Carries out the command as the command line does, and settles what is left to be sent.
-pub(crate) fn carry_out(bus: &mut dyn Bus, spec: &Spec, heard: &mut Heard) -> Result<Said, Failure> {
+/// Runs the command as the command line does, and sends the remaining frames.
+pub(crate) fn carry_out(bus: &mut dyn Bus, spec: &Spec, observed: &mut Observations) -> Result<Claim, Failure> {
     if let Command::Detect { ask, each_ms } = spec.command {
         let found = detect::detect(bus, ask, Duration::from_millis(each_ms), &mut |_| {})?;
-        return Ok(Said::Detected(found.found.map(|(rate, _)| rate)));
+        return Ok(Claim::Detected(found.found.map(|(rate, _)| rate)));
     }
     let timing = Timing { timeout: Duration::from_millis(spec.timeout_ms), retries: spec.retries };
     let mut master = Master::new(bus, timing);
-    let result = carry_out_with(&mut master, spec, heard);
+    let result = carry_out_with(&mut master, spec, observed);
     master.settle();
     result
 }
 
-fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Result<Said, Failure> {
+fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observations) -> Result<Claim, Failure> {
     let none = Overrides::new();
     let mut quiet = |_: lss::Note| {};
     Ok(match &spec.command {
@@ -139,7 +139,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
             let wait = Duration::from_millis(200.min(spec.timeout_ms));
             let found = scan::scan(master, &nodes(ids), wait, spec.retries + 1, &none)?;
             let found = found.into_iter().filter(|found| found.failure.is_none());
-            Said::Found(found.map(|found| (found.node.get(), found.instrument.identity.serial)).collect())
+            Claim::Found(found.map(|found| (found.node.get(), found.instrument.identity.serial)).collect())
         }
         Command::Read { nodes: ids } => {
             let mut values = Vec::new();
@@ -148,79 +148,79 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
                     values.push((target.source.node.get(), target.object, hex(&sample.raw.to_string())));
                 }
             }
-            Said::Values(values)
+            Claim::Values(values)
         }
         Command::Info { node: id } => {
             let device = settings::Device::open(master, node(*id), &none)?;
             let read = info::read(master, &device)?;
-            Said::Found(vec![(*id, read.instrument.identity.serial)])
+            Claim::Found(vec![(*id, read.instrument.identity.serial)])
         }
         Command::PdoShow { node: id } => {
             let number = TpdoNumber::new(1);
             let shown = pdo::show(master, node(*id), number, &none)?;
-            shown.into_iter().next().map_or(Said::Nothing, |shown| Said::Mapped(shown.settings))
+            shown.into_iter().next().map_or(Claim::Nothing, |shown| Claim::Mapped(shown.settings))
         }
         Command::SdoRead { node: id, object, how } => {
             let mut knowledge = Knowledge::new(node(*id), &described(spec, *id, *how));
             let mut progress = |_| {};
             let value = sdo::read(master, &mut knowledge, *object, None, &mut options(*how, &mut progress))?;
-            Said::Values(vec![(*id, *object, value.raw)])
+            Claim::Values(vec![(*id, *object, value.raw)])
         }
         Command::SdoWrite { node: id, object, bytes, how } => {
             let knowledge = Knowledge::new(node(*id), &described(spec, *id, *how));
             sdo::write(master, &knowledge, *object, bytes, &mut options(*how, &mut |_| {}))?;
-            Said::Nothing
+            Claim::Nothing
         }
         Command::Nmt { what, nodes: ids, all } => {
             let reports = nmt::command(master, *what, &nodes(ids), *all)?;
-            Said::States(reports.iter().map(|report| (report.node.get(), report.state)).collect())
+            Claim::States(reports.iter().map(|report| (report.node.get(), report.state)).collect())
         }
         Command::NmtState { nodes: ids } => {
             let reports = nmt::states(master, &nodes(ids))?;
-            Said::States(reports.iter().map(|report| (report.node.get(), report.state)).collect())
+            Claim::States(reports.iter().map(|report| (report.node.get(), report.state)).collect())
         }
         Command::NmtWatch { nodes: ids, ask, for_ms } => {
             let until = master.now() + Duration::from_millis(*for_ms);
             nmt::watch(master, &nodes(ids), *ask, Some(until), &mut |seen| {
-                heard.seen.push(*seen);
+                observed.seen.push(*seen);
                 ControlFlow::Continue(())
             })?;
-            Said::Nothing
+            Claim::Nothing
         }
         Command::NmtProbe { node: id } => {
             let probed = nmt::probe(master, node(*id))?;
-            Said::Probed(probed.trouble.is_none())
+            Claim::Probed(probed.trouble.is_none())
         }
         Command::Startup { node: id, auto } => {
             let set = if *auto { nmt::Starts::Auto } else { nmt::Starts::Wait };
             nmt::startup(master, node(*id), &none, Some(set))?;
-            Said::Nothing
+            Claim::Nothing
         }
         Command::LssScan => {
             let found = lss::scan(master, &mut quiet)?;
             let serial = |slave: &lss::Slave| slave.address.map(|address| address.serial);
-            Said::Found(found.iter().filter_map(|slave| Some((slave.node?.get(), serial(slave)))).collect())
+            Claim::Found(found.iter().filter_map(|slave| Some((slave.node?.get(), serial(slave)))).collect())
         }
         Command::LssInquire { target: wanted } => {
             let told = lss::inquire(master, &target(spec, wanted), (&none, None), &mut quiet)?;
             let node = told.node.flatten();
             let serial = told.address.map(|address| address.serial);
-            Said::Found(node.map(|node| (node.get(), serial)).into_iter().collect())
+            Claim::Found(node.map(|node| (node.get(), serial)).into_iter().collect())
         }
         Command::LssStore { target: wanted, force } => {
             lss::store(master, &target(spec, wanted), (&none, None), *force, &mut quiet)?;
-            Said::Nothing
+            Claim::Nothing
         }
         Command::LssActivate { target: wanted, delay_ms, force } => {
             let wanted = wanted.as_ref().map(|wanted| target(spec, wanted));
             lss::activate(master, wanted.as_ref(), *delay_ms, (&none, None), *force, &mut quiet)?;
-            Said::Nothing
+            Claim::Nothing
         }
         Command::LssIdentify { place, around } => {
             let LssAddress { vendor, product, revision, serial } = identity(&spec.devices[*place]);
             let serial = (serial.saturating_sub(*around), serial.saturating_add(*around));
             let range = LssRange { vendor, product, revision: (revision, revision), serial };
-            Said::Identified(lss::identify(master, &range)?)
+            Claim::Identified(lss::identify(master, &range)?)
         }
         Command::Assign { target: wanted, id, rate, store, retime, via, force } => {
             let job = Job {
@@ -235,7 +235,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
                 given: None,
             };
             let report = lss::assign(master, &job, &mut quiet)?;
-            Said::Assigned {
+            Claim::Assigned {
                 new: report.new.map(NodeId::get),
                 stored: report.stored,
                 rate: report.rate.map(|rate| rate.bits),
@@ -252,7 +252,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
                 inhibit_100us: None,
                 cob_id: *cob_id,
             };
-            Said::Mapped(pdo::map(master, &wish, *keep, &none)?.shown.settings)
+            Claim::Mapped(pdo::map(master, &wish, *keep, &none)?.shown.settings)
         }
         Command::Autozero { node: id, channel, force, store, dry_run } => {
             let options = autozero::Options {
@@ -264,17 +264,17 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
                 dry_run: *dry_run,
             };
             autozero::autozero(master, node(*id), &none, &options)?;
-            Said::Nothing
+            Claim::Nothing
         }
         Command::Store { node: id, group: number, verify } => {
             let device = store::device(master, node(*id), &none)?;
             store::store(master, &device, group(*number), *verify)?;
-            Said::Stored
+            Claim::Stored
         }
         Command::Restore { node: id, group: number, reset } => {
             let device = store::device(master, node(*id), &none)?;
             restore::restore(master, &device, group(*number), *reset)?;
-            Said::Stored
+            Claim::Stored
         }
         Command::Unit { node: id, signal, unit: code } => {
             let mut device = settings::Device::open(master, node(*id), &none)?;
@@ -282,9 +282,9 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
             match device.signal(*signal) {
                 Ok(signal) => {
                     let object = ObjectId::new(0x6131, signal.channel);
-                    Said::Values(vec![(*id, object, code.to_le_bytes().to_vec())])
+                    Claim::Values(vec![(*id, object, code.to_le_bytes().to_vec())])
                 }
-                Err(_) => Said::Nothing,
+                Err(_) => Claim::Nothing,
             }
         }
         Command::Filter { node: id, kind, constant } => {
@@ -297,13 +297,13 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
             ];
             let kind = kinds[usize::from(*kind)];
             filter::set(master, &device, None, filter::Wanted { kind, constant: *constant, damping: None })?;
-            Said::Nothing
+            Claim::Nothing
         }
         Command::Limits { node: id, lower, upper } => {
             let device = settings::Device::open(master, node(*id), &none)?;
             let wanted = [(limits::Limit::Lower, *lower), (limits::Limit::Upper, *upper)];
             limits::set(master, &device, "pressure", &wanted)?;
-            Said::Nothing
+            Claim::Nothing
         }
         Command::Errors { node: id, clear } => {
             let device = settings::Device::open(master, node(*id), &none)?;
@@ -311,22 +311,22 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
                 true => drop(errors::clear(master, &device)?),
                 false => drop(errors::read(master, &device)?),
             }
-            Said::Nothing
+            Claim::Nothing
         }
         Command::Minmax { node: id } => {
             let device = settings::Device::open(master, node(*id), &none)?;
             minmax::reset(master, &device)?;
-            Said::Nothing
+            Claim::Nothing
         }
         Command::PdoWatch { nodes: ids, for_ms } => {
             let duration = Some(Duration::from_millis(*for_ms));
             pdo::watch(master, &nodes(ids), &none, duration, &mut |line| {
                 if let Line::Pdo { samples, sources, .. } = line {
-                    heard.take(samples, sources);
+                    observed.take(samples, sources);
                 }
                 ControlFlow::Continue(())
             })?;
-            Said::Nothing
+            Claim::Nothing
         }
         Command::Check { nodes: ids, expected, how, excuse } => {
             let for_ms = |length: u64| Some(Duration::from_millis(length));
@@ -344,13 +344,13 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
                 recording: measuring,
                 overrides: none.clone(),
             };
-            let report = check::check(master, &options, heard)?;
+            let report = check::check(master, &options, observed)?;
             let met = check::all_satisfied(&report.verdicts, &report.failures);
-            heard.verdicts = report.verdicts;
+            observed.verdicts = report.verdicts;
             met?;
-            Said::Held
+            Claim::Satisfied
         }
-        Command::Detect { .. } => Said::Nothing,
+        Command::Detect { .. } => Claim::Nothing,
         Command::Log { nodes: ids, sync_ms, poll_ms, duration_ms, count, nmt } => {
             let mode = match (sync_ms, poll_ms) {
                 (Some(period), _) => Mode::Sync(Duration::from_millis(*period)),
@@ -367,16 +367,16 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, heard: &mut Heard) -> Re
                 max_gap: None,
                 overrides: none.clone(),
             };
-            let outcome = log(master, &plan, heard)?;
+            let outcome = log(master, &plan, observed)?;
             match outcome.nothing {
                 Some(nothing) => return Err(nothing),
-                None => Said::Nothing,
+                None => Claim::Nothing,
             }
         }
     })
 }
 
-/// `0x0102` as bytes.
+/// Parses `0x0102` as bytes.
 pub(crate) fn hex(text: &str) -> Vec<u8> {
     let digits = text.trim_start_matches("0x");
     (0..digits.len() / 2).filter_map(|at| u8::from_str_radix(digits.get(2 * at..2 * at + 2)?, 16).ok()).collect()

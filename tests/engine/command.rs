@@ -1,4 +1,4 @@
-//! What is asked of the program: a command with its arguments.
+//! The command that a scenario runs, with its arguments.
 
 use cangauge::canopen::nmt::NmtCommand;
 use cangauge::canopen::object::ObjectId;
@@ -9,21 +9,21 @@ use std::fmt;
 #[derive(Clone, Debug)]
 pub(crate) enum Target {
     Node(u8),
-    /// That of the device at this place.
+    /// The identity of the device at this place of the bench.
     Identity(usize),
     Only,
     Unconfigured,
 }
 
-/// How an object is transferred.
+/// The options of an SDO transfer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct How {
     pub(crate) blocks: BlockMode,
-    /// Whether the user says which device it is.
+    /// Whether the user names the device description.
     pub(crate) described: bool,
 }
 
-/// A value that is expected within limits, which belong to it.
+/// An expression: the signal's value must be within the limits, inclusive.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Expected {
     pub(crate) signal: &'static str,
@@ -37,7 +37,7 @@ impl fmt::Display for Expected {
     }
 }
 
-/// How values come that are judged.
+/// The source of the values for `check`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Measuring {
     /// One reading by SDO.
@@ -108,13 +108,13 @@ pub(crate) enum Command {
         target: Target,
         force: bool,
     },
-    /// Nobody in particular is everybody.
+    /// Without a target: all slaves.
     LssActivate {
         target: Option<Target>,
         delay_ms: u16,
         force: bool,
     },
-    /// Whether there is somebody like the device at this place, with a serial number at most so far from its own.
+    /// Looks for the device at this place. The range of serial numbers extends this far around its own.
     LssIdentify {
         place: usize,
         around: u32,
@@ -217,7 +217,7 @@ impl Command {
         }
     }
 
-    /// Whether it names a device by its place on the bench.
+    /// Whether the command names a device by its place on the bench.
     pub(crate) fn counts_places(&self) -> bool {
         let target = match self {
             Command::LssIdentify { .. } => return true,

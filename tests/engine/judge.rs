@@ -1,4 +1,4 @@
-//! What must always hold, whatever went wrong.
+//! The rules that must always hold, with any faults.
 
 mod addressed;
 mod causes;
@@ -21,15 +21,15 @@ use kept::after_power;
 use killed::killed;
 use put_back::put_back;
 use rows::{rows, signatures};
-use silence::told_causes;
+use silence::check_cause;
 use watched::watched;
 
-use crate::bench::{Holds, holds};
-use crate::carry_out::{Said, hex};
+use crate::bench::{DeviceState, device_state};
+use crate::carry_out::{Claim, hex};
 use crate::command::{Command, Measuring, Target};
 use crate::run::Run;
-use crate::spec::{Act, Fault, Spec, Vagary};
-use crate::station::Unruly;
+use crate::spec::{Act, DeviceFault, Fault, Spec};
+use crate::station::FaultyDevice;
 use crate::tap::Passed;
 use cangauge::bus::Mono;
 use cangauge::canopen::id::{CanId, NodeId};
@@ -42,39 +42,40 @@ use cangauge::tasks::sdo::is_signature;
 use cangauge::tasks::store::Group;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A rule that was broken, and how.
-pub(crate) type Broken = (&'static str, String);
+/// A violations rule, and how it was violations.
+pub(crate) type Violation = (&'static str, String);
 
-pub(crate) fn judge(spec: &Spec, run: &mut Run) -> Vec<Broken> {
-    let mut broken = Vec::new();
-    ends(run, &mut broken);
-    frames(spec, run.sent_by_killed(), &mut broken);
-    frames(spec, run.bus.all_sent().into_iter(), &mut broken);
-    let after: Vec<Holds> = run.bus.bus.inner().stations::<Unruly>().map(|unruly| holds(&unruly.device)).collect();
-    others_unchanged(spec, run, &after, &mut broken);
-    put_back(spec, run, &after, &mut broken);
-    kinds(spec, run, &mut broken);
-    told_causes(spec, run, &mut broken);
-    rows(spec, run, &mut broken);
-    watched(spec, run, &mut broken);
-    checks(spec, run, &mut broken);
-    signatures(spec, run, &mut broken);
-    killed(spec, run, &mut broken);
+pub(crate) fn judge(spec: &Spec, run: &mut Run) -> Vec<Violation> {
+    let mut violations = Vec::new();
+    ends(run, &mut violations);
+    frames(spec, run.sent_by_killed(), &mut violations);
+    frames(spec, run.bus.all_sent().into_iter(), &mut violations);
+    let after: Vec<DeviceState> =
+        run.bus.bus.inner().stations::<FaultyDevice>().map(|station| device_state(&station.device)).collect();
+    others_unchanged(spec, run, &after, &mut violations);
+    put_back(spec, run, &after, &mut violations);
+    kinds(spec, run, &mut violations);
+    check_cause(spec, run, &mut violations);
+    rows(spec, run, &mut violations);
+    watched(spec, run, &mut violations);
+    checks(spec, run, &mut violations);
+    signatures(spec, run, &mut violations);
+    killed(spec, run, &mut violations);
     if let Ok(said) = run.result.clone() {
-        claims(spec, run, &said, &after, &mut broken);
-        last_writes(spec, run, &mut broken);
+        claims(spec, run, &said, &after, &mut violations);
+        last_writes(spec, run, &mut violations);
     }
-    after_power(spec, run, &mut broken);
-    broken
+    after_power(spec, run, &mut violations);
+    violations
 }
 
-fn ends(run: &Run, broken: &mut Vec<Broken>) {
+fn ends(run: &Run, violations: &mut Vec<Violation>) {
     if run.bus.overran {
-        broken.push(("ends in time", format!("not ended after {:?}", run.bound)));
+        violations.push(("ends in time", format!("not ended after {:?}", run.bound)));
     }
 }
 
-/// The group that a number stands for.
+/// The group with this number.
 pub(crate) fn group(number: u8) -> Group {
     [Group::All, Group::Communication, Group::Application][usize::from(number % 3)]
 }

@@ -1,15 +1,15 @@
-//! Scenarios without number: a seed gives a bench, what goes wrong on it, a command and an interruption; afterwards it
-//! is judged what must always hold. Each is repeatable from its seed alone.
+//! Generated scenarios: a seed gives devices, faults, a command and an interruption. Then the test checks what must
+//! always hold. The same seed always gives the same scenario.
 //!
 //! ```text
-//! cargo test --test engine                                        a few hundred fixed seeds
-//! ENGINE_RUNS=100000 cargo test --release --test engine           so many, from a fresh seed
-//! ENGINE_SECONDS=120 cargo test --release --test engine           for so long, from a fresh seed
-//! ENGINE_SEED=123 cargo test --test engine -- --nocapture         this one, with its transcript
-//! ENGINE_FROM=1 ENGINE_RUNS=1000 cargo test --test engine         these
+//! cargo test --test engine                                        some hundred fixed seeds
+//! ENGINE_RUNS=100000 cargo test --release --test engine           that many, from a new seed
+//! ENGINE_SECONDS=120 cargo test --release --test engine           for that time, from a new seed
+//! ENGINE_SEED=123 cargo test --test engine -- --nocapture         one seed, with its transcript
+//! ENGINE_FROM=1 ENGINE_RUNS=1000 cargo test --test engine         a range of seeds
 //! ```
 //!
-//! A scenario that breaks a rule is made smaller as long as it still breaks it, and printed with its frames.
+//! A failing scenario is reduced as long as it breaks the same rule, and printed with its frames.
 
 mod bench;
 mod carry_out;
@@ -25,7 +25,7 @@ mod station;
 mod tap;
 mod time;
 
-use judge::{Broken, judge};
+use judge::{Violation, judge};
 use spec::Spec;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -33,32 +33,32 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// So many of them without being asked for more.
+/// The number of scenarios of a plain `cargo test`.
 const FIXED: u64 = 400;
 
-/// So many failures are made smaller and printed.
+/// After so many failures the test stops.
 const MOST: usize = 12;
 
-fn asked<T: std::str::FromStr>(name: &str) -> Option<T> {
+fn env_number<T: std::str::FromStr>(name: &str) -> Option<T> {
     let text = std::env::var(name).ok()?;
-    Some(text.parse().unwrap_or_else(|_| panic!("{name}={text} is no number")))
+    Some(text.parse().unwrap_or_else(|_| panic!("{name}={text} is not a number")))
 }
 
-/// For people who look on; nobody may be there.
-fn say(text: &str) {
+/// Prints a line. A closed stdout is no error.
+fn print_line(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }
 
-/// What a scenario breaks, and its transcript.
-fn try_out(spec: &Spec) -> (Vec<Broken>, String) {
+/// Runs a scenario. Returns the violations rules and the transcript.
+fn run_and_judge(spec: &Spec) -> (Vec<Violation>, String) {
     let tried = catch_unwind(AssertUnwindSafe(|| {
         let mut run = run::run(spec);
         let end = format!("{:?} at {:?}\n", run.result, run.ended.since_start());
-        let devices = run.bus.bus.inner().stations::<station::Unruly>();
-        let devices: Vec<_> = devices.map(|unruly| bench::holds(&unruly.device)).collect();
+        let devices = run.bus.bus.inner().stations::<station::FaultyDevice>();
+        let devices: Vec<_> = devices.map(|station| bench::device_state(&station.device)).collect();
         let end = end + &format!("before {:?}\nafter {devices:?}", run.before);
-        let broken = judge(spec, &mut run);
-        (broken, run::transcript(&run) + &end)
+        let violations = judge(spec, &mut run);
+        (violations, run::transcript(&run) + &end)
     }));
     tried.unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().cloned();
@@ -67,10 +67,10 @@ fn try_out(spec: &Spec) -> (Vec<Broken>, String) {
     })
 }
 
-/// Takes away what is not needed to break the same rule.
+/// Removes everything that is not needed to break the same rule.
 fn shrink(mut spec: Spec, rule: &str) -> Spec {
     loop {
-        let breaks = |smaller: &Spec| try_out(smaller).0.iter().any(|(broken, _)| *broken == rule);
+        let breaks = |smaller: &Spec| run_and_judge(smaller).0.iter().any(|(violations, _)| *violations == rule);
         match spec.smaller().into_iter().find(breaks) {
             Some(smaller) => spec = smaller,
             None => return spec,
@@ -78,60 +78,61 @@ fn shrink(mut spec: Spec, rule: &str) -> Spec {
     }
 }
 
-fn report(seed: u64, broken: &[Broken], whole: bool) -> String {
+fn report(seed: u64, violations: &[Violation], whole: bool) -> String {
     let mut text = format!("\n=== seed {seed}\n");
-    for (rule, how) in broken {
+    for (rule, how) in violations {
         text += &format!("  {rule}: {how}\n");
     }
-    if let (Some((rule, _)), true) = (broken.first(), whole) {
+    if let (Some((rule, _)), true) = (violations.first(), whole) {
         let small = shrink(Spec::of(seed), rule);
-        let (broken, transcript) = try_out(&small);
-        text += &format!("  smallest: {small:#?}\n  {broken:?}\n{transcript}\n");
+        let (violations, transcript) = run_and_judge(&small);
+        text += &format!("  smallest: {small:#?}\n  {violations:?}\n{transcript}\n");
     }
     text
 }
 
 #[test]
-fn nothing_that_must_hold_is_ever_broken() {
-    if let Some(seed) = asked("ENGINE_SEED") {
+fn no_rule_is_broken() {
+    if let Some(seed) = env_number("ENGINE_SEED") {
         let spec = Spec::of(seed);
-        let (broken, transcript) = try_out(&spec);
-        say(&format!("{spec:#?}\n{transcript}"));
-        assert!(broken.is_empty(), "{}", report(seed, &broken, true));
+        let (violations, transcript) = run_and_judge(&spec);
+        print_line(&format!("{spec:#?}\n{transcript}"));
+        assert!(violations.is_empty(), "{}", report(seed, &violations, true));
         return;
     }
-    let (runs, seconds): (Option<u64>, Option<u64>) = (asked("ENGINE_RUNS"), asked("ENGINE_SECONDS"));
+    let (runs, seconds): (Option<u64>, Option<u64>) = (env_number("ENGINE_RUNS"), env_number("ENGINE_SECONDS"));
     let fresh = || SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |now| now.as_secs() << 24);
-    let first = asked("ENGINE_FROM").unwrap_or_else(|| if runs.or(seconds).is_some() { fresh() } else { 1 });
+    let first = env_number("ENGINE_FROM").unwrap_or_else(|| if runs.or(seconds).is_some() { fresh() } else { 1 });
     let most = runs.unwrap_or(if seconds.is_some() { u64::MAX } else { FIXED });
-    let begun = Instant::now();
-    let until = seconds.map(|seconds| begun + Duration::from_secs(seconds));
+    let started = Instant::now();
+    let until = seconds.map(|seconds| started + Duration::from_secs(seconds));
     let next = AtomicU64::new(0);
-    let failures: Mutex<Vec<(u64, Vec<Broken>)>> = Mutex::new(Vec::new());
-    say(&format!("scenarios from seed {first}"));
+    let failures: Mutex<Vec<(u64, Vec<Violation>)>> = Mutex::new(Vec::new());
+    print_line(&format!("scenarios from seed {first}"));
     let work = || {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
-            let enough = failures.lock().expect("nobody panicked").len() >= asked("ENGINE_MOST").unwrap_or(MOST);
+            let enough =
+                failures.lock().expect("no thread panicked").len() >= env_number("ENGINE_MOST").unwrap_or(MOST);
             if number >= most || enough || until.is_some_and(|until| Instant::now() >= until) {
                 next.fetch_sub(1, Ordering::Relaxed);
                 return;
             }
             let seed = first.wrapping_add(number);
-            let (broken, _) = try_out(&Spec::of(seed));
-            if !broken.is_empty() {
-                failures.lock().expect("nobody panicked").push((seed, broken));
+            let (violations, _) = run_and_judge(&Spec::of(seed));
+            if !violations.is_empty() {
+                failures.lock().expect("no thread panicked").push((seed, violations));
             }
         }
     };
     std::thread::scope(|scope| {
-        let threads = asked("ENGINE_THREADS").unwrap_or(2);
+        let threads = env_number("ENGINE_THREADS").unwrap_or(2);
         (0..threads).for_each(|_| drop(scope.spawn(work)));
     });
     let count = next.load(Ordering::Relaxed);
-    say(&format!("{count} scenarios from seed {first} in {:.1} s", begun.elapsed().as_secs_f64()));
-    let failures = failures.into_inner().expect("nobody panicked");
-    let brief = asked::<u8>("ENGINE_BRIEF").is_some();
-    let reports: String = failures.iter().map(|(seed, broken)| report(*seed, broken, !brief)).collect();
+    print_line(&format!("{count} scenarios from seed {first} in {:.1} s", started.elapsed().as_secs_f64()));
+    let failures = failures.into_inner().expect("no thread panicked");
+    let brief = env_number::<u8>("ENGINE_BRIEF").is_some();
+    let reports: String = failures.iter().map(|(seed, violations)| report(*seed, violations, !brief)).collect();
     assert!(failures.is_empty(), "{} of {count} scenarios from seed {first}:\n{reports}", failures.len());
 }

@@ -1,11 +1,11 @@
-//! From a seed to a [`Spec`].
+//! Makes a [`Spec`] from a seed.
 
 mod commands;
 
 use crate::command::Command;
-use crate::kinds::ATTIC;
+use crate::kinds::LARGE_KIND;
 use crate::random::Random;
-use crate::spec::{Act, DeviceSpec, Fault, Kill, Other, Spec, Vagary};
+use crate::spec::{Act, DeviceFault, DeviceSpec, Fault, Kill, Other, Spec};
 use commands::command;
 
 const KINDS: [&str; 14] = [
@@ -22,7 +22,7 @@ const KINDS: [&str; 14] = [
     "jumo",
     "baumer",
     "hydac-old",
-    ATTIC,
+    LARGE_KIND,
 ];
 const RATES: [u32; 4] = [125_000, 250_000, 500_000, 1_000_000];
 const ABORTS: [u32; 6] = [0x0800_0000, 0x0602_0000, 0x0609_0011, 0x0601_0002, 0x0800_0022, 0x0606_0000];
@@ -53,7 +53,7 @@ impl Spec {
             let rate = *random.pick(&[20_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000]);
             spec.devices.iter_mut().for_each(|device| device.bit_rate = Some(rate));
         }
-        // Each kind of trouble now and then, and a quarter of all runs without any.
+        // A quarter of the scenarios runs without any fault.
         match random.within(0..=99) {
             0..=69 => spec.trouble(random),
             70..=75 => spec.kill = Some(kill(random)),
@@ -72,11 +72,11 @@ impl Spec {
         if random.percent(45) {
             for _ in 0..random.within(1..=2) {
                 let at = usize::try_from(random.next() % self.devices.len() as u64).expect("an index");
-                let (vagary, device) = (vagary(random), &mut self.devices[at]);
-                if matches!(vagary, Vagary::Hang { .. } | Vagary::Late { .. }) {
+                let (device_fault, device) = (device_fault(random), &mut self.devices[at]);
+                if matches!(device_fault, DeviceFault::Hang { .. } | DeviceFault::Late { .. }) {
                     device.unsaved_heartbeat = None;
                 }
-                device.vagaries.push(vagary);
+                device.device_faults.push(device_fault);
             }
         }
         if random.percent(18) {
@@ -111,22 +111,22 @@ fn device(random: &mut Random, at: u32) -> DeviceSpec {
         heartbeat_ms: random.percent(45).then(|| *random.pick(&[50, 100, 200, 1000])),
         bit_rate: random.percent(2).then(|| *random.pick(&RATES)),
         latency_us,
-        // Whoever wrote that has had the answer before the program comes, which could not tell it from its own;
-        // therefore neither from one that hangs or is late.
+        // The answer to this write must have come before the program starts, which could not distinguish it from an
+        // answer to its own requests. So a device that hangs or is late gets none.
         unsaved_heartbeat: (latency_us < 20_000 && random.percent(15)).then_some(150),
         event_timer_ms: random.percent(30).then(|| *random.pick(&[10, 50, 100])),
         overload: random.percent(10),
-        vagaries: Vec::new(),
+        device_faults: Vec::new(),
     }
 }
 
-/// A moment in µs: early ones more often.
+/// A moment in µs. Early ones are more frequent.
 fn when(random: &mut Random) -> u64 {
     let most = *random.pick(&[2_000, 20_000, 100_000, 600_000, 4_000_000]);
     random.within(0..=most)
 }
 
-/// The number of a frame: early ones more often.
+/// The number of a frame. Small ones are more frequent.
 fn nth(random: &mut Random) -> u64 {
     let most = *random.pick(&[4, 15, 40, 100, 200]);
     random.within(0..=most)
@@ -155,33 +155,34 @@ fn fault(random: &mut Random) -> Fault {
     }
 }
 
-fn vagary(random: &mut Random) -> Vagary {
+fn device_fault(random: &mut Random) -> DeviceFault {
     let nth = nth(random);
     match random.within(0..=14) {
-        0 => Vagary::ResetAt { ms: when(random) / 1000 },
-        1 => Vagary::Hang { from_ms: when(random) / 1000, for_ms: *random.pick(&[20, 200, 2_000, 1_000_000]) },
+        0 => DeviceFault::ResetAt { ms: when(random) / 1000 },
+        1 => DeviceFault::Hang { from_ms: when(random) / 1000, for_ms: *random.pick(&[20, 200, 2_000, 1_000_000]) },
         2 | 3 => {
             let index =
                 [0x1000, 0x1017, 0x1018, 0x1008, 0x1010, 0x1011, 0x1800, 0x1a00, 0x6125, 0x6131, 0x61a0, 0x2320];
-            Vagary::Refuse { index: *random.pick(&index), code: *random.pick(&ABORTS) }
+            DeviceFault::Refuse { index: *random.pick(&index), code: *random.pick(&ABORTS) }
         }
-        4 | 5 => Vagary::Lose { nth },
-        6 => Vagary::Late { nth, ms: *random.pick(&[20, 60, 120, 600, 3_500]) },
-        7 => Vagary::Twice { nth },
-        8 => Vagary::Garbled { nth, place: usize::from(random.byte(0..=7)), turned: random.byte(1..=255) },
-        9 => Vagary::As { nth, node: *random.pick(&[1, 5, 12, 16, 127]) },
-        10 => Vagary::LoseLss(*random.pick(&[0x11, 0x13, 0x17, 0x43, 0x4b, 0x5e, 0x5a])),
-        11 => {
-            Vagary::LateLss(*random.pick(&[0x11, 0x13, 0x17, 0x43, 0x5e]), *random.pick(&[60, 300, 700, 2_500, 4_000]))
-        }
-        12 => Vagary::RefuseLss(*random.pick(&[0x11, 0x13, 0x17])),
-        13 => Vagary::Babbles {
+        4 | 5 => DeviceFault::Lose { nth },
+        6 => DeviceFault::Late { nth, ms: *random.pick(&[20, 60, 120, 600, 3_500]) },
+        7 => DeviceFault::Twice { nth },
+        8 => DeviceFault::Garbled { nth, place: usize::from(random.byte(0..=7)), turned: random.byte(1..=255) },
+        9 => DeviceFault::As { nth, node: *random.pick(&[1, 5, 12, 16, 127]) },
+        10 => DeviceFault::LoseLss(*random.pick(&[0x11, 0x13, 0x17, 0x43, 0x4b, 0x5e, 0x5a])),
+        11 => DeviceFault::LateLss(
+            *random.pick(&[0x11, 0x13, 0x17, 0x43, 0x5e]),
+            *random.pick(&[60, 300, 700, 2_500, 4_000]),
+        ),
+        12 => DeviceFault::RefuseLss(*random.pick(&[0x11, 0x13, 0x17])),
+        13 => DeviceFault::Babbles {
             from_ms: when(random) / 1000,
             for_ms: *random.pick(&[20, 500, 10_000]),
             every_us: *random.pick(&[550, 2_000, 20_000]),
         },
-        _ if random.percent(50) => Vagary::OfflineAfterReset,
-        _ => Vagary::EndlessFastscan,
+        _ if random.percent(50) => DeviceFault::OfflineAfterReset,
+        _ => DeviceFault::EndlessFastscan,
     }
 }
 

@@ -1,4 +1,4 @@
-//! Numbers from a seed: the same ones on every machine (SplitMix64).
+//! Random numbers from a seed, the same on every machine (SplitMix64).
 
 use std::ops::RangeInclusive;
 

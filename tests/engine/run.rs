@@ -1,9 +1,9 @@
-//! Lets a command run on the bench that a [`Spec`] says, and keeps everything that can be judged afterwards.
+//! Runs the command of a [`Spec`], and keeps everything that is checked afterwards.
 
-use crate::bench::{Holds, bench, holds, plan};
-use crate::carry_out::{Heard, Said, carry_out};
+use crate::bench::{DeviceState, bench, device_state, plan};
+use crate::carry_out::{Claim, Observations, carry_out};
 use crate::spec::Spec;
-use crate::station::{Unruly, ms};
+use crate::station::{FaultyDevice, ms};
 use crate::tap::{Passed, Tap};
 use crate::time::bound;
 use cangauge::bus::faults::Faulty;
@@ -16,30 +16,30 @@ use std::io::Write;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// A command that has come to its end.
+/// A finished command.
 pub(crate) struct Run {
-    pub(crate) result: Result<Said, Failure>,
+    pub(crate) result: Result<Claim, Failure>,
     pub(crate) bus: Tap<Faulty<MemoryBus>>,
     /// The devices before the command.
-    pub(crate) before: Vec<Holds>,
-    pub(crate) begun: Mono,
-    /// When the command had ended, and when it had settled.
+    pub(crate) before: Vec<DeviceState>,
+    pub(crate) started: Mono,
+    /// The end of the command, and the moment when the bus was quiet again.
     pub(crate) ended: Mono,
     pub(crate) settled: Mono,
     pub(crate) bound: Duration,
-    pub(crate) heard: Heard,
-    /// What the devices sent, as the simulator's own record writes it.
+    pub(crate) observed: Observations,
+    /// The values that the devices sent, in the format of the simulator's record.
     pub(crate) truth: Vec<String>,
-    /// What came before, if the program was killed in the middle of the same command.
+    /// The first run of the same command, if that program was killed.
     pub(crate) killed: Option<Killed>,
 }
 
-/// What a program that vanished leaves behind.
+/// The run of a program that was killed.
 pub(crate) struct Killed {
     pub(crate) frames: Vec<(Mono, Passed)>,
     /// The devices before and after it.
-    pub(crate) before: Vec<Holds>,
-    pub(crate) after: Vec<Holds>,
+    pub(crate) before: Vec<DeviceState>,
+    pub(crate) after: Vec<DeviceState>,
 }
 
 #[derive(Clone, Default)]
@@ -47,7 +47,7 @@ struct Memory(Arc<Mutex<Vec<u8>>>);
 
 impl Write for Memory {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.lock().expect("nobody panicked").extend_from_slice(bytes);
+        self.0.lock().expect("no thread panicked").extend_from_slice(bytes);
         Ok(bytes.len())
     }
 
@@ -57,12 +57,12 @@ impl Write for Memory {
 }
 
 impl Run {
-    /// The devices before anything was asked of them.
-    pub(crate) fn origin(&self) -> &[Holds] {
+    /// The devices before the first frame.
+    pub(crate) fn origin(&self) -> &[DeviceState] {
         self.killed.as_ref().map_or(&self.before, |killed| &killed.before)
     }
 
-    /// What a program that vanished had sent.
+    /// The frames that the killed program had sent.
     pub(crate) fn sent_by_killed(&self) -> impl Iterator<Item = (Mono, Frame)> {
         self.killed.iter().flat_map(|killed| &killed.frames).filter_map(|(at, passed)| match passed {
             Passed::Sent(frame) => Some((*at, *frame)),
@@ -71,59 +71,59 @@ impl Run {
     }
 }
 
-/// Lets time pass in which nobody runs a program.
+/// Lets time pass without a program.
 fn wait(bus: &mut impl Bus, until: Mono) {
     while !matches!(bus.receive(until), Ok(Event::Timeout) | Err(_)) {}
 }
 
-fn all_hold(bus: &MemoryBus) -> Vec<Holds> {
-    bus.stations::<Unruly>().map(|unruly| holds(&unruly.device)).collect()
+fn device_states(bus: &MemoryBus) -> Vec<DeviceState> {
+    bus.stations::<FaultyDevice>().map(|station| device_state(&station.device)).collect()
 }
 
 pub(crate) fn run(spec: &Spec) -> Run {
     let record = Memory::default();
     let recorder = Recorder::new(Box::new(record.clone())).expect("memory");
     let mut bus = bench(spec, &recorder);
-    // The boot-ups go over the wire before the program comes.
-    let mut begun = ms(20);
-    wait(&mut bus, begun);
+    // The boot-up messages are sent before the program starts.
+    let mut started = ms(20);
+    wait(&mut bus, started);
     for interrupt in &spec.interrupts {
-        bus.interrupt_at(begun + Duration::from_micros(*interrupt));
+        bus.interrupt_at(started + Duration::from_micros(*interrupt));
     }
-    let mut before = all_hold(&bus);
+    let mut before = device_states(&bus);
     let bound = bound(spec);
     let kill = spec.kill.map(|kill| kill.before);
-    let mut bus = Tap::new(Faulty::new(bus, plan(&spec.faults)), begun + bound, kill);
-    let mut heard = Heard::default();
-    let mut result = carry_out(&mut bus, spec, &mut heard);
+    let mut bus = Tap::new(Faulty::new(bus, plan(&spec.faults)), started + bound, kill);
+    let mut observed = Observations::default();
+    let mut result = carry_out(&mut bus, spec, &mut observed);
     let mut killed = None;
     if let (true, Some(kill)) = (bus.is_dead, spec.kill) {
         let frames = std::mem::take(&mut bus.frames);
-        begun = bus.now().mono + Duration::from_millis(kill.again_ms);
-        wait(&mut bus.bus, begun);
-        let after = all_hold(bus.bus.inner());
+        started = bus.now().mono + Duration::from_millis(kill.again_ms);
+        wait(&mut bus.bus, started);
+        let after = device_states(bus.bus.inner());
         killed = Some(Killed { frames, before, after: after.clone() });
         before = after;
-        bus = bus.anew(begun + bound);
-        // A program that starts wants every frame.
+        bus = bus.restarted(started + bound);
+        // A program that starts receives every frame.
         bus.listen(&Filters::All).expect("it can always listen");
-        heard = Heard::default();
-        result = carry_out(&mut bus, spec, &mut heard);
+        observed = Observations::default();
+        result = carry_out(&mut bus, spec, &mut observed);
     }
     let ended = bus.now().mono;
     if bus.overran {
         bus.overran = ended > bus.deadline || result.is_err();
     }
-    // What was handed over last gets there, and who was reset is back.
+    // The last frames are sent, and devices that were reset have restarted.
     wait(bus.bus.inner_mut(), ended + Duration::from_millis(400));
     let settled = bus.now().mono;
     recorder.flush().expect("memory");
-    let truth = record.0.lock().expect("nobody panicked").clone();
+    let truth = record.0.lock().expect("no thread panicked").clone();
     let truth = String::from_utf8(truth).expect("text").lines().skip(1).map(str::to_owned).collect();
-    Run { result, bus, before, begun, ended, settled, bound, heard, truth, killed }
+    Run { result, bus, before, started, ended, settled, bound, observed, truth, killed }
 }
 
-/// The frames as the program saw them, like those of `candump -L`.
+/// The frames as the program saw them, in the format of `candump -L`.
 pub(crate) fn transcript(run: &Run) -> String {
     let line = |(at, passed): &(Mono, Passed)| {
         let time = at.since_start();

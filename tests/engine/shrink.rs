@@ -1,9 +1,9 @@
-//! Smaller scenarios: what is left of one when a piece is taken away.
+//! Reduces a scenario: all variants with one piece less.
 
 use crate::spec::{Other, Spec};
 
 impl Spec {
-    /// Everything that is left of it when one piece is taken away.
+    /// All variants with one piece less.
     pub(crate) fn smaller(&self) -> Vec<Spec> {
         let mut all = Vec::new();
         let mut without = |change: &dyn Fn(&mut Spec)| {
@@ -15,8 +15,8 @@ impl Spec {
         (0..self.faults.len()).for_each(|at| without(&|spec| _ = spec.faults.remove(at)));
         (0..self.interrupts.len()).for_each(|at| without(&|spec| _ = spec.interrupts.remove(at)));
         for (at, device) in self.devices.iter().enumerate() {
-            for vagary in 0..device.vagaries.len() {
-                without(&|spec| _ = spec.devices[at].vagaries.remove(vagary));
+            for device_fault in 0..device.device_faults.len() {
+                without(&|spec| _ = spec.devices[at].device_faults.remove(device_fault));
             }
             if device.latency_us > 0 {
                 without(&|spec| spec.devices[at].latency_us = 0);

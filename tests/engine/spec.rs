@@ -1,5 +1,5 @@
-//! What a seed stands for: a bench, what goes wrong, what is asked for, and when it is interrupted. Everything is
-//! spelled out, so that it can be made smaller piece by piece.
+//! A scenario: the bench, the faults, the command, and the interruptions. Every part is a plain value, so that a
+//! failing scenario can be reduced piece by piece.
 
 use crate::command::Command;
 
@@ -17,10 +17,10 @@ pub(crate) struct Spec {
     pub(crate) command: Command,
 }
 
-/// The program vanishes, and the same command is typed once more.
+/// The program is killed, and the same command is run again.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Kill {
-    /// The first frame that it does not send, counted from 0.
+    /// The first frame that is not sent, counted from 0.
     pub(crate) before: u64,
     pub(crate) again_ms: u64,
 }
@@ -32,20 +32,20 @@ pub(crate) struct DeviceSpec {
     pub(crate) serial: u32,
     pub(crate) start: bool,
     pub(crate) heartbeat_ms: Option<u16>,
-    /// At another one than the bus's it is deaf and mute.
+    /// At a bit rate other than that of the bus the device neither receives nor sends.
     pub(crate) bit_rate: Option<u32>,
     pub(crate) latency_us: u64,
     /// Written to 1017h before the command, and not saved.
     pub(crate) unsaved_heartbeat: Option<u16>,
     pub(crate) event_timer_ms: Option<u16>,
     pub(crate) overload: bool,
-    pub(crate) vagaries: Vec<Vagary>,
+    pub(crate) device_faults: Vec<DeviceFault>,
 }
 
-/// What a device does that it should not.
+/// A fault of a device.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Vagary {
-    /// Its power fails for a moment.
+pub(crate) enum DeviceFault {
+    /// A short power failure.
     ResetAt {
         ms: u64,
     },
@@ -53,12 +53,12 @@ pub(crate) enum Vagary {
         from_ms: u64,
         for_ms: u64,
     },
-    /// Every SDO request for this index is refused.
+    /// The device rejects every SDO request for this index.
     Refuse {
         index: u16,
         code: u32,
     },
-    /// The n-th SDO answer never comes.
+    /// The n-th SDO answer is not sent.
     Lose {
         nth: u64,
     },
@@ -74,7 +74,7 @@ pub(crate) enum Vagary {
         place: usize,
         turned: u8,
     },
-    /// The n-th SDO answer comes under another node-ID.
+    /// The n-th SDO answer has the COB-ID of another node.
     As {
         nth: u64,
         node: u8,
@@ -84,7 +84,7 @@ pub(crate) enum Vagary {
     RefuseLss(u8),
     EndlessFastscan,
     OfflineAfterReset,
-    /// It sends emergencies that mean nothing, again and again.
+    /// The device sends emergencies with an unknown code, periodically.
     Babbles {
         from_ms: u64,
         for_ms: u64,
@@ -92,12 +92,12 @@ pub(crate) enum Vagary {
     },
 }
 
-/// Somebody else on the bus.
+/// Another participant on the bus.
 #[derive(Clone, Debug)]
 pub(crate) enum Other {
-    /// A second master: frames at moments in µs; segments of strings are fetched.
+    /// A second master: its frames with their moments in µs. It also requests the segments of strings.
     Master { plan: Vec<(u64, Act)> },
-    /// Frames that mean nothing to anybody, every so many µs.
+    /// Sends meaningless frames with this period in µs.
     Babbler { every_us: u64, seed: u64, nasty: bool },
 }
 
@@ -119,11 +119,11 @@ pub(crate) enum Act {
         specifier: u8,
         node: u8,
     },
-    /// Everybody back to the waiting state of LSS.
+    /// Switches all LSS slaves to waiting state.
     LssWait,
 }
 
-/// What goes wrong between the program and the wire. Frames are counted, each direction for itself.
+/// A fault between the program and the bus. Frames are counted separately for each direction.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Fault {
     Lose(u64),
@@ -139,15 +139,19 @@ pub(crate) enum Fault {
 }
 
 impl Spec {
-    /// Whether the bytes of frames change on the way, or somebody speaks for a device: then values mean nothing.
-    pub(crate) fn lies(&self) -> bool {
+    /// Whether frames change on the way or are sent under a false identifier: values then prove nothing.
+    pub(crate) fn falsifies_data(&self) -> bool {
         let faults = self.faults.iter().any(|fault| matches!(fault, Fault::Garble(..) | Fault::Truncate(..)));
         let nasty = self.others.iter().any(|other| matches!(other, Other::Babbler { nasty: true, .. }));
-        faults || nasty || self.vagaries().any(|vagary| matches!(vagary, Vagary::Garbled { .. } | Vagary::As { .. }))
+        faults
+            || nasty
+            || self
+                .device_faults()
+                .any(|device_fault| matches!(device_fault, DeviceFault::Garbled { .. } | DeviceFault::As { .. }))
     }
 
-    pub(crate) fn vagaries(&self) -> impl Iterator<Item = &Vagary> {
-        self.devices.iter().flat_map(|device| &device.vagaries)
+    pub(crate) fn device_faults(&self) -> impl Iterator<Item = &DeviceFault> {
+        self.devices.iter().flat_map(|device| &device.device_faults)
     }
 
     pub(crate) fn acts(&self) -> impl Iterator<Item = &Act> {
@@ -160,10 +164,12 @@ impl Spec {
             .map(|(_, act)| act)
     }
 
-    /// Whether anybody but the program changes what a device holds or does.
-    pub(crate) fn is_meddled_with(&self) -> bool {
+    /// Whether anything but the program changes a device.
+    pub(crate) fn is_changed_by_others(&self) -> bool {
         self.acts().any(|act| !matches!(act, Act::Read { .. }))
-            || self.vagaries().any(|vagary| matches!(vagary, Vagary::ResetAt { .. } | Vagary::OfflineAfterReset))
+            || self.device_faults().any(|device_fault| {
+                matches!(device_fault, DeviceFault::ResetAt { .. } | DeviceFault::OfflineAfterReset)
+            })
     }
 
     pub(crate) fn shares_node_ids(&self) -> bool {
@@ -171,12 +177,12 @@ impl Spec {
         (1..nodes.len()).any(|at| nodes[..at].contains(&nodes[at]))
     }
 
-    /// Frames come late, twice or in another order.
+    /// Whether frames are late, repeated or reordered.
     pub(crate) fn is_disordered(&self) -> bool {
         self.faults.iter().any(|fault| matches!(fault, Fault::Duplicate(_) | Fault::Delay(..)))
-            || self
-                .vagaries()
-                .any(|vagary| matches!(vagary, Vagary::Late { .. } | Vagary::Twice { .. } | Vagary::LateLss(..)))
+            || self.device_faults().any(|device_fault| {
+                matches!(device_fault, DeviceFault::Late { .. } | DeviceFault::Twice { .. } | DeviceFault::LateLss(..))
+            })
     }
 
     pub(crate) fn loses_sent(&self) -> bool {
@@ -185,18 +191,18 @@ impl Spec {
         })
     }
 
-    /// Nothing goes wrong at all.
+    /// Whether the scenario has no fault at all.
     pub(crate) fn is_clean(&self) -> bool {
         self.faults.is_empty()
             && self.others.is_empty()
             && self.interrupts.is_empty()
             && self.kill.is_none()
-            && self.vagaries().next().is_none()
+            && self.device_faults().next().is_none()
             && !self.shares_node_ids()
             && self.devices.iter().all(|device| device.bit_rate.is_none() && device.latency_us < 20_000)
     }
 
-    /// Nothing but faults between program and wire goes wrong.
+    /// Whether all faults are between the program and the bus.
     pub(crate) fn is_clean_but_for_faults(&self) -> bool {
         Spec { faults: Vec::new(), interrupts: Vec::new(), kill: None, ..self.clone() }.is_clean()
     }

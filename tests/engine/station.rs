@@ -1,7 +1,7 @@
-//! What sits on the bus: devices with vagaries that keep a record of what they really sent, and others.
+//! The participants on the bus: devices with faults, which record what they sent, and others.
 
 use crate::random::Random;
-use crate::spec::{Act, Vagary};
+use crate::spec::{Act, DeviceFault};
 use cangauge::bus::Mono;
 use cangauge::bus::memory::{Outbox, Station, Tuning};
 use cangauge::canopen::frame::Frame;
@@ -16,51 +16,56 @@ pub(crate) fn ms(milliseconds: u64) -> Mono {
     Mono::at(Duration::from_millis(milliseconds))
 }
 
-/// A device that does what it should not.
-pub(crate) struct Unruly {
+/// A device with faults.
+pub(crate) struct FaultyDevice {
     pub(crate) device: Device,
-    /// Which of the bench.
+    /// Its place on the bench.
     pub(crate) place: usize,
-    vagaries: Vec<Vagary>,
+    device_faults: Vec<DeviceFault>,
     resets: VecDeque<Mono>,
     hangs: Vec<(Mono, Mono)>,
-    /// It was to be woken and is not before then.
+    /// The device hangs until then: it is not woken before.
     hung_until: Mono,
-    /// SDO answers so far.
+    /// The SDO answers so far.
     answers: u64,
     late: Vec<(Mono, Frame)>,
-    /// When it babbles next, until when, and how often.
+    /// The next emergency without meaning, the end of the series, and its period.
     babble: Option<(Mono, Mono, Duration)>,
     unsaved: Option<Frame>,
-    /// Everything that it sent, when it was complete.
+    /// Every frame that it sent, with the moment of its end.
     pub(crate) sent: Vec<(Mono, Frame)>,
-    /// Signatures that reached it.
+    /// The objects to which a signature was written.
     pub(crate) signed: Vec<ObjectId>,
-    /// Every data byte sequence that it held in the object of interest.
+    /// The object under observation, and every value that it had.
     pub(crate) watched: Option<ObjectId>,
     pub(crate) held: BTreeSet<Vec<u8>>,
 }
 
-impl Unruly {
-    pub(crate) fn new(device: Device, place: usize, vagaries: &[Vagary], unsaved: Option<Frame>) -> Unruly {
+impl FaultyDevice {
+    pub(crate) fn new(
+        device: Device,
+        place: usize,
+        device_faults: &[DeviceFault],
+        unsaved: Option<Frame>,
+    ) -> FaultyDevice {
         let mut resets: Vec<Mono> = Vec::new();
         let mut hangs = Vec::new();
         let mut babble = None;
-        for vagary in vagaries {
-            match vagary {
-                Vagary::ResetAt { ms: at } => resets.push(ms(*at)),
-                Vagary::Hang { from_ms, for_ms } => hangs.push((ms(*from_ms), ms(from_ms + for_ms))),
-                Vagary::Babbles { from_ms, for_ms, every_us } => {
+        for device_fault in device_faults {
+            match device_fault {
+                DeviceFault::ResetAt { ms: at } => resets.push(ms(*at)),
+                DeviceFault::Hang { from_ms, for_ms } => hangs.push((ms(*from_ms), ms(from_ms + for_ms))),
+                DeviceFault::Babbles { from_ms, for_ms, every_us } => {
                     babble = Some((ms(*from_ms), ms(from_ms + for_ms), Duration::from_micros(*every_us)));
                 }
                 _ => {}
             }
         }
         resets.sort();
-        Unruly {
+        FaultyDevice {
             device,
             place,
-            vagaries: vagaries.to_vec(),
+            device_faults: device_faults.to_vec(),
             resets: resets.into(),
             hangs,
             hung_until: Mono::START,
@@ -75,9 +80,9 @@ impl Unruly {
         }
     }
 
-    /// From now on it behaves.
+    /// Removes all faults.
     pub(crate) fn tame(&mut self) {
-        self.vagaries.clear();
+        self.device_faults.clear();
         self.resets.clear();
         self.hangs.clear();
         self.late.clear();
@@ -85,7 +90,7 @@ impl Unruly {
         self.hung_until = Mono::START;
     }
 
-    /// An emergency of no code that anybody knows, if one is due and the one before is out.
+    /// Sends an emergency with an unknown code, if one is due and the previous one was sent.
     fn babble(&mut self, now: Mono, out: &mut Outbox) {
         let Some((due, until, every)) = self.babble.filter(|(due, ..)| *due <= now) else { return };
         self.babble = (due < until).then_some((now + every, until, every));
@@ -106,7 +111,7 @@ impl Unruly {
         }
     }
 
-    /// Lets the device act; of what it then has to say in answer, its vagaries make what they like.
+    /// Lets the device act, and applies its faults to the answers that it then sends.
     fn act(&mut self, now: Mono, out: &mut Outbox, act: impl FnOnce(&mut Device, &mut Outbox)) {
         let answers = |out: &mut Outbox| {
             let mut count = 0;
@@ -119,7 +124,7 @@ impl Unruly {
         let before = answers(out);
         act(&mut self.device, out);
         let mut old = answers(out).min(before);
-        if answers(out) > old && !self.vagaries.is_empty() {
+        if answers(out) > old && !self.device_faults.is_empty() {
             let all: Vec<Frame> = std::iter::from_fn(|| out.pop()).collect();
             for frame in all {
                 let is_answer = frame.id().sdo_response_node().is_some();
@@ -138,19 +143,19 @@ impl Unruly {
         let number = self.answers;
         self.answers += 1;
         let (mut copies, mut late) = (1, None);
-        for vagary in &self.vagaries {
-            match *vagary {
-                Vagary::Lose { nth } if nth == number => copies = 0,
-                Vagary::Twice { nth } if nth == number => copies = 2,
-                Vagary::Late { nth, ms } if nth == number => late = Some(now + Duration::from_millis(ms)),
-                Vagary::Garbled { nth, place, turned } if nth == number => {
+        for device_fault in &self.device_faults {
+            match *device_fault {
+                DeviceFault::Lose { nth } if nth == number => copies = 0,
+                DeviceFault::Twice { nth } if nth == number => copies = 2,
+                DeviceFault::Late { nth, ms } if nth == number => late = Some(now + Duration::from_millis(ms)),
+                DeviceFault::Garbled { nth, place, turned } if nth == number => {
                     let mut data = frame.data().to_vec();
                     if let Some(byte) = data.get_mut(place) {
                         *byte ^= turned;
                     }
                     frame = Frame::new(frame.id(), &data).unwrap_or(frame);
                 }
-                Vagary::As { nth, node } if nth == number => {
+                DeviceFault::As { nth, node } if nth == number => {
                     let id = CanId::sdo_response(NodeId::new(node).expect("a node-ID"));
                     frame = Frame::new(id, frame.data()).unwrap_or(frame);
                 }
@@ -172,8 +177,8 @@ impl Unruly {
         let begins = matches!(data[0] >> 5, 1 | 2)
             || data[0] >> 5 == 6 && data[0] & 1 == 0
             || data[0] >> 5 == 5 && data[0] & 3 == 0;
-        let code = self.vagaries.iter().find_map(|vagary| match vagary {
-            Vagary::Refuse { index: refused, code } if *refused == index && begins => Some(code.to_le_bytes()),
+        let code = self.device_faults.iter().find_map(|device_fault| match device_fault {
+            DeviceFault::Refuse { index: refused, code } if *refused == index && begins => Some(code.to_le_bytes()),
             _ => None,
         })?;
         let answer = [0x80, data[1], data[2], data[3], code[0], code[1], code[2], code[3]];
@@ -181,7 +186,7 @@ impl Unruly {
     }
 }
 
-impl Station for Unruly {
+impl Station for FaultyDevice {
     fn power_on(&mut self, now: Mono, out: &mut Outbox) {
         self.device.power_on(now, out);
         if let Some(write) = self.unsaved.take() {
@@ -229,7 +234,7 @@ impl Station for Unruly {
 
     fn next_wake(&self) -> Option<Mono> {
         let late = self.late.iter().map(|(due, _)| *due);
-        // A device that hangs is not woken before it is over.
+        // A device that hangs is not woken before the end.
         let babble = self.babble.map(|(due, ..)| due);
         let own = late.chain(self.device.next_wake()).chain(babble).min().map(|due| due.max(self.hung_until));
         own.into_iter().chain(self.resets.front().copied()).min()
@@ -249,18 +254,18 @@ impl Station for Unruly {
     }
 }
 
-/// A second master with a plan of its own.
-pub(crate) struct Rival {
+/// A second master with a fixed plan.
+pub(crate) struct SecondMaster {
     plan: VecDeque<(Mono, Act)>,
     fetching: Option<(u8, u8)>,
 }
 
-impl Rival {
-    pub(crate) fn new(plan: &[(u64, Act)]) -> Rival {
+impl SecondMaster {
+    pub(crate) fn new(plan: &[(u64, Act)]) -> SecondMaster {
         let mut plan: Vec<(Mono, Act)> =
             plan.iter().map(|(at, act)| (Mono::at(Duration::from_micros(*at)), *act)).collect();
         plan.sort_by_key(|(at, _)| *at);
-        Rival { plan: plan.into(), fetching: None }
+        SecondMaster { plan: plan.into(), fetching: None }
     }
 }
 
@@ -268,13 +273,13 @@ fn request(node: u8, data: [u8; 8]) -> Frame {
     Frame::full(CanId::sdo_request(NodeId::new(node).expect("a node-ID")), data)
 }
 
-/// A write of `bytes` bytes, as frame.
+/// The frame of an expedited write of `bytes` bytes.
 pub(crate) fn write(node: u8, index: u16, sub: u8, value: u32, bytes: u8) -> Frame {
     let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
     request(node, [0x23 | (4 - bytes) << 2, low, high, sub, a, b, c, d])
 }
 
-impl Station for Rival {
+impl Station for SecondMaster {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
@@ -316,7 +321,7 @@ impl Station for Rival {
     fn sent(&mut self, _: Mono, _: &Frame) {}
 }
 
-/// Sends frames that mean nothing; a nasty one under identifiers that mean something.
+/// Sends meaningless frames. A `nasty` one uses identifiers of CANopen services.
 pub(crate) struct Babbler {
     every: Duration,
     next: Mono,
@@ -345,7 +350,7 @@ impl Station for Babbler {
         let (id, least) = match random.within(0..=7) {
             _ if !self.nasty => (*random.pick(&[0x7ff, 0x010, 0x7f0, 0x679]), 0),
             0 => (0x080 + node, 8),
-            // What begins like an acknowledge would be one.
+            // A frame that looks like an acknowledge would be one.
             1..=3 => (0x580 + node, 0),
             4 => (0x700 + node, 0),
             5 => (0x7e4, 0),

@@ -1,9 +1,9 @@
-//! The program's own end of the bus: keeps what goes through, and ends what would never end.
+//! The program's end of the bus: records the frames, and ends a command that does not end by itself.
 
 use cangauge::bus::{BitRateControl, Bus, BusError, Event, Fault, Mode, Mono};
 use cangauge::canopen::frame::Frame;
 
-/// So often nothing may be waited for without any time passing.
+/// The most calls of `receive` in one scenario.
 const MOST_CALLS: u64 = 400_000;
 
 #[derive(Clone, Copy, Debug)]
@@ -15,18 +15,18 @@ pub(crate) enum Passed {
 pub(crate) struct Tap<B> {
     pub(crate) bus: B,
     pub(crate) frames: Vec<(Mono, Passed)>,
-    /// By then the command must have ended.
+    /// The command must have ended by then.
     pub(crate) deadline: Mono,
     pub(crate) overran: bool,
     calls: u64,
-    /// The program vanishes before it sends this frame, counted from 0.
+    /// The program is killed before it sends this frame, counted from 0.
     kill: Option<u64>,
-    /// Frames that the bus took.
+    /// The frames that the bus has accepted.
     taken: u64,
     pub(crate) is_dead: bool,
-    /// When the program was first told to stop.
+    /// When the program was first interrupted.
     pub(crate) interrupted: Option<Mono>,
-    /// Whether it was told that the interface is down, that the controller is off.
+    /// Whether the program saw the interface down, and the controller bus-off.
     pub(crate) was_down: bool,
     pub(crate) was_off: bool,
 }
@@ -55,12 +55,12 @@ impl<B: Bus> Tap<B> {
         })
     }
 
-    /// Somebody else's end of the same bus, who will not vanish.
-    pub(crate) fn anew(self, deadline: Mono) -> Tap<B> {
+    /// The same bus for the second program, which is not killed.
+    pub(crate) fn restarted(self, deadline: Mono) -> Tap<B> {
         Tap::new(self.bus, deadline, None)
     }
 
-    /// Nothing gets through any more.
+    /// An error if the program was killed: it neither sends nor receives.
     fn live(&self) -> Result<(), BusError> {
         if self.is_dead { Err(BusError::Unsupported("the program is gone".to_owned())) } else { Ok(()) }
     }
@@ -112,7 +112,7 @@ impl<B: Bus> Bus for Tap<B> {
             return Err(BusError::Unsupported("the scenario is over".to_owned()));
         }
         self.live()?;
-        // Nobody waits for ever: beyond the end there is nothing to be found.
+        // No wait is longer than the deadline of the scenario: nothing happens after it.
         let result = self.bus.receive(deadline.min(self.deadline + std::time::Duration::from_nanos(1)));
         match &result {
             Ok(Event::Frame(received)) => self.frames.push((received.at.mono, Passed::Received(received.frame))),

@@ -1,19 +1,19 @@
-//! How long a command may take, by what was asked for.
+//! The longest time that a command may take.
 
 use crate::command::{Command, Measuring};
 use crate::spec::Spec;
 use std::time::Duration;
 
-/// What the devices' own heartbeats may make of it: 1017h has 16 bits of milliseconds.
+/// The longest heartbeat time: 1017h has 16 bits of milliseconds.
 const LONGEST_HEARTBEAT: Duration = Duration::from_millis(0xffff);
 
-/// The time that a command may take by what was asked for: some sixty exchanges one after the other that get their
-/// answer at the last moment, storing and starting again, and what the command itself is to last.
+/// The longest time of a command: sixty exchanges in sequence with answers at the last moment, storing and restarting,
+/// and the duration that the user asked for.
 pub(crate) fn bound(spec: &Spec) -> Duration {
     let ms = Duration::from_millis;
     let unit = ms(spec.timeout_ms) * (spec.retries + 1);
     let asked = match &spec.command {
-        // Each segment may come just in time, and before that all of it once in blocks.
+        // Each segment may take the whole time-out, and a block transfer may fail before.
         Command::SdoRead { .. } | Command::SdoWrite { .. } => return ms(1000) + unit * 20 + ms(spec.timeout_ms) * 360,
         Command::Log { duration_ms, .. } => ms(*duration_ms),
         Command::Check { how, .. } => match how {
@@ -23,12 +23,12 @@ pub(crate) fn bound(spec: &Spec) -> Duration {
             }
         },
         Command::NmtWatch { for_ms, .. } | Command::PdoWatch { for_ms, .. } => ms(*for_ms),
-        // Every bit rate there is, listened to and asked at; at the lowest the questions alone take some seconds.
+        // All bit rates, one after the other; at the lowest one the requests alone take seconds.
         Command::Detect { each_ms, .. } => ms(*each_ms) * 20 + ms(8000),
-        // The interface and the device go there and back.
+        // Interface and device switch to the new bit rate and back.
         Command::Assign { retime: true, .. } => ms(20_000),
-        // A heartbeat is waited for, by the period that the device tells.
-        Command::Nmt { .. } | Command::NmtState { .. } if spec.lies() => LONGEST_HEARTBEAT,
+        // The command waits for a heartbeat, with the period that the device reported.
+        Command::Nmt { .. } | Command::NmtState { .. } if spec.falsifies_data() => LONGEST_HEARTBEAT,
         _ => Duration::ZERO,
     };
     ms(30_000) + unit * 60 + asked

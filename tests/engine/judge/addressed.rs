@@ -1,8 +1,8 @@
-//! Who is meant, and that nobody else is changed.
+//! Which devices a command addresses. No other device is changed.
 
 use super::*;
 
-/// Whether several devices may take what is for the only one.
+/// Whether several devices may execute a command for the only one.
 fn is_forced(command: &Command) -> bool {
     match command {
         Command::Assign { force, .. } | Command::LssStore { force, .. } | Command::LssActivate { force, .. } => *force,
@@ -62,7 +62,7 @@ pub(super) fn named(spec: &Spec) -> BTreeSet<u8> {
     }
 }
 
-/// Whether a device is the one that is meant.
+/// Whether the command addresses this device.
 pub(super) fn is_meant(spec: &Spec, place: usize) -> bool {
     let node = spec.devices[place].node;
     match &spec.command {
@@ -77,7 +77,7 @@ pub(super) fn is_meant(spec: &Spec, place: usize) -> bool {
                     let same = |at: usize| (spec.devices[at].kind, spec.devices[at].serial);
                     same(*meant) == same(place)
                 }
-                // Who has no node-ID and knows none of the inquiries cannot be seen, and takes what the only one takes.
+                // A device without node-ID and LSS inquiries is not detectable and obeys a command for the only one.
                 Target::Only => {
                     spec.devices.len() == 1
                         || is_forced(&spec.command)
@@ -92,24 +92,24 @@ pub(super) fn is_meant(spec: &Spec, place: usize) -> bool {
     }
 }
 
-pub(super) fn others_unchanged(spec: &Spec, run: &Run, after: &[Holds], broken: &mut Vec<Broken>) {
+pub(super) fn others_unchanged(spec: &Spec, run: &Run, after: &[DeviceState], violations: &mut Vec<Violation>) {
     let written_by_others = spec.acts().any(|act| matches!(act, Act::Nmt { .. }));
-    let own = |holds: &Holds| (holds.node, holds.bit_rate, holds.stored);
+    let own = |holds: &DeviceState| (holds.node, holds.bit_rate, holds.stored);
     for (place, (before, after)) in run.origin().iter().zip(after).enumerate() {
         if !is_meant(spec, place) && own(before) != own(after) {
-            broken.push(("changes nobody else", format!("device {place}: {before:?} became {after:?}")));
+            violations.push(("changes no other device", format!("device {place}: {before:?} became {after:?}")));
         }
         let meddled = written_by_others
             || spec.devices[place]
-                .vagaries
+                .device_faults
                 .iter()
-                .any(|vagary| matches!(vagary, Vagary::ResetAt { .. } | Vagary::Hang { .. }));
+                .any(|device_fault| matches!(device_fault, DeviceFault::ResetAt { .. } | DeviceFault::Hang { .. }));
         let broadcast = matches!(spec.command, Command::Nmt { all: true, .. });
-        // Who has no node-ID of its own may stand where the new one is.
+        // A device without node-ID may be at the place of the new one.
         if !is_meant(spec, place) && !meddled && !broadcast && before.state != after.state {
             let shares = named(spec).iter().any(|node| before.node == Some(*node));
             if !shares {
-                broken.push(("switches nobody else", format!("device {place}: {before:?} became {after:?}")));
+                violations.push(("switches no other device", format!("device {place}: {before:?} became {after:?}")));
             }
         }
     }

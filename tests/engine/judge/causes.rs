@@ -4,7 +4,7 @@ use super::*;
 use cangauge::output::failure::ErrorMessage;
 
 /// The kind of a failure is its real cause.
-pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
+pub(super) fn kinds(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     let Err(failure) = &run.result else { return };
     if run.bus.overran {
         return;
@@ -12,24 +12,24 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     let told = || format!("{:?}: {failure} (hint: {:?})", failure.kind(), ErrorMessage::of(&failure).hint);
     let tap = &run.bus;
     if tap.interrupted.is_some() && !tap.was_down && !tap.was_off {
-        // What went wrong before the interruption may be the reason.
+        // The failure may have happened before the interruption.
         let was_full = spec.faults.iter().any(|fault| matches!(fault, Fault::Full { .. } | Fault::BusOff { .. }));
         if failure.kind() == Kind::Bus && !was_full {
-            broken.push(("names the cause", format!("interrupted: {}", told())));
+            violations.push(("names the cause", format!("interrupted: {}", told())));
         }
-        let quiet = spec.faults.is_empty() && spec.others.is_empty() && spec.vagaries().next().is_none();
-        // A recording may have ended for want of rows before that, and was putting back what it had started.
+        let quiet = spec.faults.is_empty() && spec.others.is_empty() && spec.device_faults().next().is_none();
+        // A recording may have ended before, for lack of rows, and was restoring states when it was interrupted.
         let in_time = tap.interrupted < tap.frames.last().map(|(at, _)| *at) || !records(spec);
         if quiet && failure.kind() == Kind::NoAnswer && all_there(spec) && in_time {
-            broken.push(("names the cause", format!("interrupted: {}", told())));
+            violations.push(("names the cause", format!("interrupted: {}", told())));
         }
         return;
     }
     if failure.kind() == Kind::Interrupted && tap.interrupted.is_none() {
-        broken.push(("names the cause", format!("nobody interrupted: {}", told())));
+        violations.push(("names the cause", format!("not interrupted: {}", told())));
     }
     if tap.was_down && tap.interrupted.is_none() && !records(spec) && failure.kind() != Kind::Bus {
-        // It may have failed before.
+        // The command may have failed before.
         let down_at = spec.faults.iter().filter_map(|fault| match fault {
             Fault::Down { at_us, .. } => Some(*at_us),
             _ => None,
@@ -37,7 +37,7 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
         if down_at.min() == Some(0)
             || spec.faults.len() == 1 && !matches!(failure.kind(), Kind::Usage | Kind::Refused) && quiet(spec)
         {
-            broken.push(("names the cause", format!("the interface was down: {}", told())));
+            violations.push(("names the cause", format!("the interface was down: {}", told())));
         }
     }
     let bus_is_well = spec
@@ -47,37 +47,40 @@ pub(super) fn kinds(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     if failure.kind() == Kind::Bus && bus_is_well && spec.devices.iter().all(|device| device.bit_rate.is_none()) {
         let sharing = spec.shares_node_ids() || !spec.others.is_empty();
         let answered = run.bus.frames.iter().any(|(_, passed)| matches!(passed, Passed::Received(_)));
-        // A device that has gone to another bit rate acknowledges nothing any more.
+        // A device that has switched to another bit rate acknowledges no frame.
         let retimes = matches!(spec.command, Command::Assign { rate: Some(_), .. } | Command::LssActivate { .. });
         if answered
             && !sharing
             && !retimes
-            && !spec.vagaries().any(|vagary| {
-                // Who babbles may fill the bus.
-                matches!(vagary, Vagary::Hang { .. } | Vagary::OfflineAfterReset | Vagary::Babbles { .. })
+            && !spec.device_faults().any(|device_fault| {
+                // A device that floods the bus can cause any time-out.
+                matches!(
+                    device_fault,
+                    DeviceFault::Hang { .. } | DeviceFault::OfflineAfterReset | DeviceFault::Babbles { .. }
+                )
             })
         {
-            broken.push(("names the cause", format!("the bus works: {}", told())));
+            violations.push(("names the cause", format!("the bus works: {}", told())));
         }
     }
     if !spec.is_clean() {
         return;
     }
-    // Nothing is wrong: who is there answers, and breaks no rule.
+    // Without faults every device answers and follows the protocol.
     if failure.kind() == Kind::NoAnswer && all_there(spec) && !may_be_silent(spec) {
-        broken.push(("names the cause", format!("everybody answers: {}", told())));
+        violations.push(("names the cause", format!("all devices answer: {}", told())));
     }
     if failure.kind() == Kind::Unexpected && !may_be_odd(spec, &ErrorMessage::of(&failure).message) {
-        broken.push(("names the cause", format!("nothing is odd: {}", told())));
+        violations.push(("names the cause", format!("nothing is unexpected: {}", told())));
     }
     if failure.kind() == Kind::Refused
         && matches!(spec.command, Command::Scan { .. } | Command::Info { .. } | Command::Nmt { .. })
     {
-        broken.push(("names the cause", format!("nobody refuses: {}", told())));
+        violations.push(("names the cause", format!("no device refuses: {}", told())));
     }
 }
 
-/// A recording goes on when the interface is back.
+/// A recording continues when the interface is back.
 fn records(spec: &Spec) -> bool {
     match &spec.command {
         Command::Log { .. } => true,
@@ -87,7 +90,7 @@ fn records(spec: &Spec) -> bool {
 }
 
 fn quiet(spec: &Spec) -> bool {
-    spec.others.is_empty() && spec.vagaries().next().is_none() && all_there(spec) && spec.is_clean_but_for_faults()
+    spec.others.is_empty() && spec.device_faults().next().is_none() && all_there(spec) && spec.is_clean_but_for_faults()
 }
 
 fn all_there(spec: &Spec) -> bool {
@@ -95,10 +98,10 @@ fn all_there(spec: &Spec) -> bool {
     !spec.command.is_lss() && named(spec).is_subset(&there)
 }
 
-/// TPDOs that wait for something bring no rows; a device with a long latency is silent at a short time-out.
+/// TPDOs that wait for a trigger make no rows; a device with a long latency exceeds a short time-out.
 fn may_be_silent(spec: &Spec) -> bool {
     matches!(spec.command, Command::Log { .. } | Command::Check { .. } | Command::PdoWatch { .. })
-        // Its table of bit rates has not that of this bus, and what it stores is that it works at another one.
+        // The device's table of bit rates lacks that of this bus. A stored rate would be another one.
         || matches!(spec.command, Command::Store { .. }) && spec.devices.iter().any(|device| device.kind == "baumer")
         || spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
 }
@@ -108,7 +111,7 @@ fn may_be_odd(spec: &Spec, message: &str) -> bool {
         spec.command,
         Command::Assign { target: Target::Only, .. } | Command::LssStore { target: Target::Only, .. }
     );
-    // Devices that have no measured value, no such object; what a description does not know.
+    // Devices without process values lack such objects, and a description may not know them.
     matches!(spec.devices.len(), 0)
         || [
             "it has no",
@@ -123,7 +126,7 @@ fn may_be_odd(spec: &Spec, message: &str) -> bool {
         ]
         .iter()
         .any(|part| message.contains(part))
-        // Several that take one node-ID, because they may or because they could not be seen.
+        // Several devices take one node-ID: allowed by --force, or not detectable.
         || only && spec.devices.len() > 1
         || spec.command.is_lss() && spec.devices.iter().any(|device| device.latency_us * 2 >= spec.timeout_ms * 1000)
 }

@@ -1,9 +1,9 @@
-//! What may be sent, and to whom.
+//! Which frames a command may send, and to which node.
 
 use super::*;
 use cangauge::canopen::frame::Frame;
 
-/// Whether an LSS request is one of those that a command is there for.
+/// Whether a command may send this LSS request.
 fn may_configure(command: &Command, request: &[u8]) -> bool {
     match request.first() {
         Some(0x11 | 0x13) => matches!(command, Command::Assign { .. }),
@@ -14,7 +14,7 @@ fn may_configure(command: &Command, request: &[u8]) -> bool {
     }
 }
 
-/// Whether a command may write anything by SDO.
+/// Whether a command may write objects.
 fn writes(command: &Command) -> bool {
     !matches!(
         command,
@@ -40,8 +40,8 @@ fn writes(command: &Command) -> bool {
     )
 }
 
-/// No frame that could change a device that was not meant.
-pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, broken: &mut Vec<Broken>) {
+/// No frame may change a device that the command does not address.
+pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, violations: &mut Vec<Violation>) {
     let named = named(spec);
     let lss = spec.command.is_lss();
     let resets = |command: &Command| match command {
@@ -62,8 +62,10 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, bro
     );
     for (at, frame) in sent {
         let allowed = match frame.id() {
-            // A SYNC by the identifier that the device seemed to tell.
-            id if id != CanId::Standard(0) && syncs && spec.lies() && frame.data().is_empty() => !frame.is_remote(),
+            // A SYNC with the COB-ID that the device reported.
+            id if id != CanId::Standard(0) && syncs && spec.falsifies_data() && frame.data().is_empty() => {
+                !frame.is_remote()
+            }
             CanId::Standard(0) => match (&spec.command, frame.data()) {
                 (Command::Nmt { what, nodes, all }, &[specifier, node]) => {
                     specifier == what.specifier() && if *all { node == 0 } else { nodes.contains(&node) }
@@ -89,8 +91,8 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, bro
                 (Some(node), Some(data)) => {
                     let reads = matches!(data[0] >> 5, 2..=5);
                     let meant = named.contains(&node);
-                    // A block of a long download begins with a number; only short ones are written here.
-                    // Whether an identifier is free is seen by asking who there is.
+                    // A segment of a block download begins with its number; only short blocks are written here.
+                    // Whether a COB-ID is free is checked by reading from all nodes.
                     let asks = lss
                         || matches!(
                             spec.command,
@@ -102,7 +104,7 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, bro
             },
         };
         if !allowed {
-            broken.push(("touches nobody else", format!("{:?}: {frame}", at.since_start())));
+            violations.push(("addresses no other device", format!("{:?}: {frame}", at.since_start())));
             return;
         }
     }

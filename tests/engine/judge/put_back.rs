@@ -1,37 +1,38 @@
-//! Nothing stays switched that was switched on the way.
+//! Temporary changes are restored.
 
 use super::*;
 use cangauge::bus::BitRateControl;
 use cangauge::bus::memory::BIT_RATE;
 use cangauge::output::failure::ErrorMessage;
 
-/// What was switched on the way is put back.
-pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[Holds], broken: &mut Vec<Broken>) {
+/// Everything that the command switched temporarily is restored.
+pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[DeviceState], violations: &mut Vec<Violation>) {
     let detects = matches!(spec.command, Command::Detect { .. });
     let cannot = spec.loses_sent()
-        // Who babbles may fill the bus, and the last frames wait.
-        || spec.vagaries().any(|vagary| matches!(vagary, Vagary::Hang { .. } | Vagary::Babbles { .. }))
-        // Some hear LSS in one NMT state only, and another master takes them out of it.
+        // A device that floods the bus can delay the last frames.
+        || spec.device_faults().any(|fault| matches!(fault, DeviceFault::Hang { .. } | DeviceFault::Babbles { .. }))
+        // Some devices use LSS in one NMT state only, and another master may change that state.
         || spec.acts().any(|act| matches!(act, Act::Nmt { .. }))
         || spec.devices.iter().any(|device| device.bit_rate.is_some()) && !detects;
-    // What a program left that vanished, the next one need not know of.
+    // The second program does not know what the killed one had switched.
     if cannot || run.bus.overran || run.killed.is_some() {
         return;
     }
-    // The interface is as it was before.
+    // The interface has its bit rate from before.
     if detects && run.bus.bit_rate() != Some(BIT_RATE) && !run.bus.was_down {
-        broken.push(("puts the interface back", format!("{:?}", run.bus.bit_rate())));
+        violations.push(("restores the interface", format!("{:?}", run.bus.bit_rate())));
     }
     for (place, holds) in after.iter().enumerate() {
         if holds.configuring {
-            broken.push(("leaves configuration state", format!("device {place}: {holds:?}")));
+            violations.push(("leaves configuration state", format!("device {place}: {holds:?}")));
         }
     }
-    if spec.is_meddled_with() || spec.lies() || spec.is_disordered() || spec.shares_node_ids() {
+    if spec.is_changed_by_others() || spec.falsifies_data() || spec.is_disordered() || spec.shares_node_ids() {
         return;
     }
-    // A state that heartbeats told is what it was.
-    let clean_answers = spec.faults.is_empty() && spec.vagaries().all(|vagary| matches!(vagary, Vagary::Refuse { .. }));
+    // The NMT state that heartbeats showed before is back.
+    let clean_answers = spec.faults.is_empty()
+        && spec.device_faults().all(|device_fault| matches!(device_fault, DeviceFault::Refuse { .. }));
     let keeps = match &spec.command {
         Command::Log { .. } | Command::Check { .. } => true,
         Command::Map { .. } | Command::Store { .. } | Command::Restore { .. } => clean_answers,
@@ -41,7 +42,10 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[Holds], broken: &mut
         for (place, (before, after)) in run.before.iter().zip(after).enumerate() {
             let device = &spec.devices[place];
             let told = device.heartbeat_ms.is_some_and(|time| time <= 200) && device.unsaved_heartbeat.is_none();
-            let refuses = device.vagaries.iter().any(|vagary| matches!(vagary, Vagary::Refuse { index: 0x1017, .. }));
+            let refuses = device
+                .device_faults
+                .iter()
+                .any(|device_fault| matches!(device_fault, DeviceFault::Refuse { index: 0x1017, .. }));
             let shared = spec.shares_node_ids();
             if told
                 && !refuses
@@ -59,38 +63,38 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[Holds], broken: &mut
                     && !remarks.contains("stays")
                     && !remarks.contains("state")
                 {
-                    broken
-                        .push(("puts states back", format!("device {place}: {before:?} became {after:?}: {remarks}")));
+                    violations
+                        .push(("restores states", format!("device {place}: {before:?} became {after:?}: {remarks}")));
                 }
             }
         }
     }
-    // So is the heartbeat after a probe.
+    // The heartbeat time after a probe is restored.
     if let Command::NmtProbe { node } = spec.command
-        && !matches!(run.result, Ok(Said::Probed(false)))
+        && !matches!(run.result, Ok(Claim::Probed(false)))
         && clean_answers
     {
-        for unruly in run.bus.bus.inner_mut().stations_mut::<Unruly>() {
-            let device = &spec.devices[unruly.place];
+        for station in run.bus.bus.inner_mut().stations_mut::<FaultyDevice>() {
+            let device = &spec.devices[station.place];
             if device.node != Some(node) {
                 continue;
             }
-            let held = unruly.device.value(ObjectId::new(0x1017, 0), run.settled);
+            let held = station.device.value(ObjectId::new(0x1017, 0), run.settled);
             let Some(held) = held.and_then(|bytes| bytes.try_into().ok()) else { continue };
             let period = u16::from_le_bytes(held);
             let expected = device.unsaved_heartbeat.or(device.heartbeat_ms);
             if expected.is_some_and(|expected| expected != period) || expected.is_none() && period == 100 {
-                broken.push(("puts the heartbeat back", format!("{period} ms, not {expected:?}")));
+                violations.push(("restores the heartbeat time", format!("{period} ms, not {expected:?}")));
             }
         }
     }
 }
 
-/// Whether heartbeats of a device were seen.
-fn heartbeats(run: &Run, before: &Holds) -> bool {
-    run.bus.bus.inner().stations::<Unruly>().any(|unruly| {
-        holds(&unruly.device).node == before.node
-            && unruly
+/// Whether heartbeats of a device were received.
+fn heartbeats(run: &Run, before: &DeviceState) -> bool {
+    run.bus.bus.inner().stations::<FaultyDevice>().any(|station| {
+        device_state(&station.device).node == before.node
+            && station
                 .sent
                 .iter()
                 .filter(|(_, frame)| frame.id().heartbeat_node().map(NodeId::get) == before.node)

@@ -1,8 +1,8 @@
-//! What is recorded was sent, and what acts is sent once.
+//! Recorded values were sent, and actions are sent once.
 
 use super::*;
 
-/// How a command comes to its rows, and whether it keeps all that comes.
+/// The source of the rows of a command, and whether it records every value.
 fn recording(command: &Command) -> Option<(bool, bool)> {
     match command {
         Command::Log { poll_ms, count, .. } => Some((poll_ms.is_some(), count.is_none())),
@@ -13,28 +13,28 @@ fn recording(command: &Command) -> Option<(bool, bool)> {
     }
 }
 
-/// Every row is a value that was sent; none twice, none invented.
-pub(super) fn rows(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
+/// Every row is a value that was sent, and no value has two rows.
+pub(super) fn rows(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     let Some((polls, keeps_all)) = recording(&spec.command) else { return };
-    if spec.lies() || spec.shares_node_ids() {
+    if spec.falsifies_data() || spec.shares_node_ids() {
         return;
     }
     if polls {
         let answers = answers(run);
-        for row in &run.heard.rows {
+        for row in &run.observed.rows {
             let mut cells = row.split(',').skip(1);
             let node: u8 = cells.next().and_then(|node| node.parse().ok()).unwrap_or(0);
             let raw = hex(row.rsplit(',').next().unwrap_or(""));
             if !answers.iter().any(|((from, _), values)| *from == node && values.contains(&raw)) {
-                broken.push(("invents no row", row.clone()));
+                violations.push(("invents no row", row.clone()));
                 return;
             }
         }
         return;
     }
     let late = spec.faults.iter().any(|fault| matches!(fault, Fault::Delay(..)));
-    // What was not to be read is not known: a unit, and the digits with it.
-    let refuses = spec.vagaries().any(|vagary| matches!(vagary, Vagary::Refuse { .. }));
+    // A unit that could not be read is unknown, and so are the decimal digits.
+    let refuses = spec.device_faults().any(|device_fault| matches!(device_fault, DeviceFault::Refuse { .. }));
     let key = |row: &str| {
         let cells: Vec<&str> = row.split(',').collect();
         let time = if late { "" } else { cells[0] };
@@ -44,44 +44,44 @@ pub(super) fn rows(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     let mut left: BTreeMap<String, usize> = BTreeMap::new();
     run.truth.iter().for_each(|row| *left.entry(key(row)).or_default() += 1);
     let mut twice = spec.faults.iter().filter(|fault| matches!(fault, Fault::Duplicate(_))).count() * 8;
-    for row in &run.heard.rows {
+    for row in &run.observed.rows {
         match left.get_mut(&key(row)) {
             Some(count) if *count > 0 => *count -= 1,
             Some(_) if twice > 0 => twice -= 1,
             Some(_) => {
-                broken.push(("no row twice", row.clone()));
+                violations.push(("no value has two rows", row.clone()));
                 return;
             }
             None => {
-                // A unit that somebody changes in between shows in the record at once.
+                // If the unit is changed during the run, the simulator's record shows the new one at once.
                 let raw = row.rsplit(',').next().unwrap_or("");
                 let same = run.truth.iter().find(|other| other.rsplit(',').next() == Some(raw));
-                broken.push(("invents no row", format!("{row} (sent: {same:?})")));
+                violations.push(("invents no row", format!("{row} (sent: {same:?})")));
                 return;
             }
         }
     }
-    // Where nothing is lost nothing is missing between the first row and the last one.
+    // If nothing is lost, no value is missing between the first row and the last one.
     if !spec.is_clean() || !keeps_all {
         return;
     }
     let time = |row: &str| row.split(',').next().and_then(|time| time.parse::<u64>().ok()).unwrap_or(0);
     let node = |row: &str| row.split(',').nth(1).and_then(|node| node.parse::<u8>().ok()).unwrap_or(0);
-    if let (Some(first), Some(last)) = (run.heard.rows.first(), run.heard.rows.last()) {
+    if let (Some(first), Some(last)) = (run.observed.rows.first(), run.observed.rows.last()) {
         let named = named(spec);
         let between = run.truth.iter().filter(|row| (time(first)..=time(last)).contains(&time(row)));
         let sent = between.filter(|row| named.contains(&node(row))).count();
-        if sent != run.heard.rows.len() {
-            broken.push(("loses no row", format!("{} rows of {sent}", run.heard.rows.len())));
+        if sent != run.observed.rows.len() {
+            violations.push(("loses no row", format!("{} rows of {sent}", run.observed.rows.len())));
         }
     }
 }
 
-/// What every node really answered by expedited upload.
+/// The values that each node answered by expedited upload.
 pub(super) fn answers(run: &Run) -> BTreeMap<(u8, ObjectId), BTreeSet<Vec<u8>>> {
     let mut all: BTreeMap<_, BTreeSet<Vec<u8>>> = BTreeMap::new();
-    for unruly in run.bus.bus.inner().stations::<Unruly>() {
-        for (_, frame) in &unruly.sent {
+    for station in run.bus.bus.inner().stations::<FaultyDevice>() {
+        for (_, frame) in &station.sent {
             let (Some(node), Some(data)) = (frame.id().sdo_response_node(), frame.all_eight()) else { continue };
             if data[0] & 0x02 == 0 || data[0] >> 5 == 4 {
                 continue;
@@ -95,8 +95,8 @@ pub(super) fn answers(run: &Run) -> BTreeMap<(u8, ObjectId), BTreeSet<Vec<u8>>> 
     all
 }
 
-/// What acts is sent once, and a command that says it acted has reached the device.
-pub(super) fn signatures(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
+/// A signature is sent once, and a command that reports success has reached the device.
+pub(super) fn signatures(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     let mut sent: BTreeMap<(u8, [u8; 8]), u32> = BTreeMap::new();
     for (_, frame) in run.bus.all_sent() {
         if let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.all_eight())
@@ -106,10 +106,10 @@ pub(super) fn signatures(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
             *sent.entry((node.get(), data)).or_default() += 1;
         }
     }
-    // What the device had already is written once more to put it back.
+    // A value that the device had before may be written once more to restore it.
     let once = if matches!(spec.command, Command::Assign { .. }) && run.result.is_err() { 2 } else { 1 };
     if let Some((what, times)) = sent.iter().find(|(_, times)| **times > once) {
-        broken.push(("signs once", format!("{what:?} {times} times")));
+        violations.push(("sends a signature once", format!("{what:?} {times} times")));
     }
     let acts = matches!(
         spec.command,
@@ -118,8 +118,8 @@ pub(super) fn signatures(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
             | Command::Store { .. }
             | Command::Restore { .. }
     );
-    let mut devices = run.bus.bus.inner().stations::<Unruly>();
-    if acts && run.result.is_ok() && !spec.lies() && !devices.any(|unruly| !unruly.signed.is_empty()) {
-        broken.push(("holds what was asked", "no signature reached the device".to_owned()));
+    let mut devices = run.bus.bus.inner().stations::<FaultyDevice>();
+    if acts && run.result.is_ok() && !spec.falsifies_data() && !devices.any(|station| !station.signed.is_empty()) {
+        violations.push(("has the requested settings", "no signature reached the device".to_owned()));
     }
 }

@@ -1,4 +1,4 @@
-//! What a failure names as its cause has been seen: silence, a refusal, that nothing was changed.
+//! The cause that a failure names was seen: silence, a refusal, an unchanged device.
 
 use super::*;
 use cangauge::canopen::frame::Frame;
@@ -6,19 +6,21 @@ use cangauge::output::failure::ErrorMessage;
 use cangauge::tasks::Failure;
 use std::time::Duration;
 
-/// Judges the cause that a failure names by the frames of the command.
-pub(super) fn told_causes(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
+/// Compares the cause that a failure names with the frames of the command.
+pub(super) fn check_cause(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     let Err(failure) = &run.result else { return };
     match failure.kind() {
-        Kind::NoAnswer if !spec.lies() && !spec.shares_node_ids() => was_silent(spec, run, failure, broken),
-        // What cannot be done at all is not even asked for.
+        Kind::NoAnswer if !spec.falsifies_data() && !spec.shares_node_ids() => {
+            was_silent(spec, run, failure, violations)
+        }
+        // What cannot be done is not even requested.
         Kind::Refused if ErrorMessage::of(&failure).message.contains("refused by the device") => {
-            was_refused(run, failure, broken)
+            was_refused(run, failure, violations)
         }
         _ => {}
     }
     let stopped = failure.kind() == Kind::CheckFailed && !matches!(spec.command, Command::Check { .. });
-    // What was configured and is configured as before is nothing; power shows the rest.
+    // A setting that was written and restored is no change; the check after a power cycle shows the rest.
     let undoes = matches!(spec.command, Command::Assign { .. });
     if undoes {
         return;
@@ -26,12 +28,12 @@ pub(super) fn told_causes(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     if stopped || failure.kind() == Kind::Usage || ErrorMessage::of(&failure).message.contains("nothing was changed") {
         let changes = (0..run.bus.frames.len()).find_map(|place| taken(&run.bus.frames[place..]));
         if let Some((at, frame)) = changes {
-            broken.push(("says what was changed", format!("{failure}, and {frame} at {:?}", at.since_start())));
+            violations.push(("reports what was changed", format!("{failure}, and {frame} at {:?}", at.since_start())));
         }
     }
 }
 
-/// The first of these frames, if it changed a device, or may have.
+/// The first of these frames that changed a device, or may have.
 fn taken(frames: &[(Mono, Passed)]) -> Option<(Mono, Frame)> {
     let (&(at, Passed::Sent(request)), rest) = frames.split_first()? else { return None };
     let refuses = |answer: &Frame| match (request.id().sdo_request_node(), request.all_eight(), answer.all_eight()) {
@@ -47,7 +49,7 @@ fn taken(frames: &[(Mono, Passed)]) -> Option<(Mono, Frame)> {
     (changes(&request) && !refused).then_some((at, request))
 }
 
-/// Whether a frame of the program changes a device for longer than a command.
+/// Whether a frame of the program changes a device beyond the end of the command.
 fn changes(frame: &Frame) -> bool {
     match (frame.id().sdo_request_node(), frame.data().first()) {
         (Some(_), Some(first)) => begins(frame).is_some() && matches!(first >> 5, 1 | 6),
@@ -68,8 +70,8 @@ fn begins(frame: &Frame) -> Option<ObjectId> {
     begins.then(|| ObjectId::from_multiplexer([data[1], data[2], data[3]]))
 }
 
-/// Something was asked to which nothing came, if that is what is said.
-fn was_silent(spec: &Spec, run: &Run, failure: &Failure, broken: &mut Vec<Broken>) {
+/// If the failure says "no answer": a request without an answer exists.
+fn was_silent(spec: &Spec, run: &Run, failure: &Failure, violations: &mut Vec<Violation>) {
     let (Some(node), Some(object)) = (failure.node, failure.object) else { return };
     if ErrorMessage::of(&failure).message.contains("in the middle") {
         return;
@@ -77,19 +79,19 @@ fn was_silent(spec: &Spec, run: &Run, failure: &Failure, broken: &mut Vec<Broken
     let writes = ErrorMessage::of(&failure).message.contains(&format!("write {object}"));
     let asks = |frame: &Frame| {
         let writing = frame.data().first().is_some_and(|first| matches!(first >> 5, 1 | 6));
-        let begun = begins(frame).filter(|_| frame.id() == CanId::sdo_request(node));
-        begun.map(|begun| (begun, begun == object && writing == writes))
+        let started = begins(frame).filter(|_| frame.id() == CanId::sdo_request(node));
+        started.map(|started| (started, started == object && writing == writes))
     };
     let requests = run.bus.all_sent().into_iter().filter_map(|(at, frame)| Some((at, asks(&frame)?)));
     let requests: Vec<(Mono, (ObjectId, bool))> = requests.collect();
     let Some(first) = requests.iter().position(|(_, (_, is_it))| *is_it) else {
         if !(run.bus.was_down || run.bus.was_off || spec.faults.iter().any(is_full)) {
-            broken.push(("names the cause", format!("never asked: {failure}")));
+            violations.push(("names the cause", format!("never asked: {failure}")));
         }
         return;
     };
-    // Before an object is asked for again, another one is read, so that no old answer is taken for a new one: that
-    // may be what was silent.
+    // Before an object is read again, another one is read, so that a late answer cannot count as the new one. The
+    // read without an answer may be that one.
     let answered = requests[first..].iter().all(|(at, (object, _))| {
         let until = *at + Duration::from_millis(spec.timeout_ms);
         let mut received = run.bus.frames.iter();
@@ -98,7 +100,7 @@ fn was_silent(spec: &Spec, run: &Run, failure: &Failure, broken: &mut Vec<Broken
         })
     });
     if answered {
-        broken.push(("names the cause", format!("it was answered: {failure}")));
+        violations.push(("names the cause", format!("it was answered: {failure}")));
     }
 }
 
@@ -113,11 +115,11 @@ fn is_full(fault: &Fault) -> bool {
     matches!(fault, Fault::QueueFull(_) | Fault::Full { .. })
 }
 
-/// Somebody said no, if that is what is said.
-fn was_refused(run: &Run, failure: &Failure, broken: &mut Vec<Broken>) {
+/// If the failure says "refused": a device refused.
+fn was_refused(run: &Run, failure: &Failure, violations: &mut Vec<Violation>) {
     let refuses = |frame: &Frame| match (failure.abort(), failure.node, frame.data()) {
         (Some(code), Some(node), [0x80, rest @ ..]) => {
-            // What a frame that was cut short does not say counts as zero.
+            // Missing bytes of a truncated frame count as zero.
             let said = rest.get(3..).unwrap_or_default();
             frame.id().sdo_response_node().or(frame.id().sdo_request_node()) == Some(node)
                 && (said == code.0.to_le_bytes() || said.len() < 4 && code.0 == 0)
@@ -127,6 +129,6 @@ fn was_refused(run: &Run, failure: &Failure, broken: &mut Vec<Broken>) {
     };
     let came = run.bus.frames.iter().any(|(_, passed)| matches!(passed, Passed::Received(frame) if refuses(frame)));
     if !came {
-        broken.push(("names the cause", format!("nobody refused: {failure} {:?}", failure.abort())));
+        violations.push(("names the cause", format!("nobody refused: {failure} {:?}", failure.abort())));
     }
 }

@@ -1,12 +1,12 @@
-//! What is told of nodes that are watched has been seen, and what has been seen is told.
+//! `nmt watch` reports exactly the changes that were received.
 
 use super::*;
 use cangauge::canopen::nmt::Life;
 use cangauge::tasks::nmt::Change;
 use std::time::Duration;
 
-/// Every change that is told is one of a frame that came, none twice; no boot-up and no other state is left out.
-pub(super) fn watched(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
+/// Every reported change has its own frame; every boot-up and every change of state is reported.
+pub(super) fn watched(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     let Command::NmtWatch { nodes, .. } = &spec.command else { return };
     let received = run.bus.frames.iter().filter_map(|(at, passed)| match passed {
         Passed::Received(frame) => Life::parse(frame).map(|(node, life)| (*at, node, life)),
@@ -14,7 +14,7 @@ pub(super) fn watched(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
     });
     let lives: Vec<(Mono, NodeId, Life)> = received.filter(|(_, node, _)| nodes.contains(&node.get())).collect();
     let mut left = lives.clone();
-    for seen in &run.heard.seen {
+    for seen in &run.observed.seen {
         let at = seen.at.mono;
         let life = match seen.change {
             Change::BootUp => Life::BootUp,
@@ -23,23 +23,22 @@ pub(super) fn watched(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
                 let is_silent =
                     |(came, node, _): &(Mono, NodeId, Life)| *node == seen.node && *came > at - silent && *came <= at;
                 if silent < Duration::from_millis(50) || lives.iter().any(is_silent) {
-                    broken.push(("tells what came", format!("{seen:?} of {lives:?}")));
+                    violations.push(("reports what was received", format!("{seen:?} of {lives:?}")));
                 }
                 continue;
             }
         };
         match left.iter().position(|came| *came == (at, seen.node, life)) {
             Some(place) => drop(left.remove(place)),
-            None => broken.push(("tells what came", format!("{seen:?} of {lives:?}"))),
+            None => violations.push(("reports what was received", format!("{seen:?} of {lives:?}"))),
         }
     }
-    // What came while the nodes were still asked for their periods is not followed yet, and then never where that
-    // fails.
+    // Frames that arrive while the heartbeat times are read are not watched yet. If that read fails, none are.
     if run.result.is_err() {
         return;
     }
     let asked = run.bus.all_sent().last().map(|(at, _)| *at + Duration::from_millis(spec.timeout_ms));
-    let from = asked.unwrap_or(run.begun);
+    let from = asked.unwrap_or(run.started);
     let mut before: BTreeMap<NodeId, NmtState> = BTreeMap::new();
     for (at, node, life) in lives.iter().filter(|(at, ..)| *at > from) {
         let is_news = match life {
@@ -49,9 +48,9 @@ pub(super) fn watched(spec: &Spec, run: &Run, broken: &mut Vec<Broken>) {
             }
             Life::State(state) => before.insert(*node, *state).is_some_and(|before| before != *state),
         };
-        let is_told = run.heard.seen.iter().any(|seen| seen.node == *node && seen.at.mono == *at);
+        let is_told = run.observed.seen.iter().any(|seen| seen.node == *node && seen.at.mono == *at);
         if is_news && !is_told {
-            broken.push(("tells what came", format!("nothing of {life:?} of node {node} at {at:?}")));
+            violations.push(("reports what was received", format!("nothing of {life:?} of node {node} at {at:?}")));
             return;
         }
     }

@@ -1,7 +1,7 @@
-//! Commands for a bench.
+//! Chooses a command for a bench.
 
 use crate::command::{Command, Expected, How, Measuring, Target};
-use crate::kinds::{ATTIC, KEPT, model, stuff};
+use crate::kinds::{LARGE_KIND, LARGE_OBJECTS, filler, model};
 use crate::make::RATES;
 use crate::random::Random;
 use crate::spec::DeviceSpec;
@@ -12,7 +12,7 @@ use cangauge::device::description::Access;
 use cangauge::master::BlockMode;
 use cangauge::tasks::lss::Via;
 
-/// A node that is there, or seldom one that is not.
+/// A node of the bench, or sometimes an absent one.
 fn node(random: &mut Random, devices: &[DeviceSpec]) -> u8 {
     let there = random.pick(devices).node;
     there.filter(|_| !random.percent(6)).unwrap_or_else(|| random.byte(1..=127))
@@ -37,7 +37,7 @@ fn target(random: &mut Random, devices: &[DeviceSpec]) -> Target {
     }
 }
 
-/// An object of the device at a node, what can be written to it among those that are plain memory.
+/// An object of the device at a node. For writing only objects that have no effect besides their value.
 fn object(random: &mut Random, devices: &[DeviceSpec], node: u8, write: bool) -> Option<(ObjectId, DataType)> {
     let model = model(devices.iter().find(|device| device.node == Some(node))?.kind);
     let may = |object: ObjectId, access: Access, data_type: DataType| {
@@ -89,7 +89,7 @@ pub(super) fn command(random: &mut Random, devices: &[DeviceSpec]) -> Command {
         12 => Command::NmtState { nodes: nodes(random, devices) },
         13 => Command::NmtProbe { node: one },
         14 => Command::Startup { node: one, auto: random.percent(50) },
-        // What asks all 127 takes its time.
+        // A request to all 127 nodes takes long: choose it rarely.
         15 if random.percent(15) => Command::LssScan,
         15 if random.percent(40) => Command::LssInquire { target: target(random, devices) },
         15 => Command::LssStore { target: target(random, devices), force: random.percent(40) },
@@ -184,17 +184,17 @@ fn how(random: &mut Random) -> How {
     How { blocks, described: random.percent(50) }
 }
 
-/// Something large, of a device that keeps such things if there is one.
+/// A transfer of a large object, from a device that has one if possible.
 fn large(random: &mut Random, devices: &[DeviceSpec]) -> Command {
-    let keeps = devices.iter().find(|device| device.kind == ATTIC && device.node.is_some());
+    let keeps = devices.iter().find(|device| device.kind == LARGE_KIND && device.node.is_some());
     let node = keeps.and_then(|device| device.node).unwrap_or_else(|| node(random, devices));
-    let (object, _) = *random.pick(&KEPT);
+    let (object, _) = *random.pick(&LARGE_OBJECTS);
     let how = how(random);
     if random.percent(50) {
         return Command::SdoRead { node, object, how };
     }
     let length = *random.pick(&[0, 1, 7, 8, 28, 29, 300, 888, 889, 890, 2_500]);
-    Command::SdoWrite { node, object, bytes: stuff(length, random.next()), how }
+    Command::SdoWrite { node, object, bytes: filler(length, random.next()), how }
 }
 
 fn check(random: &mut Random, devices: &[DeviceSpec]) -> Command {
