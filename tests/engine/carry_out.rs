@@ -51,7 +51,7 @@ pub(crate) enum Claim {
     /// Whether a slave answers.
     Identified(bool),
     /// All expressions are satisfied.
-    Held,
+    Satisfied,
 }
 
 /// What a command reports while it runs.

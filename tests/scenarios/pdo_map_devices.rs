@@ -38,7 +38,7 @@ fn description(pdo: &str, parameters: &str) -> Arc<Model> {
 }
 
 fn parameter(at: &str, data_type: &str, more: &str) -> String {
-    let name: String = at.chars().filter(char::is_ascii_alphanumeric).collect();
+    let name: String = at.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
     format!("{{ at = \"{at}\", name = \"p{name}\", type = \"{data_type}\", access = \"rw\", {more} }},\n")
 }
 

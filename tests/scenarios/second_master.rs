@@ -19,7 +19,7 @@ const SETTING: ObjectId = ObjectId::new(0x2102, 0);
 
 fn device() -> Device {
     let description = r#"
-        name = "two masters"
+        name = "two-masters"
         title = "a device of the tests"
         vendor = "nobody"
         source = "none"

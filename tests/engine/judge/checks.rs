@@ -32,9 +32,9 @@ pub(super) fn checks(spec: &Spec, run: &mut Run, violations: &mut Vec<Violation>
             continue;
         };
         let Some(node) = verdict.node else { continue };
-        let holds = |value: f64| limits.low <= value && value <= limits.high;
+        let is_satisfied = |value: f64| limits.low <= value && value <= limits.high;
         if *how == Measuring::Once {
-            once(spec, run, (node, verdict), device_state, violations);
+            once(spec, run, (node, verdict), is_satisfied, violations);
             continue;
         }
         let of_node = run.observed.rows.iter().map(|row| row.split(',').collect::<Vec<_>>());
@@ -42,7 +42,7 @@ pub(super) fn checks(spec: &Spec, run: &mut Run, violations: &mut Vec<Violation>
         let values: Vec<Option<f64>> = of_node.map(|cells| cells[3].parse().ok()).collect();
         let ruling = match values.as_slice() {
             [] => Outcome::NoData,
-            values if values.iter().all(|value| value.is_some_and(holds)) => Outcome::Ok,
+            values if values.iter().all(|value| value.is_some_and(is_satisfied)) => Outcome::Ok,
             _ => Outcome::Fail,
         };
         if verdict.outcome != ruling || verdict.count != values.len() as u64 {
@@ -56,13 +56,13 @@ fn once(
     spec: &Spec,
     run: &mut Run,
     (node, verdict): (NodeId, &Verdict),
-    holds: impl Fn(f64) -> bool,
+    is_satisfied: impl Fn(f64) -> bool,
     violations: &mut Vec<Violation>,
 ) {
     let shown = verdict.values.first().and_then(|shown| shown.value);
     let right = match (verdict.outcome, shown) {
-        (Outcome::Ok, Some(value)) => device_state(value),
-        (Outcome::Fail, Some(value)) => !device_state(value),
+        (Outcome::Ok, Some(value)) => is_satisfied(value),
+        (Outcome::Fail, Some(value)) => !is_satisfied(value),
         // A missing value satisfies no expression.
         (Outcome::Fail, None) => true,
         (Outcome::Ok | Outcome::NoData, _) => verdict.outcome == Outcome::NoData && shown.is_none(),
