@@ -3,18 +3,18 @@
 mod host;
 
 use super::args::{BusSpec, Duration, InterfaceName, Rate};
-use super::exit::{IntoFailure, stdout};
-use super::{Format, Global, open};
+use super::exit::IntoFailure;
+use super::{Global, open};
 use crate::bus::claim::Claim;
-use crate::output::interfaces::{self, Interface};
-use crate::tasks::detect::{By, Detection, How, Tried, detect};
-use crate::tasks::{Failure, Kind};
+use crate::output::failure::ErrorMessage;
+use crate::output::interfaces::{BitRateReport, change, tried_line};
+use crate::tasks::Failure;
+use crate::tasks::detect::{By, DetectFailure, How, detect};
 use clap::{Args, Subcommand};
-use std::io::{self, Write};
 
-/// List CAN interfaces, switch them on and off, find the bit rate of a bus
+/// List CAN interfaces, bring them up and down, find the bit rate of a bus
 ///
-/// Setting an interface takes root (CAP_NET_ADMIN); without it the lines to type are said.
+/// Setting an interface needs root (CAP_NET_ADMIN). Without it, the error shows the commands to type.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge bus list\n  cangauge bus up can0 250k\n  cangauge bus detect can0\n  cangauge bus down can0"
@@ -26,50 +26,50 @@ pub(crate) struct BusCommand {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// List the CAN interfaces of this machine with bit rate, state and error counters
+    /// List the CAN interfaces of this computer with bit rate, state and error counters
     List,
-    /// Switch an interface on, at a bit rate
+    /// Bring an interface up at a bit rate
     ///
-    /// One that is up at this rate is left alone; one that is up at another goes down for a moment. Only the
-    /// bit rate, the listen-only mode and the switch are set. What was set is read back.
+    /// An interface that is already up at this bit rate stays as it is. One that is up at another bit rate goes down
+    /// for a moment. Only the bit rate, the listen-only mode and the link are set. They are read back.
     Up(Up),
-    /// Switch an interface off
+    /// Bring an interface down
     Down(Down),
-    /// Find the bit rate of a running bus by listening only; prints it in bit/s
+    /// Find the bit rate of a running bus by listening; print it in bit/s
     ///
-    /// The usual bit rates are tried one after the other, the interface's own first, until valid frames are
-    /// heard. Nothing is sent, acknowledged or disturbed. At the end, on Ctrl-C too, the interface is put
-    /// back as it was. A device alone with this machine is not heard like that: nobody acknowledges its frames.
+    /// Tries the usual bit rates one after the other, the present one first, until it receives valid frames. It
+    /// sends no frame and no acknowledge. At the end, and on Ctrl-C, the interface is set back. A device that is alone
+    /// on the bus cannot be heard, because no node acknowledges its frames.
     Detect(Detect),
 }
 
 #[derive(Debug, Args)]
 struct Up {
-    /// Which interface: can0
+    /// Interface: can0
     interface: InterfaceName,
-    /// 250k, 1M, 125000; not given: only switched on, as it is set (a virtual one has none)
+    /// Bit rate: 250k, 1M, 125000 [default: the present one; a virtual interface has none]
     rate: Option<Rate>,
-    /// Only listen: no frame, no acknowledge, no error flag
+    /// Listen only: send no frame, no acknowledge and no error flag
     #[arg(long, requires = "rate")]
     listen_only: bool,
 }
 
 #[derive(Debug, Args)]
 struct Down {
-    /// Which interface: can0
+    /// Interface: can0
     interface: InterfaceName,
 }
 
 #[derive(Debug, Args)]
 struct Detect {
-    /// Which bus: can0, sim:FILE.toml; not given: --bus
+    /// Bus: can0, sim:FILE.toml [default: --bus]
     #[arg(value_name = "BUS")]
     on: Option<BusSpec>,
-    /// Where nothing is heard, ask: every node-ID for its device type, at one rate after the other. Only
-    /// for a bench with one device: at a wrong rate this disturbs every frame on the bus
+    /// If nothing is received, ask each node-ID for its device type at each bit rate. Only for a bench with one
+    /// device: at a wrong bit rate this disturbs every frame on the bus
     #[arg(long)]
     active: bool,
-    /// How long each bit rate is tried; the default hears a heartbeat of once a second
+    /// Time per bit rate; the default is longer than a heartbeat interval of 1 s
     #[arg(long = "for", value_name = "DUR", default_value = "1500ms")]
     each: Duration,
 }
@@ -85,104 +85,54 @@ impl BusCommand {
             Action::List => {
                 let all = host::list();
                 if all.is_empty() {
-                    global.console().note("there is no CAN interface here");
+                    global.console().note("this computer has no CAN interface");
                 }
                 global.print(&all)
             }
             Action::Up(up) => {
                 let rate = up.rate.map(|rate| rate.0);
-                let (after, said) = host::up(&up.interface.0, rate, up.listen_only)?;
-                done(&after, &said, global)
+                report(&host::up(&up.interface.0, rate, up.listen_only)?, global)
             }
-            Action::Down(down) => {
-                let (after, said) = host::down(&down.interface.0)?;
-                done(&after, &said, global)
-            }
+            Action::Down(down) => report(&host::down(&down.interface.0)?, global),
             Action::Detect(detect) => detect.run(global),
         }
     }
 }
 
-/// What was done is a note; as data only where a program asks for it.
-fn done(after: &Interface, said: &str, global: &Global) -> anyhow::Result<()> {
-    global.print_data(std::slice::from_ref(after))?;
-    global.console().note(said);
+fn report(changed: &host::Changed, global: &Global) -> anyhow::Result<()> {
+    global.print_data(std::slice::from_ref(&changed.after))?;
+    global.console().note(&change(&changed.before, &changed.after));
     Ok(())
 }
 
 impl Detect {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let Some(spec) = self.on.as_ref().or(global.bus.as_ref()) else {
-            let hint = "see what is there: cangauge bus list";
-            return Err(Failure::new(Kind::Usage, "which bus?").hint(hint).into());
+            return Err(ErrorMessage::usage("no bus was given").hint("list the interfaces: cangauge bus list").into());
         };
         let mut bus = open::open_as(global, spec, true)?;
         let console = global.console();
-        let mut asked = false;
-        let found = detect(&mut *bus, self.active, self.each.0, &mut |tried| {
-            if tried.how == How::Asking && !std::mem::replace(&mut asked, true) {
-                console.note("nothing valid is heard: asking, which disturbs whoever is at another bit rate");
+        let mut is_asking = false;
+        let detection = detect(&mut *bus, self.active, self.each.0, &mut |tried| {
+            if tried.how == How::Asking && !std::mem::replace(&mut is_asking, true) {
+                console.note("no valid frame: now asking, which disturbs nodes at other bit rates");
             }
-            console.note(&said(tried));
+            console.note(&tried_line(tried));
         });
-        let name = bus.name().to_owned();
+        let interface = bus.name().to_owned();
         let finished = bus.finish().or_fail();
-        let found = found?;
+        let detection = detection?;
         finished?;
-        let Some((bit_rate, by)) = found.found else {
-            if global.format == Format::Json {
-                write(|out| interfaces::detection_json(out, &name, &found))?;
-            }
-            return Err(nothing(&name, self.active, &found).into());
+        let report = BitRateReport { interface, detection };
+        let Some((_, by)) = report.detection.found else {
+            global.print_json(std::slice::from_ref(&report))?;
+            let BitRateReport { interface, detection } = report;
+            return Err(Failure::general(DetectFailure::NotFound { interface, detection, active: self.active }).into());
         };
-        write(|out| match global.format {
-            Format::Json => interfaces::detection_json(out, &name, &found),
-            Format::Csv => interfaces::detection_csv(out, &name, &found),
-            Format::Text => writeln!(out, "{bit_rate}"),
-        })?;
+        global.print(std::slice::from_ref(&report))?;
         if by == By::Acknowledge {
-            console.warn("at this rate alone somebody acknowledges; nobody answers");
+            console.warn("requests were acknowledged at this bit rate only, but no node answered");
         }
         Ok(())
     }
-}
-
-fn write(work: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> anyhow::Result<()> {
-    let mut out = io::stdout().lock();
-    work(&mut out).and_then(|()| out.flush()).map_err(stdout)
-}
-
-fn said(tried: &Tried) -> String {
-    let counted = |count: u32, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
-    let what = match &tried.impossible {
-        Some(why) => format!("not with this interface: {why}"),
-        None => format!("{}, {}", counted(tried.frames, "valid frame"), counted(tried.errors, "error")),
-    };
-    let acknowledged = if tried.acknowledged { ", acknowledged" } else { "" };
-    format!("{} bit/s: {what}{acknowledged}", tried.bit_rate)
-}
-
-fn nothing(name: &str, active: bool, detection: &Detection) -> Failure {
-    let errors = detection.tried.iter().any(|tried| tried.errors > 0);
-    let (message, hint) = match (active, errors) {
-        (false, true) => (
-            "errors, but no valid frame at any bit rate",
-            format!(
-                "a device alone on the bus is not heard, as nobody acknowledges it; on a bench with one device \
-                 only: cangauge bus detect {name} --active"
-            ),
-        ),
-        (false, false) => (
-            "nothing is heard at any bit rate",
-            format!(
-                "the devices may be silent: listen longer (--for 5s), or on a bench with one device only: \
-                 cangauge bus detect {name} --active"
-            ),
-        ),
-        (true, _) => (
-            "nothing tells the bit rate",
-            "check the sensor's power, the wiring and the 120 ohm terminators".to_owned(),
-        ),
-    };
-    Failure::new(Kind::NoAnswer, format!("{name}: {message}")).hint(hint)
 }

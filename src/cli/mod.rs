@@ -246,6 +246,11 @@ impl Global {
         if self.format == Format::Text { Ok(()) } else { self.print(reports) }
     }
 
+    /// Prints reports if the format is JSON: results of a command that failed.
+    pub(crate) fn print_json<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
+        if self.format == Format::Json { self.print(reports) } else { Ok(()) }
+    }
+
     /// Prints reports one by one as they arrive.
     #[allow(dead_code)]
     pub(crate) fn stream<R: Report>(&self) -> anyhow::Result<Stream<R, io::Stdout>> {

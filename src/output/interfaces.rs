@@ -1,14 +1,11 @@
-//! CAN interfaces, and the result of a bit rate detection.
+//! Text and reports of CAN interfaces and of the search for a bit rate.
 
-use super::csv;
-use super::json::line;
 use super::report::{Cell, Column, Report};
-use crate::tasks::detect::{By, Detection, How};
-use serde::Serialize;
+use crate::tasks::detect::{By, Detection, How, Tried};
 use std::io::{self, Write};
 
-/// A CAN interface. What is unknown is `None`.
-#[derive(Clone, Debug, Default)]
+/// An interface. A field is `None` if it is unknown or does not apply.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Interface {
     /// The name.
     pub interface: String,
@@ -16,111 +13,154 @@ pub struct Interface {
     pub up: bool,
     /// The driver of its hardware.
     pub driver: Option<String>,
-    /// The kind of link: `can`, `vcan`.
+    /// Its kind in the kernel: `can`, `vcan`.
     pub kind: Option<String>,
-    /// In bit/s.
+    /// The bit rate in bit/s.
     pub bit_rate: Option<u32>,
-    /// Position of the sample point within a bit, 0 to 1.
+    /// The sample point as a part of a bit, 0 to 1.
     pub sample_point: Option<f64>,
-    /// The controller's state.
+    /// The state of the controller.
     pub state: Option<&'static str>,
-    /// Whether it is in listen-only mode.
+    /// Whether it is listen-only.
     pub listen_only: Option<bool>,
-    /// Restart delay after bus-off in milliseconds; 0: no restart.
+    /// The time in milliseconds until an automatic restart after bus-off; 0: no automatic restart.
     pub restart_ms: Option<u32>,
-    /// Transmit error counter.
+    /// The transmit error counter.
     pub tx_errors: Option<u16>,
-    /// Receive error counter.
+    /// The receive error counter.
     pub rx_errors: Option<u16>,
-    /// The only bit rates that it supports, in bit/s.
+    /// The bit rates in bit/s, if only these can be set.
     pub bit_rates: Option<Vec<u32>>,
 }
 
 impl Report for Interface {
     const COLUMNS: &'static [Column] = &[
         Column::new("interface"),
-        Column::new("up").heading("LINK"),
+        Column::new("up").json_only(),
+        Column::new("link").not_json(),
+        Column::new("driver").json_only(),
+        Column::new("kind").json_only(),
         Column::new("bit_rate").right(),
+        Column::new("sample_point").json_only(),
         Column::new("state"),
-        Column::new("listen_only").heading("MODE"),
+        Column::new("listen_only").json_only(),
+        Column::new("mode").not_json(),
+        Column::new("restart_ms").json_only(),
         Column::new("tx_errors").right(),
         Column::new("rx_errors").right(),
-        Column::new("driver"),
-        Column::new("kind").data_only(),
-        Column::new("sample_point").data_only(),
-        Column::new("restart_ms").data_only(),
-        Column::new("bit_rates").data_only(),
+        Column::new("driver").not_json(),
+        Column::new("bit_rates").json_only(),
     ];
 
     fn cells(&self) -> Vec<Cell> {
-        let mode = |listen_only| if listen_only { "listen-only" } else { "normal" };
-        let driver = Cell::from(self.driver.as_ref());
+        let link = if self.up { "up" } else { "down" };
+        let mode = self.listen_only.map(|listens| if listens { "listen-only" } else { "normal" });
         vec![
-            self.interface.as_str().into(),
-            Cell::from(self.up).shown_as(if self.up { "up" } else { "down" }),
+            self.interface.clone().into(),
+            self.up.into(),
+            link.into(),
+            self.driver.clone().into(),
+            self.kind.clone().into(),
             self.bit_rate.into(),
+            self.sample_point.map_or(Cell::Null, |point| Cell::Real(point, 3)),
             self.state.into(),
-            self.listen_only.map(|listen_only| Cell::from(listen_only).shown_as(mode(listen_only))).into(),
+            self.listen_only.into(),
+            mode.into(),
+            self.restart_ms.into(),
             self.tx_errors.into(),
             self.rx_errors.into(),
-            // A virtual interface has no driver.
-            if driver == Cell::Null { driver.shown_as(Cell::from(self.kind.as_ref()).shown()) } else { driver },
-            self.kind.as_ref().into(),
-            self.sample_point.map(|point| Cell::Real(point, 3)).into(),
-            self.restart_ms.into(),
-            self.bit_rates.as_ref().map(|rates| Cell::list(rates.iter().copied())).into(),
+            self.driver.clone().or_else(|| self.kind.clone()).into(),
+            self.bit_rates.as_ref().map_or(Cell::Null, |rates| Cell::list(rates.iter().copied())),
         ]
     }
 }
 
-/// What a detection found, as one object.
-pub fn detection_json(out: &mut dyn Write, name: &str, detection: &Detection) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Found<'a> {
-        interface: &'a str,
-        bit_rate: Option<u32>,
-        by: Option<&'a str>,
-        tried: Vec<Tried<'a>>,
+/// What was changed: `can0 is up at 250000 bit/s; it was up at 125000 bit/s`.
+pub fn change(before: &Interface, after: &Interface) -> String {
+    let (name, now, was) = (&after.interface, link_text(after), link_text(before));
+    match (before == after, now == was) {
+        (true, _) => format!("{name} is {now} already: nothing was changed"),
+        (false, true) => format!("{name} is {now}"),
+        (false, false) => format!("{name} is {now}; it was {was}"),
     }
-    #[derive(Serialize)]
-    struct Tried<'a> {
-        bit_rate: u32,
-        active: bool,
-        frames: Option<u32>,
-        errors: Option<u32>,
-        acknowledged: Option<bool>,
-        impossible: Option<&'a str>,
+}
+
+fn link_text(interface: &Interface) -> String {
+    let link = if interface.up { "up" } else { "down" };
+    let rate = interface.bit_rate.map_or_else(String::new, |rate| format!(" at {rate} bit/s"));
+    let mode = if interface.listen_only == Some(true) { ", listen-only" } else { "" };
+    format!("{link}{rate}{mode}")
+}
+
+/// The result of a search for the bit rate of a bus.
+#[derive(Clone, Debug)]
+pub struct BitRateReport {
+    /// The interface.
+    pub interface: String,
+    /// What was found.
+    pub detection: Detection,
+}
+
+impl Report for BitRateReport {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("interface"),
+        Column::new("bit_rate"),
+        Column::new("by"),
+        Column::nested(
+            "tried",
+            &[
+                Column::new("bit_rate"),
+                Column::new("active"),
+                Column::new("frames"),
+                Column::new("errors"),
+                Column::new("acknowledged"),
+                Column::new("impossible"),
+            ],
+        )
+        .json_only(),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let Detection { found, tried } = &self.detection;
+        let by = found.map(|(_, by)| match by {
+            By::Frames => "frames",
+            By::Acknowledge => "acknowledge",
+        });
+        vec![
+            self.interface.clone().into(),
+            found.map(|(bit_rate, _)| bit_rate).into(),
+            by.into(),
+            Cell::Rows(tried.iter().map(tried_cells).collect()),
+        ]
     }
-    let tried = detection.tried.iter().map(|tried| {
-        let active = tried.how == How::Asking;
-        let possible = tried.impossible.is_none();
-        Tried {
-            bit_rate: tried.bit_rate,
-            active,
-            frames: possible.then_some(tried.frames),
-            errors: possible.then_some(tried.errors),
-            acknowledged: (possible && active).then_some(tried.acknowledged),
-            impossible: tried.impossible.as_deref(),
-        }
-    });
-    let found = Found {
-        interface: name,
-        bit_rate: detection.found.map(|(rate, _)| rate),
-        by: detection.found.map(|(_, by)| by_name(by)),
-        tried: tried.collect(),
+
+    /// The bit rate alone.
+    fn text(reports: &[BitRateReport], out: &mut dyn Write) -> io::Result<()> {
+        let mut found = reports.iter().filter_map(|report| report.detection.found);
+        found.try_for_each(|(bit_rate, _)| writeln!(out, "{bit_rate}"))
+    }
+}
+
+fn tried_cells(tried: &Tried) -> Vec<Cell> {
+    let is_active = tried.how == How::Asking;
+    let is_possible = tried.impossible.is_none();
+    vec![
+        tried.bit_rate.into(),
+        is_active.into(),
+        is_possible.then_some(tried.frames).into(),
+        is_possible.then_some(tried.errors).into(),
+        (is_possible && is_active).then_some(tried.acknowledged).into(),
+        tried.impossible.clone().into(),
+    ]
+}
+
+/// One line about a bit rate that was tried.
+pub fn tried_line(tried: &Tried) -> String {
+    let counted = |count: u32, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+    let result = match &tried.impossible {
+        Some(reason) => format!("the interface cannot be set to it: {reason}"),
+        None => format!("{}, {}", counted(tried.frames, "valid frame"), counted(tried.errors, "error")),
     };
-    line(out, &found)
-}
-
-/// What a detection found, as CSV.
-pub fn detection_csv(out: &mut dyn Write, name: &str, detection: &Detection) -> io::Result<()> {
-    let (rate, by) = detection.found.map(|(rate, by)| (rate.to_string(), by_name(by))).unwrap_or_default();
-    csv::write(out, &["interface", "bit_rate", "by"], [vec![name.to_owned(), rate, by.to_owned()]])
-}
-
-fn by_name(by: By) -> &'static str {
-    match by {
-        By::Frames => "frames",
-        By::Acknowledge => "acknowledge",
-    }
+    let acknowledged = if tried.acknowledged { ", acknowledged" } else { "" };
+    format!("{} bit/s: {result}{acknowledged}", tried.bit_rate)
 }

@@ -3,6 +3,7 @@
 //! Each has a code for scripts, which never changes, and a message for people. Some have a command to type.
 
 use super::console::Console;
+use super::failure::host::up_by_hand;
 use crate::canopen::id::NodeId;
 use crate::tasks::{Effect, Fact, Note};
 use serde::Serialize;
@@ -45,6 +46,11 @@ pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> Told {
     let number = node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
     match effect {
         Effect::NothingChanged => Told::new("nothing-changed", "nothing was changed"),
+        Effect::InterfaceNotRestored { interface, bit_rate, reason } => Told::new(
+            "interface-not-restored",
+            format!("{interface} was not set back to its previous bit rate: {reason}"),
+        )
+        .command("set it back", up_by_hand(interface, *bit_rate)),
         Effect::WasOperational => Told::new("was-operational", "the node was operational before")
             .command("start it again", format!("cangauge nmt start {number}")),
         Effect::Text(text) | Effect::Hint(text) => Told::new("other", text.clone()),

@@ -81,6 +81,11 @@ impl Column {
         Column { in_json: false, in_csv: false, ..self }
     }
 
+    /// In CSV and the table, not in JSON.
+    pub const fn not_json(self) -> Column {
+        Column { in_json: false, ..self }
+    }
+
     /// In JSON and CSV, not in the table.
     pub const fn data_only(self) -> Column {
         Column { in_table: false, ..self }

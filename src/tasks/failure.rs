@@ -7,7 +7,7 @@ pub use crate::master::{LssError, Operation, SdoError, SdoFailure};
 pub use crate::measure::expression::ExpressionError;
 
 use super::note::Effect;
-use super::{autozero, check, detect, log, lss, nmt, pdo, read, scan, sdo, settings, store};
+use super::{autozero, check, detect, host, log, lss, nmt, pdo, read, scan, sdo, settings, store};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::Service;
 use crate::canopen::object::ObjectId;
@@ -64,6 +64,8 @@ pub enum Cause {
     LssService(Arc<LssError>),
     /// Reading or writing a node failed.
     Node(Arc<node::Error>),
+    /// An interface of this computer was not set.
+    Host(host::HostFailure),
     /// The user stopped the command (Ctrl-C, SIGTERM, SIGHUP).
     Interrupted,
     /// An expression of `check` or `log --expect` is wrong.
@@ -127,6 +129,7 @@ impl Cause {
             },
             Cause::LssService(error) => lss_kind(error),
             Cause::Node(error) => node_kind(error),
+            Cause::Host(cause) => cause.kind(),
             Cause::Interrupted => Kind::Interrupted,
             Cause::Expression(_) => Kind::Usage,
             Cause::Read(cause) => cause.kind(),

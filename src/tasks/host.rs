@@ -1,25 +1,75 @@
-//! The host's side of a bus: what to type where the program may not set the interface itself.
+//! The interface of this computer: why it was not set.
 
-use super::{Failure, Kind};
-use crate::bus::BusError;
+use super::Failure;
+use super::failure::{BusError, Cause};
+use crate::tasks::Kind;
 
-/// What a person types to take the interface `name` up, at a bit rate in bit/s where one is given.
-pub fn by_hand(name: &str, bit_rate: Option<u32>) -> String {
-    match bit_rate {
-        None => format!("sudo ip link set {name} up"),
-        Some(bit_rate) => format!(
-            "sudo ip link set {name} down; sudo ip link set {name} type can bitrate {bit_rate}; \
-             sudo ip link set {name} up"
-        ),
+/// What was to be done with an interface.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HostAction {
+    /// Bring it up.
+    Up {
+        /// Its name.
+        interface: String,
+        /// The bit rate in bit/s; `None` keeps the present one.
+        bit_rate: Option<u32>,
+        /// Whether it is to be listen-only.
+        listen_only: bool,
+    },
+    /// Bring it down.
+    Down {
+        /// Its name.
+        interface: String,
+    },
+    /// Find the bit rate of the bus.
+    Detect {
+        /// Its name.
+        interface: String,
+    },
+}
+
+/// Why an interface was not set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HostFailure {
+    /// The program lacks the privilege (CAP_NET_ADMIN).
+    NotPermitted {
+        /// What the privilege is missing for: `set the bit rate of can0`.
+        what: String,
+        /// What was to be done.
+        action: HostAction,
+    },
+    /// The interface, its driver or this system cannot do it.
+    Unsupported {
+        /// The reason.
+        reason: String,
+        /// What was to be done.
+        action: HostAction,
+    },
+    /// The interface has no bit rate yet, and none was given.
+    NoBitRate {
+        /// Its name.
+        interface: String,
+    },
+}
+
+impl HostFailure {
+    /// The kind, which decides the exit code.
+    pub fn kind(&self) -> Kind {
+        Kind::Bus
     }
 }
 
-/// Why the interface was not set, with `way_out` where only the privilege was missing.
-pub fn not_set(error: BusError, way_out: &str) -> Failure {
-    match &error {
-        BusError::Permission(_) => Failure::from(error).hint(format!("by hand: {way_out}")),
-        // The bus that does not need any of this is no way out here.
-        BusError::Unsupported(message) => Failure::new(Kind::Bus, message),
-        _ => error.into(),
+impl From<HostFailure> for Cause {
+    fn from(cause: HostFailure) -> Cause {
+        Cause::Host(cause)
+    }
+}
+
+/// The failure of an action on an interface.
+pub fn not_set(error: BusError, action: HostAction) -> Failure {
+    match error {
+        BusError::Permission(what) => Failure::general(HostFailure::NotPermitted { what, action }),
+        BusError::Unsupported(reason) => Failure::general(HostFailure::Unsupported { reason, action }),
+        error => error.into(),
     }
 }

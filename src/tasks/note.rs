@@ -9,6 +9,15 @@ use crate::canopen::id::NodeId;
 pub enum Effect {
     /// The task had changed nothing.
     NothingChanged,
+    /// An interface could not be set back to its previous state.
+    InterfaceNotRestored {
+        /// Its name.
+        interface: String,
+        /// Its previous bit rate in bit/s, if it is known.
+        bit_rate: Option<u32>,
+        /// The reason.
+        reason: String,
+    },
     /// The node was operational and may not be operational any more.
     WasOperational,
     /// Text of a task that has no typed effects yet.

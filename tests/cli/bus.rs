@@ -20,7 +20,7 @@ fn what_is_typed_wrong_is_said_first() {
     assert_eq!(first("bus detect can0 --for 0s"), "cangauge: \"0s\" for --for <DUR>: a duration must be longer than 0");
     bench
         .finish(&mut bench.command(&["bus", "detect"]))
-        .fails(2, "cangauge: which bus?\nhint: see what is there: cangauge bus list\n");
+        .fails(2, "cangauge: no bus was given\nhint: list the interfaces: cangauge bus list\n");
 }
 
 #[test]
@@ -28,7 +28,7 @@ fn what_is_typed_wrong_is_said_first() {
 fn an_interface_that_is_not_there() {
     let bench = Bench::of("mh4@1");
     let refused = "cangauge: there is no CAN interface \"nosuchcan\"\n\
-                   hint: see what is there: cangauge bus list; without hardware: --bus sim\n";
+                   hint: list the interfaces: cangauge bus list; without hardware: --bus sim\n";
     bench.run("bus up nosuchcan 250k").fails(5, refused);
     bench.run("bus down nosuchcan").fails(5, refused);
     let error = bench.run("bus up nosuchcan -f json").exit(5).error();

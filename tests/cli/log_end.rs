@@ -59,7 +59,8 @@ fn no_nmt_leaves_nmt_alone() {
 #[test]
 fn named_nodes_must_answer() {
     let bench = Bench::of("mh4@1");
-    let no_answer = "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: who is there: cangauge scan\n";
+    let no_answer =
+        "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: list the nodes that answer: cangauge scan\n";
     let done = bench.run("log 1,9 --sync 10ms -o run.csv").exit(3);
     assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("", no_answer));
     assert_eq!((done.frames_of("000"), bench.files()), (vec![], vec![]), "nothing was started, no file is left");

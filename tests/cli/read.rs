@@ -23,7 +23,8 @@ fn overloaded() -> Bench {
     ))
 }
 
-const NO_ANSWER: &str = "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: who is there: cangauge scan\n";
+const NO_ANSWER: &str =
+    "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: list the nodes that answer: cangauge scan\n";
 
 #[test]
 fn one_signal_of_one_node_is_the_bare_number() {
@@ -118,7 +119,7 @@ fn of_several_nodes_those_that_answer_are_printed() {
     assert_eq!(
         done.error(),
         json!({"error": {"kind": "no-answer", "exit": 3, "message": "node 9: read 0x1000:0: no answer within 500 ms",
-            "node": 9, "object": "0x1000:0", "abort": null, "hint": "who is there: cangauge scan"}})
+            "node": 9, "object": "0x1000:0", "abort": null, "hint": "list the nodes that answer: cangauge scan"}})
     );
 }
 

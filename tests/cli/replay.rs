@@ -93,7 +93,7 @@ fn nothing_can_be_sent_into_it() {
     assert_eq!(
         done.stderr,
         "cangauge: the recording t.log is receive only\n\
-         hint: what listens only can do it: log, scan --passive, nmt watch\n"
+         hint: commands that only listen work on it: log, scan --passive, nmt watch\n"
     );
     replay(&bench, "t.log", "log 1 --sync 10ms").refuses("a recording (replay:) receives only: --sync and --poll send");
     replay(&bench, "t.log", "log 1 --poll 10ms").refuses("a recording (replay:) receives only: --sync and --poll send");

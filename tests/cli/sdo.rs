@@ -51,7 +51,7 @@ fn the_type_can_be_said() {
     bench.run("sdo read 1 0x1008 --type u8").fails(
         6,
         "cangauge: node 1: read 0x1008:0: the device delivered 8 bytes where u8 has 1\n\
-         hint: its bytes: cangauge sdo read 1 0x1008:0 --type hex\n",
+         hint: show its bytes: cangauge sdo read 1 0x1008:0 --type hex\n",
     );
     let done = bench.run("sdo read 1 0x1017 --type u32").prints("0\n");
     assert_eq!(done.stderr, "warning: node 1: 0x1017:0: the device delivered 2 bytes for 4\n");
@@ -140,7 +140,7 @@ fn a_device_that_says_no() {
 #[test]
 fn a_node_that_is_not_there() {
     let bench = Bench::of("mh4@1");
-    let hint = "hint: who is there: cangauge scan\n";
+    let hint = "hint: list the nodes that answer: cangauge scan\n";
     let done = bench
         .run("sdo read 5 0x6130:1")
         .fails(3, &format!("cangauge: node 5: read 0x6130:1: no answer within 500 ms\n{hint}"));
@@ -153,7 +153,7 @@ fn a_node_that_is_not_there() {
     assert_eq!(
         error,
         json!({"error": {"kind": "no-answer", "exit": 3, "message": "node 5: read 0x6130:1: no answer within 2 s",
-            "node": 5, "object": "0x6130:1", "abort": null, "hint": "who is there: cangauge scan"}})
+            "node": 5, "object": "0x6130:1", "abort": null, "hint": "list the nodes that answer: cangauge scan"}})
     );
 }
 

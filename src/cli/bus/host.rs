@@ -1,80 +1,56 @@
-//! The interfaces of this machine, as `cangauge bus` shows and sets them.
+//! The interfaces of this computer, as `cangauge bus` lists and sets them.
 
 use crate::output::interfaces::Interface;
 use crate::tasks::Failure;
 
+/// An interface before and after it was set.
+pub(super) struct Changed {
+    pub(super) before: Interface,
+    pub(super) after: Interface,
+}
+
 #[cfg(target_os = "linux")]
 mod linux {
-    use super::{Failure, Interface};
+    use super::{Changed, Failure, Interface};
+    use crate::bus::Mode;
     use crate::bus::socketcan::{Change, Link, State, bring_down, bring_up, interfaces, link};
-    use crate::bus::{BusError, Mode};
-    use crate::tasks::Kind;
-    use crate::tasks::host::{by_hand, not_set};
+    use crate::tasks::host::{HostAction, HostFailure, not_set};
 
-    /// The interfaces of this machine.
+    /// The interfaces of this computer.
     pub(in super::super) fn list() -> Vec<Interface> {
         let described = |found: crate::bus::socketcan::Interface| {
-            // One that is gone by now is told as far as it was seen.
-            let about = link(&found.name).ok();
-            let up = about.as_ref().map_or(found.up, |link| link.up);
-            describe(found.name, up, found.driver, about.as_ref())
+            // The interface may have been removed since it was listed.
+            let link = link(&found.name).ok();
+            let up = link.as_ref().map_or(found.up, |link| link.up);
+            describe(found.name, up, found.driver, link.as_ref())
         };
         interfaces().into_iter().map(described).collect()
     }
 
-    /// Switches an interface on; what it is then, and what was done.
-    pub(in super::super) fn up(
-        name: &str,
-        bit_rate: Option<u32>,
-        listen_only: bool,
-    ) -> Result<(Interface, String), Failure> {
-        let refused = |error: BusError| match error {
-            BusError::Unsupported(message) if bit_rate.is_some() && !listen_only => {
-                Failure::new(Kind::Bus, message).hint(format!("switch it on without one: cangauge bus up {name}"))
-            }
-            error => not_set(error, &by_hand(name, bit_rate)),
-        };
-        let now = link(name).map_err(refused)?;
+    /// Brings an interface up.
+    pub(in super::super) fn up(name: &str, bit_rate: Option<u32>, listen_only: bool) -> Result<Changed, Failure> {
+        let interface = name.to_owned();
+        let action = HostAction::Up { interface: interface.clone(), bit_rate, listen_only };
+        let now = link(name).map_err(|error| not_set(error, action.clone()))?;
         if bit_rate.is_none() && now.is_controller() && !now.up && now.bit_rate().is_none() {
-            let message = format!("{name} has no bit rate yet");
-            return Err(Failure::new(Kind::Bus, message).hint(format!("give it one: cangauge bus up {name} 250k")));
+            return Err(Failure::general(HostFailure::NoBitRate { interface }));
         }
         let mode = if listen_only { Mode::ListenOnly } else { Mode::Normal };
-        let change = bring_up(name, bit_rate, mode).map_err(refused)?;
-        Ok((described(name, &change), said(name, &change)))
+        let change = bring_up(name, bit_rate, mode).map_err(|error| not_set(error, action))?;
+        Ok(changed(name, &change))
     }
 
-    /// Switches an interface off; what it is then, and what was done.
-    pub(in super::super) fn down(name: &str) -> Result<(Interface, String), Failure> {
-        let change = bring_down(name).map_err(|error| not_set(error, &format!("sudo ip link set {name} down")))?;
-        Ok((described(name, &change), said(name, &change)))
+    /// Brings an interface down.
+    pub(in super::super) fn down(name: &str) -> Result<Changed, Failure> {
+        let action = HostAction::Down { interface: name.to_owned() };
+        let change = bring_down(name).map_err(|error| not_set(error, action))?;
+        Ok(changed(name, &change))
     }
 
-    fn described(name: &str, change: &Change) -> Interface {
+    fn changed(name: &str, change: &Change) -> Changed {
         let driver = interfaces().into_iter().find(|found| found.name == name).and_then(|found| found.driver);
-        describe(name.to_owned(), change.after.up, driver, Some(&change.after))
-    }
-
-    /// `can0 is up at 250000 bit/s; it was up at 125000 bit/s`.
-    fn said(name: &str, change: &Change) -> String {
-        let now = state(&change.after);
-        let before = state(&change.before);
-        match (change.before == change.after, now == before) {
-            (true, _) => format!("{name} is {now} already: nothing was changed"),
-            (false, true) => format!("{name} is {now}"),
-            (false, false) => format!("{name} is {now}; it was {before}"),
-        }
-    }
-
-    fn state(link: &Link) -> String {
-        let mut text = if link.up { "up" } else { "down" }.to_owned();
-        if let Some(rate) = link.bit_rate() {
-            text.push_str(&format!(" at {rate} bit/s"));
-        }
-        if link.listen_only == Some(true) {
-            text.push_str(", listen-only");
-        }
-        text
+        let describe = |link: &Link| describe(name.to_owned(), link.up, driver.clone(), Some(link));
+        Changed { before: describe(&change.before), after: describe(&change.after) }
     }
 
     fn describe(interface: String, up: bool, driver: Option<String>, link: Option<&Link>) -> Interface {
@@ -105,16 +81,18 @@ pub(super) fn list() -> Vec<Interface> {
 }
 
 #[cfg(not(target_os = "linux"))]
-pub(super) fn up(name: &str, _: Option<u32>, _: bool) -> Result<(Interface, String), Failure> {
-    Err(elsewhere(name))
+pub(super) fn up(name: &str, _: Option<u32>, _: bool) -> Result<Changed, Failure> {
+    Err(unsupported(name))
 }
 
 #[cfg(not(target_os = "linux"))]
-pub(super) fn down(name: &str) -> Result<(Interface, String), Failure> {
-    Err(elsewhere(name))
+pub(super) fn down(name: &str) -> Result<Changed, Failure> {
+    Err(unsupported(name))
 }
 
 #[cfg(not(target_os = "linux"))]
-fn elsewhere(name: &str) -> Failure {
-    Failure::new(crate::tasks::Kind::Bus, format!("{name}: this system has no SocketCAN"))
+fn unsupported(name: &str) -> Failure {
+    use crate::tasks::host::{HostAction, not_set};
+    let error = crate::bus::BusError::Unsupported(format!("{name}: this system has no SocketCAN"));
+    not_set(error, HostAction::Down { interface: name.to_owned() })
 }

@@ -5,8 +5,8 @@ use crate::canopen::id::NodeId;
 use crate::cli::args::{BusSpec, Nodes, Rate as BitRate};
 use crate::cli::exit::{several, stdout};
 use crate::cli::{Format, Global};
+use crate::output::failure::host::up_by_hand;
 use crate::output::json_lss;
-use crate::tasks::host::by_hand;
 use crate::tasks::lss::{Job, PlannedRate, Rate, Report, Target, Via, assign, check_rate, check_store};
 use crate::tasks::{Failure, Kind};
 use clap::{Args, ValueEnum};
@@ -239,7 +239,7 @@ fn tell(global: &Global, report: &Report, bus: &str) -> anyhow::Result<()> {
 fn host_has_to_follow(global: &Global, report: &Report, bus: &str, rate: &str) -> String {
     let bits = report.rate.and_then(|rate| rate.bits);
     let side = match (&global.bus, bits) {
-        (Some(BusSpec::SocketCan(_)) | None, Some(bits)) => by_hand(bus, Some(bits)),
+        (Some(BusSpec::SocketCan(_)) | None, Some(bits)) => up_by_hand(bus, Some(bits)),
         _ => format!("this side to {rate}"),
     };
     if report.rate.is_some_and(|rate| rate.is_auto) {

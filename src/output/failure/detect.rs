@@ -1,10 +1,36 @@
 //! Text for causes: the bit rate of a bus was not found.
 
 use super::Words;
-use crate::tasks::Failure;
 use crate::tasks::detect::DetectFailure;
 
 /// The message and the hint for a cause.
-pub(super) fn words(_failure: &Failure, cause: &DetectFailure) -> Words {
-    match *cause {}
+pub(super) fn words(cause: &DetectFailure) -> Words {
+    match cause {
+        DetectFailure::NotFound { interface, detection, active } => {
+            let has_errors = detection.tried.iter().any(|tried| tried.errors > 0);
+            let ask = format!("on a bench with one device only: cangauge bus detect {interface} --active");
+            let (message, hint) = match (active, has_errors) {
+                (false, true) => (
+                    "errors but no valid frame at any bit rate",
+                    format!("a device that is alone on the bus gets no acknowledge, so it cannot be heard; {ask}"),
+                ),
+                (false, false) => (
+                    "no frame at any bit rate",
+                    format!("the devices may be silent: listen longer (--for 5s), or {ask}"),
+                ),
+                (true, _) => (
+                    "no valid frame and no acknowledge at any bit rate",
+                    "check the sensor's power, the wiring and the 120 ohm terminators".to_owned(),
+                ),
+            };
+            Words::new(format!("{interface}: {message}")).hint(hint)
+        }
+        DetectFailure::NotRestored { interface, found, error } => {
+            let restored = format!("{interface} was not set back to its previous bit rate: {error}");
+            match found {
+                Some(bit_rate) => Words::new(format!("the bus runs at {bit_rate} bit/s, but {restored}")),
+                None => Words::new(restored),
+            }
+        }
+    }
 }

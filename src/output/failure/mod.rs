@@ -7,6 +7,7 @@ mod autozero;
 mod below;
 mod check;
 mod detect;
+pub mod host;
 mod log;
 mod lss;
 mod nmt;
@@ -216,6 +217,7 @@ fn words(failure: &Failure) -> Words {
         Cause::Sdo(error) => below::sdo(error),
         Cause::LssService(error) => below::lss(error),
         Cause::Node(error) => node::words(failure, error),
+        Cause::Host(cause) => host::words(cause),
         Cause::Interrupted => Words::new("interrupted"),
         Cause::Expression(error) => below::expression(error),
         Cause::Read(cause) => read::words(failure, cause),
@@ -228,7 +230,7 @@ fn words(failure: &Failure) -> Words {
         Cause::Log(cause) => log::words(failure, cause),
         Cause::Check(cause) => check::words(failure, cause),
         Cause::Lss(cause) => lss::words(failure, cause),
-        Cause::Detect(cause) => detect::words(failure, cause),
+        Cause::Detect(cause) => detect::words(cause),
         Cause::Autozero(cause) => autozero::words(failure, cause),
         Cause::Text(text) => Words::new(text.message.clone()),
     }

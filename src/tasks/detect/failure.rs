@@ -1,16 +1,40 @@
 //! Causes of failures: the bit rate of a bus was not found.
 
+use super::Detection;
 use crate::tasks::Kind;
-use crate::tasks::failure::Cause;
+use crate::tasks::failure::{BusError, Cause};
+use std::sync::Arc;
 
-/// The bit rate of a bus was not found.
-#[derive(Clone, Debug, PartialEq)]
-pub enum DetectFailure {}
+/// Why a detection failed.
+#[derive(Clone, Debug)]
+pub enum DetectFailure {
+    /// No bit rate was found.
+    NotFound {
+        /// The interface.
+        interface: String,
+        /// What was tried.
+        detection: Detection,
+        /// Whether nodes were asked as well.
+        active: bool,
+    },
+    /// The interface could not be set back to its previous state.
+    NotRestored {
+        /// The interface.
+        interface: String,
+        /// The bit rate of the bus in bit/s, if it was found.
+        found: Option<u32>,
+        /// The reason.
+        error: Arc<BusError>,
+    },
+}
 
 impl DetectFailure {
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
-        match *self {}
+        match self {
+            DetectFailure::NotFound { .. } => Kind::NoAnswer,
+            DetectFailure::NotRestored { .. } => Kind::Bus,
+        }
     }
 }
 

@@ -1,8 +1,11 @@
-//! On a wire that knows bit rates: at another one nothing but errors is heard.
+//! On a simulated wire with a bit rate: at another bit rate, only errors are received.
 
 use super::*;
 use crate::bus::{BitRateControl, Mono, Received, Stamp, TimestampSource, Wall};
 use crate::canopen::frame::Frame;
+use crate::tasks::Kind;
+use crate::tasks::failure::Cause;
+use crate::tasks::host::HostFailure;
 use std::collections::VecDeque;
 
 const EACH: Duration = Duration::from_millis(1500);
@@ -10,19 +13,19 @@ const EACH: Duration = Duration::from_millis(1500);
 /// An interface, and one device with a heartbeat of once a second.
 struct Wire {
     now: Mono,
-    /// At which rate the device runs.
+    /// The bit rate of the device.
     device: u32,
     /// Whether it sends a heartbeat.
     heartbeat: bool,
     /// Whether it answers SDO.
     answers: bool,
-    /// Whether a third one is there that acknowledges.
-    company: bool,
-    /// A rate that the interface cannot do.
+    /// Whether a third node is connected, which acknowledges frames.
+    third_node: bool,
+    /// A bit rate that the interface cannot be set to.
     impossible: Option<u32>,
     /// Whether it has a listen-only mode.
     listens: bool,
-    /// What it can be set at all.
+    /// The error if the interface cannot be set at all.
     refusal: Option<fn() -> BusError>,
     interrupt: Option<Mono>,
     set: Option<(u32, Mode)>,
@@ -38,7 +41,7 @@ impl Wire {
             device,
             heartbeat: true,
             answers: true,
-            company: true,
+            third_node: true,
             impossible: None,
             listens: true,
             refusal: None,
@@ -106,7 +109,7 @@ impl Bus for Wire {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        assert_eq!(self.set.map(|(_, mode)| mode), Some(Mode::Normal), "{frame} although it was to listen only");
+        assert_eq!(self.set.map(|(_, mode)| mode), Some(Mode::Normal), "{frame} in listen-only mode");
         if !self.matches() {
             return Err(BusError::QueueFull);
         }
@@ -134,9 +137,9 @@ impl Bus for Wire {
             return Ok(Event::Timeout);
         }
         self.now = next;
-        // Without anybody who acknowledges, a frame ends in an error for all.
+        // A frame that no node acknowledges is an error for all.
         let normal = self.set.is_some_and(|(_, mode)| mode == Mode::Normal);
-        if self.matches() && (self.company || normal) {
+        if self.matches() && (self.third_node || normal) {
             return Ok(Event::Frame(Received { frame: "705#7F".parse().unwrap(), at: self.stamp() }));
         }
         Ok(Event::Fault(Fault::Protocol, self.stamp()))
@@ -148,24 +151,24 @@ fn run(wire: &mut Wire, ask: bool) -> Result<Detection, Failure> {
 }
 
 #[test]
-fn the_rate_is_heard_and_the_interface_put_back() {
+fn listening_finds_the_bit_rate_and_restores_the_interface() {
     for rate in RATES {
         let mut wire = Wire::at(rate);
         let found = run(&mut wire, false).unwrap();
         assert_eq!(found.found, Some((rate, By::Frames)));
         assert!(found.tried.iter().all(|tried| tried.how == How::Listening));
-        assert_eq!(wire.log.first().map(String::as_str), Some("500000 ListenOnly"), "its own rate comes first");
+        assert_eq!(wire.log.first().map(String::as_str), Some("500000 ListenOnly"), "the present bit rate comes first");
         assert_eq!(wire.log.last().map(String::as_str), Some("back"));
         assert!(wire.sent.is_empty());
     }
 }
 
 #[test]
-fn nothing_is_guessed() {
-    // At no usual rate; silent; alone, so that nobody acknowledges.
+fn no_bit_rate_without_evidence() {
+    // An unusual bit rate; a silent device; a lone device, whose frames no node acknowledges.
     let mut strange = Wire::at(83_333);
     let mut silent = Wire { heartbeat: false, ..Wire::at(125_000) };
-    let mut alone = Wire { company: false, ..Wire::at(125_000) };
+    let mut alone = Wire { third_node: false, ..Wire::at(125_000) };
     for (wire, errors) in [(&mut strange, true), (&mut silent, false), (&mut alone, true)] {
         let found = run(wire, false).unwrap();
         assert_eq!((found.found, found.tried.len()), (None, RATES.len()));
@@ -175,8 +178,8 @@ fn nothing_is_guessed() {
 }
 
 #[test]
-fn one_device_alone_is_asked_after_listening() {
-    let mut wire = Wire { company: false, heartbeat: false, ..Wire::at(125_000) };
+fn lone_device_is_asked_after_listening() {
+    let mut wire = Wire { third_node: false, heartbeat: false, ..Wire::at(125_000) };
     let found = run(&mut wire, true).unwrap();
     assert_eq!(found.found, Some((125_000, By::Frames)));
     let how: Vec<How> = found.tried.iter().map(|tried| tried.how).collect();
@@ -187,46 +190,48 @@ fn one_device_alone_is_asked_after_listening() {
 }
 
 #[test]
-fn a_device_that_only_acknowledges() {
-    let mut wire = Wire { company: false, heartbeat: false, answers: false, ..Wire::at(100_000) };
+fn acknowledge_alone_is_evidence() {
+    let mut wire = Wire { third_node: false, heartbeat: false, answers: false, ..Wire::at(100_000) };
     assert_eq!(run(&mut wire, true).unwrap().found, Some((100_000, By::Acknowledge)));
 }
 
 #[test]
-fn who_can_be_heard_is_not_asked() {
+fn device_that_sends_is_not_asked() {
     let mut wire = Wire::at(10_000);
     assert_eq!(run(&mut wire, true).unwrap().found, Some((10_000, By::Frames)));
     assert!(wire.sent.is_empty());
 }
 
 #[test]
-fn rates_and_modes_that_the_interface_has_not() {
+fn unsupported_bit_rates_and_modes() {
     let mut wire = Wire { impossible: Some(500_000), ..Wire::at(100_000) };
     let found = run(&mut wire, false).unwrap();
     assert_eq!(found.found, Some((100_000, By::Frames)));
     assert_eq!(found.tried[0].impossible.as_deref(), Some("no"));
 
-    let mut deaf = Wire { listens: false, ..Wire::at(100_000) };
-    let failure = run(&mut deaf, false).unwrap_err();
-    assert_eq!((failure.kind(), failure.to_string().as_str()), (Kind::Bus, "can9 cannot only listen"));
-    assert_eq!(deaf.log, ["back"]);
-    assert_eq!(run(&mut deaf, true).unwrap().found, Some((100_000, By::Frames)));
+    let mut no_listen_only = Wire { listens: false, ..Wire::at(100_000) };
+    let failure = run(&mut no_listen_only, false).unwrap_err();
+    let action = HostAction::Detect { interface: "can9".into() };
+    let expected = HostFailure::Unsupported { reason: "can9 cannot only listen".into(), action };
+    assert!(matches!(&failure.cause, Cause::Host(cause) if *cause == expected), "{failure:?}");
+    assert_eq!(no_listen_only.log, ["back"]);
+    assert_eq!(run(&mut no_listen_only, true).unwrap().found, Some((100_000, By::Frames)));
 }
 
 #[test]
-fn without_the_right_nothing_is_touched() {
+fn missing_permission_changes_nothing() {
     let refusal: fn() -> BusError = || BusError::Permission("set the bit rate of can9".into());
     let mut wire = Wire { refusal: Some(refusal), ..Wire::at(100_000) };
     let failure = run(&mut wire, true).unwrap_err();
-    assert_eq!(failure.to_string(), "no permission to set the bit rate of can9");
-    let hint = crate::tasks::Effect::Hint("by hand: sudo cangauge bus detect can9".to_owned());
-    assert_eq!(failure.effects, [hint]);
+    let action = HostAction::Detect { interface: "can9".into() };
+    let expected = HostFailure::NotPermitted { what: "set the bit rate of can9".into(), action };
+    assert!(matches!(&failure.cause, Cause::Host(cause) if *cause == expected), "{failure:?}");
     assert!(wire.log.is_empty());
 }
 
 #[test]
-fn interrupted_at_any_moment_it_is_put_back() {
-    // Listening takes 13.5 s, asking as long again.
+fn interface_is_restored_after_ctrl_c_at_any_time() {
+    // Listening takes 13.5 s, asking takes the same time again.
     for millis in (0..27_000).step_by(1900) {
         let mut wire = Wire { heartbeat: false, answers: false, ..Wire::at(83_333) };
         wire.interrupt = Some(Mono::at(Duration::from_millis(millis)));

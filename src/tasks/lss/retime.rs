@@ -14,8 +14,8 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::NmtCommand;
 use crate::device::assign::{Applies, AssignEntry, AssignKind, RateTable, short_bit_rate};
 use crate::master::{Happening, Master};
-use crate::tasks::host::{by_hand, not_set};
-use crate::tasks::{Failure, Kind};
+use crate::tasks::host::{HostAction, not_set};
+use crate::tasks::{Effect, Failure, Kind};
 use std::time::Duration;
 
 /// The delay of 15h: so long the device goes on at the old rate, and so long again it is silent. As in table 8 of
@@ -80,7 +80,7 @@ impl<'a> Retiming<'a> {
         let new = rate.bits.ok_or_else(|| refuse("what bit rate that is, is not known"))?;
         let old = master.bus().bit_rate().ok_or_else(|| refuse("the interface has no bit rate"))?;
         let name = master.bus().name().to_owned();
-        master.bus().can_set_bit_rate().map_err(|error| not_set(error, &by_hand(&name, Some(new))))?;
+        master.bus().can_set_bit_rate().map_err(|error| not_set(error, set_rate(name, new)))?;
         if way.way == AssignKind::Objects && (way.applies == Applies::Power || !job.store) {
             let why =
                 if job.store { "it takes the new rate at power on" } else { "it takes the new rate after storing" };
@@ -174,10 +174,12 @@ impl<'a> Retiming<'a> {
     ) -> Failure {
         let (subject, old, new) = (self.subject, short_bit_rate(self.old), short_bit_rate(self.new));
         if master.bus().bit_rate() != Some(self.old)
-            && let Err(error) = set(master, self.old)
+            && let Err(error) = master.set_bit_rate(self.old)
         {
-            let failure = failure.and(format!("this side could not be set back to {old}: {error}"));
-            return failure.hint(by_hand(master.bus().name(), Some(self.old)));
+            let (interface, bit_rate) = (master.bus().name().to_owned(), Some(self.old));
+            let mut failure = failure;
+            failure.effects.push(Effect::InterfaceNotRestored { interface, bit_rate, reason: error.to_string() });
+            return failure;
         }
         // Until then it may be at the old rate and on its way to the new one. A second Ctrl-C ends the waiting.
         let _ = wait(master, begun + DELAY * 2 + MARGIN);
@@ -263,9 +265,13 @@ fn is_of(id: CanId, node: Option<NodeId>) -> bool {
     own || id == CanId::LSS_SLAVE
 }
 
+fn set_rate(interface: String, bit_rate: u32) -> HostAction {
+    HostAction::Up { interface, bit_rate: Some(bit_rate), listen_only: false }
+}
+
 fn set(master: &mut Master<'_>, bit_rate: u32) -> Result<(), Failure> {
     let name = master.bus().name().to_owned();
-    master.set_bit_rate(bit_rate).map_err(|error| not_set(error, &by_hand(&name, Some(bit_rate))))
+    master.set_bit_rate(bit_rate).map_err(|error| not_set(error, set_rate(name, bit_rate)))
 }
 
 /// Lets time pass. The interface may go down and come back meanwhile.
