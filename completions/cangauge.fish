@@ -427,17 +427,17 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s d -l duration 
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s n -l count -d 'End after this many rows' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sync -d 'Send SYNC at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l poll -d 'Read by SDO at this interval' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l max-gap -d 'The longest interval that is no gap; three usual ones where nothing is said' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l expect -d 'Exit with 1 at the end unless this held: \'pressure in 9..11 bar\', see cangauge check --help' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l max-gap -d 'Report longer intervals as gaps [default: 3 times the usual interval]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l expect -d 'Exit with 1 at the end unless this was true: \'pressure in 9..11 bar\', see cangauge check --help' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s o -l output -d 'Write to a file instead of stdout' -r -F
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l layout -d 'One line per value, or one per cycle of --sync or --poll' -r -f -a "long\t''
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l layout -d 'One row per value, or one per cycle of --sync or --poll' -r -f -a "long\t''
 wide\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l rotate -d 'Begin a new file after this time or before this size: 10m, 1h, 100MB, 1GiB. For run.csv they are run-0001.csv and so on' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l events -d 'Write what happens on the way, with its time, as CSV: emergencies, gaps, losses, reboots' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l rotate -d 'Start a new file after this time or at this size: 10m, 1h, 100MB, 1GiB. The files for run.csv are run-0001.csv and so on' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l events -d 'Write events as CSV: emergencies, gaps, node losses, reboots' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l summary -d 'Write the summary as JSON to a file; - for stdout' -r -F
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l delimiter -d 'Between the columns of CSV: , ; | or tab [default: ,]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l delimiter -d 'Delimiter of CSV: , ; | or tab [default: ,]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l decimal -d 'Decimal sign of CSV: . or , [default: .]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l time -d 'Times as text (RFC 3339), as seconds since 1970, or as the days that spreadsheets count; all UTC' -r -f -a "rfc3339\t''
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l time -d 'Format of times: text (RFC 3339), seconds since 1970, or days as in spreadsheets; all UTC' -r -f -a "rfc3339\t''
 unix\t''
 excel\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s b -l bus -d 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up' -r
@@ -456,10 +456,10 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l color -d 'Colo
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l passive -d 'Send nothing at all'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Leave the nodes\' NMT states alone'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite files that exist'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l append -d 'Continue files that exist and have the same columns; a last line that was cut off goes'
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l bom -d 'Begin CSV with a byte order mark, which some spreadsheets ask for'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Do not change the NMT state of the nodes'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite existing files'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l append -d 'Continue existing files with the same columns. A last line that was cut off is removed'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l bom -d 'Start CSV with a byte order mark, which some spreadsheets need'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s q -l quiet -d 'Say less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s v -l verbose -d 'Say more on stderr'

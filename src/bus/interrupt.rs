@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM as events of a bus, each reported once.
+//! Ctrl-C, SIGTERM and SIGHUP as events of a bus, each reported once.
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::{SigId, low_level};
@@ -27,8 +27,16 @@ pub struct Interrupts {
 }
 
 impl Interrupts {
-    /// Watches for SIGINT and SIGTERM from now on.
+    /// Watches for SIGINT and SIGTERM from now on, and for SIGHUP unless the program was started to ignore it
+    /// (`nohup`).
+    ///
+    /// # Errors
+    /// The signals cannot be watched.
     pub fn new() -> io::Result<Interrupts> {
+        #[cfg(unix)]
+        if !ignores_hangup() {
+            return Interrupts::on(&[SIGINT, SIGTERM, signal_hook::consts::SIGHUP]);
+        }
         Interrupts::on(&[SIGINT, SIGTERM])
     }
 
@@ -51,6 +59,22 @@ impl Interrupts {
         let now = Instant::now();
         self.wait_until(now.checked_add(length).unwrap_or(now + A_CENTURY))
     }
+}
+
+/// Whether SIGHUP was ignored when the program started, as `nohup` does. Asked once: watching changes the answer.
+#[cfg(unix)]
+#[expect(unsafe_code, reason = "the standard library cannot read the action of a signal")]
+fn ignores_hangup() -> bool {
+    static IGNORED: std::sync::OnceLock<bool> = std::sync::OnceLock::new();
+    *IGNORED.get_or_init(|| {
+        // SAFETY: an all-zero `sigaction` is a valid value; with a null pointer for the new action, the call only
+        // writes the present one.
+        unsafe {
+            let mut action: libc::sigaction = std::mem::zeroed();
+            let result = libc::sigaction(libc::SIGHUP, std::ptr::null(), &raw mut action);
+            result == 0 && action.sa_sigaction == libc::SIG_IGN
+        }
+    })
 }
 
 #[cfg(unix)]

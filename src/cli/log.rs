@@ -1,44 +1,42 @@
 //! `cangauge log`.
 
 mod files;
-mod screen;
+mod finish;
+mod recorder;
 
 use super::args::{Duration, Nodes, SignalArg};
-use super::exit::{Several, stdout};
-use super::file::OutFile;
 use super::recording::{print_verdicts, refuse_to_send, sync_interval};
 use super::{Format, Global, When, open};
 use crate::bus::claim::Claim;
-use crate::bus::interrupt::Interrupts;
 use crate::canopen::id::NodeId;
 use crate::measure::decode::Wanted;
 use crate::measure::expression::Expression;
-use crate::measure::expression::verdict::Verdict;
 use crate::output::console::Console;
-use crate::output::events::Events;
 use crate::output::progress::Progress;
 use crate::output::rows::FileFormat;
-use crate::output::summary::{self, Written};
-use crate::tasks::check::{Checker, all_satisfied};
-use crate::tasks::log::{Mode, Plan, RecordingReport, log};
+use crate::output::summary;
+use crate::tasks::check::Checker;
+use crate::tasks::log::{Mode, Plan, log};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
-use files::{Files, Opened};
-use screen::{Screen, Unwritten};
-use std::io::{self, IsTerminal, Write};
+use files::{Files, OpenFiles};
+use finish::{Finished, wait_for_writers};
+use recorder::Recorder;
+use std::io::{self, IsTerminal};
 
 /// Record measurements as CSV or JSON Lines
 ///
-/// Without --sync and --poll the TPDOs are recorded as the nodes send them. Nodes that are not known to
-/// be operational are started, and returned at the end to the state they were known to be in.
+/// Without --sync and --poll, log records the TPDOs as the nodes send them. It starts nodes that are not known to be
+/// operational, and at the end returns them to their previous state if that was known.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Columns: time (UTC), elapsed_s, node, signal, value, unit, status (ok, invalid, overload-high,
-overload-low, or empty where the device tells none), raw (the bytes on the wire).
-Layout wide: time, elapsed_s, then 5.pressure [bar] and 5.pressure.status for every signal; a row per
-cycle, its time that of its first value, its cells empty where nothing came. New columns begin a new file.
+overload-low; empty if the device reports none), raw (bytes in wire order).
+Layout wide: time, elapsed_s, then 5.pressure [bar] and 5.pressure.status for each signal. Each cycle
+is a row with the time of its first value. Cells without data are empty. New columns start a new file.
 
-What takes the rows may be slow: 12 MiB wait for it, what is more is counted as lost (exit code 8).
+If the output is slow, 12 MiB of rows wait for it. Further rows are lost and counted (exit code 8).
+With --count or --duration, a recording that ends earlier exits with 130 (Ctrl-C) or 8 (output closed).
 
 Examples:
   cangauge -b sim log 1 --sync 100ms --count 20
@@ -48,9 +46,9 @@ Examples:
   cangauge log 1 --sync 10ms -o run.csv --rotate 1h --events events.csv
   cangauge log 5 --passive --device mh4 -o run.csv --append")]
 pub(crate) struct Log {
-    /// Which nodes: 5, 0x7f, 1-16, 1,5, all
+    /// Nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
-    /// Only these: pressure, temperature, ch1 to ch16, pressure.status, or an object: 0x6130:1
+    /// Signals [default: all]: pressure, temperature, ch1 to ch16, pressure.status, or an object: 0x6130:1
     signals: Vec<SignalArg>,
     /// End after this time
     #[arg(short, long, value_name = "DUR")]
@@ -67,13 +65,13 @@ pub(crate) struct Log {
     /// Send nothing at all
     #[arg(long)]
     passive: bool,
-    /// Leave the nodes' NMT states alone
+    /// Do not change the NMT state of the nodes
     #[arg(long)]
     no_nmt: bool,
-    /// The longest interval that is no gap; three usual ones where nothing is said
+    /// Report longer intervals as gaps [default: 3 times the usual interval]
     #[arg(long, value_name = "DUR")]
     max_gap: Option<Duration>,
-    /// Exit with 1 at the end unless this held: 'pressure in 9..11 bar', see cangauge check --help
+    /// Exit with 1 at the end unless this was true: 'pressure in 9..11 bar', see cangauge check --help
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     expect: Vec<Expression>,
     #[command(flatten)]
@@ -88,24 +86,25 @@ fn positive(text: &str) -> Result<u64, String> {
 }
 
 impl Log {
-    /// What it does not share with another cangauge.
+    /// The nodes that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         if self.passive { Claim::Nothing } else { self.nodes.claim() }
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         refuse_to_send(global, self.sync.or(self.poll))?;
-        self.refuse_at_once()?;
+        self.check_expectations()?;
         let format = if global.format == Format::Json { FileFormat::JsonLines } else { FileFormat::Csv };
-        self.files.refuse(format, self.sync.or(self.poll).is_some())?;
-        let mut opened = self.files.open(format, self.count)?;
-        let recorded = self.record(global, &mut opened)?;
-        print_verdicts(&global.console(), &recorded.verdicts);
-        self.finish(&recorded, &mut opened)
+        self.files.check(format, self.sync.or(self.poll).is_some())?;
+        let mut files = self.files.open(format, self.count)?;
+        let finished = self.record(global, &mut files)?;
+        print_verdicts(&global.console(), &finished.verdicts);
+        finished.write_summary(self.files.summary.is_some(), &mut files)?;
+        finished.result(&files)
     }
 
-    /// What is expected has to be recorded.
-    fn refuse_at_once(&self) -> Result<(), Failure> {
+    /// Every signal that `--expect` needs must be recorded.
+    fn check_expectations(&self) -> Result<(), Failure> {
         let wanted: Vec<&Wanted> = self.signals.iter().map(|signal| &signal.0).collect();
         for expression in &self.expect {
             if let Nodes::These(nodes) = &self.nodes {
@@ -118,157 +117,74 @@ impl Log {
         Ok(())
     }
 
-    fn record(&self, global: &Global, opened: &mut Opened) -> anyhow::Result<Recorded> {
-        // Rows and live lines on one terminal would tear each other.
-        let torn = global.progress == When::Auto && opened.rows.is_none() && io::stdout().is_terminal();
-        let show = global.shows_progress() && !torn;
-        let duration = self.duration.map(|duration| duration.0);
-        let progress = Progress::new(show, duration, self.count);
+    fn record(&self, global: &Global, files: &mut OpenFiles) -> anyhow::Result<Finished> {
+        // Rows and live lines cannot share a terminal.
+        let is_shared = global.progress == When::Auto && files.rows.is_none() && io::stdout().is_terminal();
+        let progress = Progress::new(global.shows_progress() && !is_shared, self.duration.map(|d| d.0), self.count);
         let console = Console { progress: Some(progress.multi()), ..global.console() };
-        let (outcome, verdicts, screen) = global.with_claims(|master, claims| {
-            let nodes = match (&self.nodes, self.passive || !master.bus().is_live()) {
+        let (report, verdicts, recorder) = global.with_claims(|master, claims| {
+            let is_live = master.bus().is_live();
+            let nodes = match (&self.nodes, self.passive || !is_live) {
                 (Nodes::All, true) => NodeId::all().collect(),
                 _ => open::nodes(master, global, &self.nodes)?,
             };
-            let mode = self.mode(master.bus().is_live());
-            let plan = Plan {
-                overrides: open::overrides(global, &nodes)?,
-                nodes,
-                wanted: self.signals.iter().map(|signal| signal.0.clone()).collect(),
-                mode,
-                duration,
-                // In the wide layout it counts rows, which are made of many values.
-                count: self.count.filter(|_| !self.files.is_wide()),
-                nmt: !self.no_nmt,
-                max_gap: self.max_gap.map(|longest| longest.0),
-            };
+            let plan = self.plan(global, nodes, is_live)?;
             let waits = master.bus().waits();
-            let (rows, events) = (opened.rows(waits)?, opened.events(waits)?);
-            let mut screen = Screen::new(rows, events, progress, console);
-            // Whoever only listens from then on leaves the nodes to others.
-            screen.claims = self.poll.is_none().then(|| std::mem::take(claims));
-            let mut checker = Checker::new(&self.expect, &plan.nodes, true, &mut screen);
-            let outcome = log(master, &plan, &mut checker);
-            let verdicts = match &outcome {
-                Ok(outcome) => checker.verdicts(outcome),
+            let mut recorder =
+                Recorder::new(files.rows(waits)?, files.rows_name(), files.events(waits)?, progress, console);
+            // Without --poll the nodes are free for others as soon as the recording runs.
+            recorder.claims = self.poll.is_none().then(|| std::mem::take(claims));
+            let mut checker = Checker::new(&self.expect, &plan.nodes, true, &mut recorder);
+            let report = log(master, &plan, &mut checker);
+            let verdicts = match &report {
+                Ok(report) => checker.verdicts(report),
                 Err(_) => Ok(Vec::new()),
             };
-            let interrupted = match &outcome {
-                Ok(outcome) => outcome.interrupted,
+            let interrupted = match &report {
+                Ok(report) => report.interrupted,
                 Err(failure) => failure.kind() == Kind::Interrupted,
             };
-            screen.progress.finish(interrupted);
-            Ok((outcome, verdicts, screen))
+            recorder.progress.finish(interrupted);
+            Ok((report, verdicts, recorder))
         })?;
-        if let Some(other) = &screen.other_head {
-            return Err(opened.other_head(other).into());
-        }
-        let interrupted = outcome.as_ref().is_ok_and(|outcome| outcome.interrupted);
-        let written = end(screen, opened, interrupted)?;
-        let outcome = outcome?;
-        if let Some(failure) = outcome.nothing {
+        let interrupted = report.as_ref().is_ok_and(|report| report.interrupted);
+        let is_limited = self.count.is_some() || self.duration.is_some();
+        let (written, unwritten) = wait_for_writers(recorder, interrupted);
+        let is_closed = match unwritten {
+            Some(unwritten) if is_limited && unwritten.is_closed_output() => true,
+            Some(unwritten) => return Err(unwritten.into_error(&global.console(), files, written.lost)),
+            None => false,
+        };
+        let report = report?;
+        if let Some(failure) = report.nothing {
             return Err(failure.into());
         }
         let console = global.console();
-        summary::lines(&outcome, written).iter().for_each(|line| console.note(line));
-        Ok(Recorded { outcome, verdicts: verdicts?, written })
+        summary::lines(&report, written).iter().for_each(|line| console.note(line));
+        Ok(Finished { report, verdicts: verdicts?, written, is_limited, is_closed })
     }
 
-    /// A recording (`replay:`) can only be listened to.
-    fn mode(&self, live: bool) -> Mode {
-        match (self.sync, self.poll, self.passive || !live) {
-            (Some(period), _, _) => Mode::Sync(period.0),
-            (_, Some(period), _) => Mode::Poll(period.0),
+    fn plan(&self, global: &Global, nodes: Vec<NodeId>, is_live: bool) -> anyhow::Result<Plan> {
+        Ok(Plan {
+            overrides: open::overrides(global, &nodes)?,
+            nodes,
+            wanted: self.signals.iter().map(|signal| signal.0.clone()).collect(),
+            mode: self.mode(is_live),
+            duration: self.duration.map(|duration| duration.0),
+            // In layout wide, --count counts cycles and not values.
+            count: self.count.filter(|_| !self.files.is_wide()),
+            nmt: !self.no_nmt,
+            max_gap: self.max_gap.map(|longest| longest.0),
+        })
+    }
+
+    /// A recording that is played back (`replay:`) is always passive.
+    fn mode(&self, is_live: bool) -> Mode {
+        match (self.sync, self.poll, self.passive || !is_live) {
+            (Some(interval), _, _) => Mode::Sync(interval.0),
+            (_, Some(interval), _) => Mode::Poll(interval.0),
             (_, _, true) => Mode::Passive,
             _ => Mode::AsSent,
         }
     }
-
-    fn finish(&self, recorded: &Recorded, opened: &mut Opened) -> anyhow::Result<()> {
-        let Recorded { outcome, verdicts, written } = recorded;
-        if self.files.summary.is_some() {
-            let mut text = Vec::new();
-            summary::json(&mut text, outcome, *written)?;
-            match &mut opened.summary {
-                Some(file) => file.write(&text)?,
-                None => io::stdout().lock().write_all(&text).map_err(stdout)?,
-            }
-        }
-        // What was expected and is not so comes first: it gives the exit code.
-        let (unmet, lost) = (all_satisfied(verdicts, &[]).err(), self.lost(outcome));
-        let name = |file: &Option<OutFile>| {
-            file.as_ref().map_or_else(|| "stdout".to_owned(), |file| file.path().display().to_string())
-        };
-        let too_slow =
-            |what: String, file| Failure::new(Kind::Io, format!("{what} were lost: {} was too slow", name(file)));
-        let late = (written.lost > 0).then(|| too_slow(rows(written.lost), &opened.rows));
-        let late = late.or((written.events_lost > 0).then(|| too_slow("events".to_owned(), &opened.events)));
-        let failures = match unmet {
-            Some(unmet) if unmet.kind() == Kind::CheckFailed => [Some(unmet), late, lost],
-            unmet => [late, lost, unmet],
-        };
-        let failures: Vec<Failure> = failures.into_iter().flatten().collect();
-        match failures.first().map(Failure::kind) {
-            None => Ok(()),
-            Some(kind) => Err(Several { kind, failures }.into()),
-        }
-    }
-
-    fn lost(&self, outcome: &RecordingReport) -> Option<Failure> {
-        let names: Vec<String> = outcome.lost.iter().map(|node| node.to_string()).collect();
-        let kind = if self.all_lost(outcome) { Kind::NoAnswer } else { Kind::Partial };
-        let word = if names.len() == 1 { "node" } else { "nodes" };
-        let message = format!("{word} {} lost: silent at the end", names.join(", "));
-        outcome.lost.first().map(|first| Failure { node: Some(*first), ..Failure::new(kind, message) })
-    }
-
-    fn all_lost(&self, outcome: &RecordingReport) -> bool {
-        outcome.statistics.iter().all(|(source, _)| outcome.lost.contains(&source.node))
-    }
-}
-
-/// What came of it.
-struct Recorded {
-    outcome: RecordingReport,
-    verdicts: Vec<Verdict>,
-    written: Written,
-}
-
-/// Who ended the recording waits for a reader that does not read only for so many tenths of a second.
-const HURRY: u32 = 20;
-
-/// Waits until everything is written, or the user does not want to wait.
-fn end(mut screen: Screen, opened: &Opened, interrupted: bool) -> anyhow::Result<Written> {
-    let mut interrupts = Interrupts::new().ok();
-    let mut waited = 0;
-    let mut give_up = || {
-        waited += 1;
-        interrupted && waited > HURRY || interrupts.as_mut().is_some_and(Interrupts::take)
-    };
-    let finished = screen.rows.finish(&mut give_up);
-    let told = screen.events.as_mut().map_or(Ok(()), |events| events.finish(&mut give_up));
-    let Screen { rows: writer, console, error, events, .. } = screen;
-    let error = error.or(finished.err().map(Unwritten::Rows)).or(told.err().map(Unwritten::Events));
-    match (error, &opened.rows, &opened.events) {
-        (None, _, _) => Ok(Written {
-            rows: writer.count(),
-            lost: writer.lost(),
-            events_lost: events.as_ref().map_or(0, Events::lost),
-            left_out: writer.left_out(),
-        }),
-        (Some(Unwritten::Events(error)), _, Some(file)) => Err(file.error(error)),
-        (Some(Unwritten::Rows(error) | Unwritten::Events(error)), file, _) => {
-            if writer.lost() > 0 && error.kind() != io::ErrorKind::BrokenPipe {
-                console.warn(&format!("{} could not be written", rows(writer.lost())));
-            }
-            Err(match file {
-                Some(file) => file.error(error),
-                None => stdout(error),
-            })
-        }
-    }
-}
-
-fn rows(count: u64) -> String {
-    if count == 1 { "1 row".to_owned() } else { format!("{count} rows") }
 }

@@ -5,8 +5,8 @@ use super::args::{BusSpec, Duration};
 use crate::measure::expression::verdict::{Outcome, Verdict};
 use crate::output::console::Console;
 use crate::output::events::{Weight, Words};
+use crate::output::failure::ErrorMessage;
 use crate::output::verdict;
-use crate::tasks::{Failure, Kind};
 
 /// The shortest interval of SYNC.
 const SHORTEST_SYNC_INTERVAL: std::time::Duration = std::time::Duration::from_millis(1);
@@ -22,9 +22,9 @@ pub(super) fn sync_interval(text: &str) -> Result<Duration, String> {
 }
 
 /// Refuses `--sync` and `--poll` for a recording (`replay:`), which cannot send.
-pub(super) fn refuse_to_send(global: &Global, interval: Option<Duration>) -> Result<(), Failure> {
+pub(super) fn refuse_to_send(global: &Global, interval: Option<Duration>) -> Result<(), ErrorMessage> {
     if matches!(global.bus, Some(BusSpec::Replay(_))) && interval.is_some() {
-        return Err(Failure::new(Kind::Usage, "a recording (replay:) is receive-only: --sync and --poll send"));
+        return Err(ErrorMessage::usage("a recording (replay:) is receive-only: --sync and --poll send"));
     }
     Ok(())
 }

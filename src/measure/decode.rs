@@ -1,4 +1,4 @@
-//! The decoding of TPDOs into samples, by mapping, type, digits and status.
+//! Decodes TPDOs into samples, by mapping, data type, decimal digits and status.
 
 use super::layout::{Layout, Signal, Tpdo};
 use super::sample::{Number, Raw, Sample, Source, Status};
@@ -10,21 +10,21 @@ use crate::canopen::value::{DataType, Value};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-/// What the user wants of a node: a signal, its status, or any object.
+/// A requested value of a node.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Wanted {
-    /// `pressure`.
+    /// A signal: `pressure`.
     Signal(String),
-    /// `pressure.status`.
+    /// The status of a signal: `pressure.status`.
     Status(String),
-    /// An object that is carried as it is.
+    /// An object, without unit and decimal digits: `0x6130:1`.
     Object(ObjectId),
 }
 
 /// How the bytes of one value become a sample.
 #[derive(Clone, Debug)]
 pub struct Reading {
-    /// The sample's source.
+    /// The number of the source.
     pub source: usize,
     data_type: DataType,
     digits: u8,
@@ -32,41 +32,41 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// The reading of a signal's process value of `data_type` into the source numbered `source`.
+    /// For the process value of a signal. `source` is the number of the source.
     pub fn of_signal(signal: &Signal, data_type: DataType, source: usize) -> Reading {
         Reading { source, data_type, digits: signal.digits.unwrap_or(0), marker: signal.marker }
     }
 
-    /// The reading of a number that has neither unit nor digits.
+    /// For a number without unit and decimal digits.
     pub fn plain(data_type: DataType, source: usize) -> Reading {
         Reading { source, data_type, digits: 0, marker: false }
     }
 
-    /// The type of the value.
+    /// The data type of the value.
     pub fn data_type(&self) -> DataType {
         self.data_type
     }
 
-    /// A sample out of a value's bytes and, where there are, its status bits.
+    /// The sample for the bytes of a value and, if there are any, its status bits. `None` if the bytes do not fit the type.
     pub fn sample(&self, at: Stamp, bytes: &[u8], status_bits: Option<u64>) -> Option<Sample> {
         let value = self.data_type.decode(bytes).ok()?;
         let number = Number::from_value(&value, self.digits)?;
-        let told = status_bits.map(Status::from_bits);
+        let reported = status_bits.map(Status::from_bits);
         let marked = !number.is_finite() || self.marker && is_smallest(&value, self.data_type);
-        let status = match told {
+        let status = match reported {
             Some((Status::Ok, _)) if marked => Some(Status::Invalid),
             Some((status, _)) => Some(status),
             None if marked => Some(Status::Invalid),
             None if self.marker => Some(Status::Ok),
             None => None,
         };
-        let valid = !marked && told.is_none_or(|(_, valid)| valid);
+        let valid = !marked && reported.is_none_or(|(_, valid)| valid);
         Some(Sample { at, source: self.source, value: valid.then_some(number), status, raw: Raw::new(bytes) })
     }
 }
 
-/// The marker of an integer in overload (MH-4: -32768, -2147483648): the smallest number of the type. Only where the
-/// signal has markers.
+/// Whether an integer is the smallest number of its type, which marks an overload (MH-4: -32768, -2147483648). Use it only for
+/// signals that have this marker.
 pub fn is_smallest(value: &Value, data_type: DataType) -> bool {
     match (value, data_type) {
         (Value::Integer(number), DataType::Integer(width)) => {
@@ -76,46 +76,51 @@ pub fn is_smallest(value: &Value, data_type: DataType) -> bool {
     }
 }
 
+/// One value in a TPDO.
 #[derive(Debug)]
-struct Part {
+struct MappedValue {
     field: Field,
     reading: Reading,
     status: Option<Field>,
 }
 
+/// How one TPDO is decoded.
 #[derive(Debug)]
-struct Plan {
+struct TpdoDecoder {
     node: NodeId,
-    /// Bytes that the mapping fills.
+    /// Length of the mapping in bytes.
     length: usize,
-    parts: Vec<Part>,
-    held: bool,
-    wrong_length: u64,
+    values: Vec<MappedValue>,
+    /// Makes no samples at present.
+    is_held: bool,
+    /// TPDOs received with another length.
+    wrong_lengths: u64,
 }
 
 /// Decodes the TPDOs of several nodes.
 #[derive(Debug, Default)]
 pub struct Decoder {
-    plans: HashMap<CanId, Plan>,
+    tpdos: HashMap<CanId, TpdoDecoder>,
     sources: Vec<Source>,
-    contested: BTreeMap<CanId, (NodeId, NodeId)>,
+    /// COB-IDs of two nodes that were not reported yet.
+    shared: BTreeMap<CanId, (NodeId, NodeId)>,
 }
 
-/// What a frame was to a decoder.
+/// What a decoder did with a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decoded {
-    /// No TPDO of ours.
+    /// It is not a known TPDO.
     NotOurs,
-    /// A TPDO of this node; its samples have been handed over.
+    /// It is a TPDO of this node, and its samples were added.
     Tpdo(NodeId),
-    /// A TPDO of this node, of which no samples are made at the moment.
+    /// It is a TPDO of this node that makes no samples at present.
     Held(NodeId),
-    /// A TPDO of this node whose length is not that of its mapping: no sample was made.
+    /// It is a TPDO of this node with another length than its mapping. It made no samples.
     WrongLength(NodeId),
 }
 
 impl Decoder {
-    /// A source that is in no TPDO: polled values share the numbering. The same source keeps its number.
+    /// Adds a source and returns its number. A known source keeps its number. Polled values use the same numbers.
     pub fn add_source(&mut self, source: Source) -> usize {
         if let Some(at) = self.sources.iter().position(|known| *known == source) {
             return at;
@@ -124,67 +129,67 @@ impl Decoder {
         self.sources.len() - 1
     }
 
-    /// Plans for every valid TPDO of a node; with `wanted`, only for what was asked for.
+    /// Decodes every valid TPDO of a node; with `wanted`, only these values.
     pub fn add(&mut self, layout: Layout<'_>, wanted: &[Wanted]) {
         for tpdo in layout.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()) {
-            let mut plan = self.plan(layout, tpdo, wanted);
+            let mut decoder = self.tpdo_decoder(layout, tpdo, wanted);
             let id = tpdo.cob_id.can_id();
-            // Two nodes that send with one identifier: nothing tells whose values come.
-            if let Some(other) = self.plans.get(&id).filter(|other| other.node != layout.node) {
-                plan.held = true;
-                self.contested.insert(id, (other.node, layout.node));
+            // Two nodes send with one COB-ID: the sender of a frame is unknown.
+            if let Some(other) = self.tpdos.get(&id).filter(|other| other.node != layout.node) {
+                decoder.is_held = true;
+                self.shared.insert(id, (other.node, layout.node));
             }
-            self.plans.insert(id, plan);
+            self.tpdos.insert(id, decoder);
         }
     }
 
-    /// The plans of a node that was read again; they replace the old ones.
-    pub fn renew(&mut self, layout: Layout<'_>, wanted: &[Wanted]) {
+    /// Decodes a node that was read again. Its old TPDOs are removed.
+    pub fn replace(&mut self, layout: Layout<'_>, wanted: &[Wanted]) {
         self.remove(layout.node);
         self.add(layout, wanted);
     }
 
-    /// Decodes nothing of a node any more: its TPDOs are nobody's.
+    /// Removes the TPDOs of a node.
     pub fn remove(&mut self, node: NodeId) {
-        self.plans.retain(|_, plan| plan.node != node);
+        self.tpdos.retain(|_, tpdo| tpdo.node != node);
     }
 
-    /// Makes no samples of a node's TPDOs until it is renewed: what they mean may have changed.
+    /// The setup of a node may have changed: its TPDOs make no samples until [`Decoder::replace`].
     pub fn hold(&mut self, node: NodeId) {
-        self.plans.values_mut().filter(|plan| plan.node == node).for_each(|plan| plan.held = true);
+        self.tpdos.values_mut().filter(|tpdo| tpdo.node == node).for_each(|tpdo| tpdo.is_held = true);
     }
 
-    fn plan(&mut self, layout: Layout<'_>, tpdo: &Tpdo, wanted: &[Wanted]) -> Plan {
+    fn tpdo_decoder(&mut self, layout: Layout<'_>, tpdo: &Tpdo, wanted: &[Wanted]) -> TpdoDecoder {
         let fields = lay_out(&tpdo.mapping);
         let bits: usize = tpdo.mapping.iter().map(|entry| usize::from(entry.bits)).sum();
-        let mut parts = Vec::new();
+        let mut values = Vec::new();
         for field in &fields {
             let object = field.entry.object;
             let data_type = layout.mapped_type(object, field.entry.bits);
             let mut add = |name: &str, unit: String, reading: &dyn Fn(usize) -> Reading, status: Option<Field>| {
                 let source = self.add_source(Source { node: layout.node, signal: name.into(), unit: unit.into() });
-                parts.push(Part { field: *field, reading: reading(source), status });
+                values.push(MappedValue { field: *field, reading: reading(source), status });
             };
-            let asked = |item: &Wanted| wanted.contains(item);
+            let is_wanted = |item: &Wanted| wanted.contains(item);
             if let Some(signal) = layout.signals.iter().find(|signal| signal.is_value(object)) {
-                if wanted.is_empty() || asked(&Wanted::Signal(signal.name.clone())) {
+                if wanted.is_empty() || is_wanted(&Wanted::Signal(signal.name.clone())) {
                     let status = fields.iter().find(|other| Some(other.entry.object) == signal.status).copied();
                     let unit = signal.unit.map(|unit| unit.to_string()).unwrap_or_default();
                     add(&signal.name, unit, &|source| Reading::of_signal(signal, data_type, source), status);
                 }
             } else if let Some(signal) = layout.signals.iter().find(|signal| signal.status == Some(object)) {
-                if asked(&Wanted::Status(signal.name.clone())) {
+                if is_wanted(&Wanted::Status(signal.name.clone())) {
                     let name = format!("{}.status", signal.name);
                     add(&name, String::new(), &|source| Reading::plain(data_type, source), None);
                 }
             } else if wanted.is_empty() && !is_dummy(object) {
                 add(&object.to_string(), String::new(), &|source| Reading::plain(data_type, source), None);
             }
-            if asked(&Wanted::Object(object)) {
+            if is_wanted(&Wanted::Object(object)) {
                 add(&object.to_string(), String::new(), &|source| Reading::plain(data_type, source), None);
             }
         }
-        Plan { node: layout.node, length: bits.div_ceil(8), parts, held: false, wrong_length: 0 }
+        TpdoDecoder { node: layout.node, length: bits.div_ceil(8), values, is_held: false, wrong_lengths: 0 }
     }
 
     /// Every source, in the order of their numbers.
@@ -192,53 +197,52 @@ impl Decoder {
         &self.sources
     }
 
-    /// Identifiers that two nodes send with, since they were last asked for: no samples are made of these TPDOs.
-    pub fn take_contested(&mut self) -> BTreeMap<CanId, (NodeId, NodeId)> {
-        std::mem::take(&mut self.contested)
+    /// COB-IDs with which two nodes send TPDOs, each returned once. These TPDOs make no samples.
+    pub fn take_shared_cob_ids(&mut self) -> BTreeMap<CanId, (NodeId, NodeId)> {
+        std::mem::take(&mut self.shared)
     }
 
-    /// The identifiers that TPDOs come with.
+    /// The COB-IDs of the decoded TPDOs.
     pub fn can_ids(&self) -> impl Iterator<Item = CanId> + '_ {
-        self.plans.keys().copied()
+        self.tpdos.keys().copied()
     }
 
-    /// TPDOs of `node` that did not have the length of their mapping.
+    /// TPDOs of a node that had another length than their mapping.
     pub fn wrong_lengths(&self, node: NodeId) -> u64 {
-        self.plans.values().filter(|plan| plan.node == node).map(|plan| plan.wrong_length).sum()
+        self.tpdos.values().filter(|tpdo| tpdo.node == node).map(|tpdo| tpdo.wrong_lengths).sum()
     }
 
-    /// Decodes a frame; its samples are pushed to `samples` in the order of the mapping.
+    /// Decodes a frame. Its samples are added to `samples` in the order of the mapping.
     ///
-    /// A TPDO whose length is not that of its mapping gives none: the mapping has been changed, or the frame
-    /// is not the device's.
+    /// A TPDO with another length than its mapping makes no samples: its mapping was changed, or another device sent it.
     pub fn decode(&mut self, received: &Received, samples: &mut Vec<Sample>) -> Decoded {
         let frame = &received.frame;
-        let Some(plan) = self.plans.get_mut(&frame.id()).filter(|_| !frame.is_remote()) else {
+        let Some(tpdo) = self.tpdos.get_mut(&frame.id()).filter(|_| !frame.is_remote()) else {
             return Decoded::NotOurs;
         };
-        if plan.held {
-            return Decoded::Held(plan.node);
+        if tpdo.is_held {
+            return Decoded::Held(tpdo.node);
         }
         let data = frame.data();
-        if data.len() != plan.length {
-            plan.wrong_length += 1;
-            return Decoded::WrongLength(plan.node);
+        if data.len() != tpdo.length {
+            tpdo.wrong_lengths += 1;
+            return Decoded::WrongLength(tpdo.node);
         }
-        for part in &plan.parts {
-            let Some((bytes, len)) = part.field.bytes(data) else { continue };
-            let status = part.status.and_then(|status| status.bytes(data)).map(|(bits, _)| u64::from_le_bytes(bits));
-            samples.extend(part.reading.sample(received.at, &bytes[..len], status));
+        for value in &tpdo.values {
+            let Some((bytes, len)) = value.field.bytes(data) else { continue };
+            let status = value.status.and_then(|status| status.bytes(data)).map(|(bits, _)| u64::from_le_bytes(bits));
+            samples.extend(value.reading.sample(received.at, &bytes[..len], status));
         }
-        Decoded::Tpdo(plan.node)
+        Decoded::Tpdo(tpdo.node)
     }
 }
 
-/// Indices 0001h to 001Fh in a mapping fill gaps (CiA 301, 7.4.7.1).
+/// Whether a mapped object only fills a gap: indices 0001h to 001Fh (CiA 301, 7.4.7.1).
 fn is_dummy(object: ObjectId) -> bool {
     object.index < 0x20
 }
 
-/// A source for a signal of a node.
+/// The source of a value of a node; `signal` gives the unit.
 pub fn source(node: NodeId, name: &str, signal: Option<&Signal>) -> Source {
     let unit = signal.and_then(|signal| signal.unit).map(|unit| unit.to_string()).unwrap_or_default();
     Source { node, signal: Arc::from(name), unit: Arc::from(unit) }
@@ -339,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn what_two_nodes_send_with_one_identifier_is_nobodys() {
+    fn shared_cob_id_yields_no_samples() {
         let one = node(REAL, &[0x6130_0120], |_| {});
         let other = Node { id: NodeId::new(2).expect("a node-ID"), ..one.clone() };
         let mut decoder = Decoder::default();
@@ -348,11 +352,11 @@ mod tests {
         let received = Received { frame: "181#0000803F".parse().expect("a frame"), at: Stamp::default() };
         let mut samples = Vec::new();
         assert!(matches!(decoder.decode(&received, &mut samples), Decoded::Held(_)) && samples.is_empty());
-        assert_eq!(decoder.take_contested().into_values().collect::<Vec<_>>(), [(one.id, other.id)]);
+        assert_eq!(decoder.take_shared_cob_ids().into_values().collect::<Vec<_>>(), [(one.id, other.id)]);
     }
 
     #[test]
-    fn dps_integer_with_digits_tells_no_status() {
+    fn dps_integer_has_digits_and_no_status() {
         let dps = node((ObjectId::new(0x6130, 1), DataType::Integer(4)), &[0x6130_0120], |_| {});
         let mut dps = dps;
         // Without a description 6130h is REAL32 by the standard.
@@ -370,7 +374,7 @@ mod tests {
     use crate::device::catalog::Model;
 
     #[test]
-    fn markers_only_where_the_device_has_them() {
+    fn markers_count_only_if_the_device_has_them() {
         let marked = node(REAL, &[0x9130_0120], |signal| signal.marker = true);
         assert_eq!(rows(&marked, &[], "181#00000080"), [row("pressure", "", "invalid")]);
         assert_eq!(rows(&marked, &[], "181#D2040000"), [row("pressure", "1.234", "ok")]);
@@ -381,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn other_indices_of_the_same_quantity_and_objects_that_are_no_signal() {
+    fn other_objects_of_a_signal_and_objects_without_signal() {
         let d20 = node(REAL, &[0x2090_0020], |_| {});
         // Without a description 2090h's type is not known; it is the signal all the same.
         assert_eq!(rows(&d20, &[], "181#D2040000"), [row("pressure", "1.234", "")]);

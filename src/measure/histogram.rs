@@ -1,17 +1,17 @@
-//! How times are distributed, in memory that does not grow with their number.
+//! The distribution of times, in memory that does not grow with their number.
 //!
-//! Times are counted in buckets whose width is a 4096th of a power of two: up to 8.192 us a bucket is one
-//! nanosecond, above it is less than 0.025 % of the time. A quantile is the middle of its bucket, and so off by
-//! 0.0125 % at most; the shortest and the longest time are exact. Buckets come in pages that are made when they are
-//! first needed: times that lie close together, as intervals do, touch a few of them. A bucket counts up to four billion.
+//! Times are counted in buckets. Up to 8.192 us a bucket is one nanosecond wide, above it less than 0.025 % of the time.
+//! A quantile is the middle of its bucket, so its error is at most 0.0125 %. The shortest and the longest time are exact.
+//! Buckets are allocated in pages when they are first needed: similar times need few pages. A bucket counts up to four
+//! billion.
 
 use std::time::Duration;
 
-/// Powers of two from one bucket's width to the next.
+/// A power of two is divided into 2 to this power buckets.
 const FINE_BITS: u32 = 12;
 /// Buckets in a page.
 const PAGE: usize = 64;
-/// The longest time that has a bucket of its own: 39 hours. Longer ones are counted there.
+/// The longest time with a bucket of its own: 39 hours. Longer times are counted in the same bucket.
 const LONGEST: u64 = (1 << 47) - 1;
 
 /// Counts of times.
@@ -53,14 +53,14 @@ impl Histogram {
         self.longest
     }
 
-    /// The time that `share` (0 to 1) of all are not longer than, off by 0.0125 % at most.
+    /// The time that `share` (0 to 1) of all times do not exceed. The error is at most 0.0125 %.
     pub fn quantile(&self, share: f64) -> Option<Duration> {
         self.place(share, self.buckets())
     }
 
-    /// The distance to `centre` that `share` (0 to 1) of all times keep, either way; off by 0.0125 % of the time.
+    /// The distance from `centre` that `share` (0 to 1) of all times do not exceed. The error is at most 0.0125 % of the time.
     pub fn distance(&self, centre: Duration, share: f64) -> Option<Duration> {
-        // The middle of a bucket may lie beyond the last time in it.
+        // The middle of a bucket may be beyond its last time.
         let farthest = self.farthest(centre)?;
         let centre = nanoseconds(centre);
         let mut distances: Vec<(u64, u64)> =
@@ -69,12 +69,12 @@ impl Histogram {
         self.rank(share, distances.into_iter()).map(|distance| distance.min(farthest))
     }
 
-    /// The greatest distance to `centre`, exact.
+    /// The greatest distance from `centre`, exact.
     pub fn farthest(&self, centre: Duration) -> Option<Duration> {
         Some(centre.abs_diff(self.shortest?).max(centre.abs_diff(self.longest?)))
     }
 
-    /// The middles of the buckets in nanoseconds, with what is in them, in rising order.
+    /// The middles of the buckets in nanoseconds with their counts, in ascending order.
     fn buckets(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
         let pages = self.pages.iter().enumerate().filter_map(|(at, page)| Some((at, page.as_deref()?)));
         pages.flat_map(|(at, page)| {
@@ -85,7 +85,7 @@ impl Histogram {
 
     fn place(&self, share: f64, buckets: impl Iterator<Item = (u64, u64)>) -> Option<Duration> {
         let time = self.rank(share, buckets)?;
-        // The middle of a bucket may lie beyond what was ever counted in it.
+        // The middle of a bucket may be beyond the times in it.
         Some(time.clamp(self.shortest?, self.longest?))
     }
 
@@ -106,7 +106,7 @@ fn nanoseconds(time: Duration) -> u64 {
     u64::try_from(time.as_nanos()).unwrap_or(LONGEST).min(LONGEST)
 }
 
-/// The bucket of a time: its power of two above 2^13 ns, and the twelve bits behind the leading one.
+/// The bucket of a time: its power of two above 2^13 ns, and the twelve bits after the leading one.
 fn bucket(time: u64) -> usize {
     let power = (u64::BITS - time.leading_zeros()).saturating_sub(FINE_BITS + 1);
     usize::try_from((u64::from(power) << FINE_BITS) + (time >> power)).unwrap_or(usize::MAX)
@@ -125,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_time_lies_in_its_bucket() {
+    fn every_time_is_in_its_bucket() {
         let mut time = 0;
         while time < LONGEST {
             for time in [time, time + 1, time.saturating_sub(1)] {
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_of_what_is_known() {
+    fn quantiles_of_known_times() {
         let mut histogram = Histogram::default();
         assert_eq!((histogram.quantile(0.5), histogram.distance(Duration::ZERO, 0.5)), (None, None));
         for n in 1..=10_000 {
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn no_share_of_all_is_farther_than_the_farthest() {
+    fn distance_of_a_share_is_at_most_the_greatest() {
         for micros in (99_000..101_000).step_by(7) {
             let mut histogram = Histogram::default();
             histogram.add(Duration::from_micros(micros));
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_bounded_by_the_spread_and_not_by_the_number() {
+    fn memory_depends_on_the_spread_not_on_the_number() {
         let mut histogram = Histogram::default();
         for n in 0..1_000_000u64 {
             histogram.add(Duration::from_nanos(10_000_000 + n * 7919 % 200_000));

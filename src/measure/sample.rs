@@ -1,4 +1,4 @@
-//! One measured value as the sensor sent it.
+//! One measured value as the device sent it.
 
 use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
@@ -6,7 +6,7 @@ use crate::canopen::value::Value;
 use std::fmt;
 use std::sync::Arc;
 
-/// A measured number, exact as it was sent.
+/// A measured number, exactly as it was sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Number {
     /// An integer divided by ten to the power of the device's decimal digits.
@@ -23,7 +23,7 @@ pub enum Number {
 }
 
 impl Number {
-    /// The number of a decoded value. Integers get the device's decimal digits; text and bytes are none.
+    /// The number of a decoded value. Integers get the device's decimal digits. Text and bytes are not numbers.
     pub fn from_value(value: &Value, digits: u8) -> Option<Number> {
         let decimal = |mantissa| Some(Number::Decimal { mantissa, digits: digits.min(38) });
         match value {
@@ -36,11 +36,11 @@ impl Number {
         }
     }
 
-    /// The nearest REAL64: what reading the text back gives.
+    /// The nearest REAL64, the same as parsing the text.
     pub fn as_f64(self) -> f64 {
         match self {
-            // A division of two exactly representable numbers is the nearest one to the quotient, up to 2^53
-            // and ten digits; beyond, the text is the exact way.
+            // Up to 2^53 and 22 digits both numbers are exact, so their quotient is the nearest one. Otherwise the text
+            // is parsed.
             Number::Decimal { mantissa, digits } if digits <= 22 && mantissa.unsigned_abs() < 1 << 53 => {
                 mantissa as f64 / 10f64.powi(i32::from(digits))
             }
@@ -78,7 +78,7 @@ impl fmt::Display for Number {
     }
 }
 
-/// What a device says of a value.
+/// The status that a device reports for a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Status {
     /// Valid.
@@ -92,8 +92,8 @@ pub enum Status {
 }
 
 impl Status {
-    /// The status of 6150h (CiA 404): bit 0 not valid, bit 1 positive overload, bit 2 negative overload;
-    /// and whether the value counts.
+    /// The status of 6150h (CiA 404): bit 0 not valid, bit 1 positive overload, bit 2 negative overload. The second
+    /// result is whether the value is valid.
     pub fn from_bits(bits: u64) -> (Status, bool) {
         let valid = bits & 1 == 0;
         let status = match bits & 0b110 {
@@ -105,7 +105,7 @@ impl Status {
         (status, valid && bits & 0b110 != 0b110)
     }
 
-    /// As it stands in a file.
+    /// The word in files and tables.
     pub fn as_str(self) -> &'static str {
         match self {
             Status::Ok => "ok",
@@ -124,7 +124,7 @@ pub struct Raw {
 }
 
 impl Raw {
-    /// At most the first eight bytes.
+    /// Keeps at most the first eight bytes.
     pub fn new(bytes: &[u8]) -> Raw {
         let len = bytes.len().min(8);
         let mut raw = Raw { bytes: [0; 8], len: len.to_le_bytes()[0] };
@@ -145,14 +145,14 @@ impl fmt::Display for Raw {
     }
 }
 
-/// What a sample is of: one signal of one node.
+/// The source of samples: one signal of one node.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source {
     /// The node.
     pub node: NodeId,
     /// `pressure`, `ch1`, `pressure.status` or an object.
     pub signal: Arc<str>,
-    /// In ASCII; empty where the device tells none.
+    /// The unit in ASCII; empty if it is unknown.
     pub unit: Arc<str>,
 }
 
@@ -161,13 +161,13 @@ pub struct Source {
 pub struct Sample {
     /// When it was received.
     pub at: Stamp,
-    /// Which of the sources known to the recorder.
+    /// The number of its source.
     pub source: usize,
-    /// The number; `None` where it is invalid.
+    /// The number; `None` if it is invalid.
     pub value: Option<Number>,
-    /// What the device says of it; `None` where it tells nothing.
+    /// The status; `None` if the device reports none.
     pub status: Option<Status>,
-    /// The bytes on the wire.
+    /// The bytes in wire order.
     pub raw: Raw,
 }
 
@@ -199,7 +199,7 @@ mod tests {
         assert_eq!(Status::from_bits(1), (Status::Invalid, false));
         assert_eq!(Status::from_bits(3), (Status::OverloadHigh, false));
         assert_eq!(Status::from_bits(5), (Status::OverloadLow, false));
-        // Outside its range, and yet said to be valid: the value stays.
+        // Outside the range, but marked as valid: the value stays.
         assert_eq!(Status::from_bits(2), (Status::OverloadHigh, true));
         assert_eq!(Status::from_bits(6), (Status::Invalid, false));
         assert_eq!(Status::from_bits(7), (Status::Invalid, false));
@@ -215,7 +215,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_number_is_the_one_that_the_text_reads_as(mantissa in any::<i32>(), digits in 0u8..=9) {
+        fn number_equals_its_parsed_text(mantissa in any::<i32>(), digits in 0u8..=9) {
             let number = Number::Decimal { mantissa: i128::from(mantissa), digits };
             prop_assert_eq!(number.as_f64(), number.to_string().parse::<f64>().expect("a number"));
         }

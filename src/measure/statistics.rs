@@ -1,12 +1,12 @@
-//! Statistics in one pass (Welford): numerically sound over as many samples as one likes.
+//! Statistics in one pass (Welford), numerically stable for any number of samples.
 //!
-//! Welford's sums lose a little with every sample: what is added to the mean becomes smaller than its last bit.
-//! So what was lost is carried along (Neumaier), which keeps a billion samples as exact as a thousand.
+//! Welford's sums lose precision with each sample, because the terms become smaller than the last bit of the sum. The lost
+//! part is kept in a second number (Neumaier), so a billion samples give the same precision as a thousand.
 
 use super::histogram::Histogram;
 use std::time::Duration;
 
-/// A sum that remembers what its last bit could not hold.
+/// A sum with the part that its last bit cannot hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sum {
     sum: f64,
@@ -26,7 +26,7 @@ impl Sum {
     }
 }
 
-/// Count, extremes, mean and spread of the values of one signal, and of the times between them.
+/// Count, minimum, maximum, mean and standard deviation of one signal's values, and the intervals between them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Statistics {
     valid: u64,
@@ -41,22 +41,21 @@ pub struct Statistics {
     gaps: u64,
 }
 
-/// How far the times between two samples are from their median. Median and distances are off by 0.025 % of the
-/// interval at most.
+/// How far the intervals between samples are from their median. All times are exact to 0.025 % of the interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Jitter {
-    /// The usual interval.
+    /// The median interval.
     pub median: Duration,
-    /// Half of the intervals are no farther from it.
+    /// Half of the intervals are within this distance from it.
     pub p50: Duration,
-    /// 99 of 100 are no farther from it.
+    /// 99 % of the intervals are within this distance from it.
     pub p99: Duration,
-    /// None is farther from it.
+    /// The greatest distance from it.
     pub max: Duration,
 }
 
 impl Statistics {
-    /// Takes a sample: its number, `None` where it is invalid, and its time on the monotonic time line.
+    /// Adds a sample: its number, or `None` if it is invalid, and its monotonic time.
     pub fn add(&mut self, value: Option<f64>, at: Duration) {
         self.first.get_or_insert(at);
         if let Some(last) = self.last {
@@ -78,7 +77,7 @@ impl Statistics {
         self.squares.add(before * (value - self.mean.value()));
     }
 
-    /// The last interval was a gap.
+    /// Counts the last interval as a gap.
     pub fn add_gap(&mut self) {
         self.gaps += 1;
     }
@@ -98,38 +97,38 @@ impl Statistics {
         self.invalid
     }
 
-    /// Least value.
+    /// The minimum.
     pub fn min(&self) -> Option<f64> {
         (self.valid > 0).then_some(self.min)
     }
 
-    /// Greatest value.
+    /// The maximum.
     pub fn max(&self) -> Option<f64> {
         (self.valid > 0).then_some(self.max)
     }
 
-    /// Arithmetic mean.
+    /// The arithmetic mean.
     pub fn mean(&self) -> Option<f64> {
         (self.valid > 0).then(|| self.mean.value())
     }
 
-    /// Standard deviation of a sample (n - 1); `None` for fewer than two values.
+    /// The sample standard deviation (n - 1); `None` for fewer than two values.
     pub fn deviation(&self) -> Option<f64> {
         (self.valid > 1).then(|| (self.squares.value().max(0.0) / (self.valid - 1) as f64).sqrt())
     }
 
-    /// Samples a second between the first and the last one.
+    /// Samples per second between the first and the last one.
     pub fn rate(&self) -> Option<f64> {
         let span = self.last?.checked_sub(self.first?)?.as_secs_f64();
         (self.count() > 1 && span > 0.0).then(|| (self.count() - 1) as f64 / span)
     }
 
-    /// The longest time between two samples.
+    /// The longest interval between two samples.
     pub fn longest_interval(&self) -> Duration {
         self.intervals.longest().unwrap_or_default()
     }
 
-    /// The times between two samples.
+    /// The intervals between two samples.
     pub fn intervals(&self) -> &Histogram {
         &self.intervals
     }
@@ -148,7 +147,7 @@ impl Statistics {
         })
     }
 
-    /// When the last sample came.
+    /// The time of the last sample.
     pub fn last(&self) -> Option<Duration> {
         self.last
     }
@@ -172,10 +171,10 @@ mod tests {
         assert_eq!(statistics.longest_interval(), Duration::from_millis(10));
     }
 
-    /// What the sums alone would have lost: every sample adds less to the mean than its last bit holds.
+    /// Each sample adds less to the mean than its last bit can hold.
     #[test]
-    fn as_exact_after_very_many_samples_as_after_a_few() {
-        // As if a billion samples of 1e6 had come, and then very many that are a little more: +-1 around it.
+    fn precision_does_not_fall_with_the_number_of_samples() {
+        // A billion samples of 1e6, then many that are a little greater.
         let mut statistics = Statistics {
             valid: 1_000_000_000,
             mean: Sum { sum: 1e6, rest: 0.0 },
@@ -199,9 +198,9 @@ mod tests {
         assert!((found / deviation - 1.0).abs() < 1e-6, "{found:e}, {deviation:e}");
     }
 
-    /// Values that grow from 1 to 1e12 and return, so that every sum is once much too large for the next term.
+    /// Values from 1 to 1e12: the sums are far too large for the next term.
     #[test]
-    fn an_adversarial_sequence() {
+    fn extreme_values_keep_precision() {
         let mut statistics = Statistics::default();
         let mut at = Duration::ZERO;
         for value in [1e12, 1.0, -1e12, 3.0].into_iter().cycle().take(4_000_000) {
@@ -209,7 +208,7 @@ mod tests {
             at += Duration::from_millis(1);
         }
         let mean = statistics.mean().expect("a mean");
-        assert!((mean - 1.0).abs() < 1e-6, "{mean}: a millionth of a millionth of what was added");
+        assert!((mean - 1.0).abs() < 1e-6, "{mean}: 1e-12 of the added values");
         let deviation = (2e24f64 / 4.0 * 4e6 / (4e6 - 1.0)).sqrt();
         let found = statistics.deviation().expect("a deviation");
         assert!((found / deviation - 1.0).abs() < 1e-12, "{found:e}, {deviation:e}");
@@ -237,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_samples_count_and_say_nothing_else() {
+    fn invalid_samples_are_only_counted() {
         let mut statistics = Statistics::default();
         assert_eq!((statistics.mean(), statistics.rate(), statistics.min()), (None, None, None));
         statistics.add(None, Duration::ZERO);

@@ -1,4 +1,4 @@
-//! The live lines of a recording: what each node measures now, and how far it has come.
+//! The live lines of a recording: the latest values of each node, and the progress.
 
 use super::text;
 use crate::measure::sample::{Sample, Source};
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::time::Duration;
 
-/// How often lines are redrawn, a second.
+/// Redraws per second.
 pub(super) const RATE: u8 = 10;
 
 /// Live lines on stderr.
@@ -39,17 +39,17 @@ impl Progress {
         Progress { multi, nodes: BTreeMap::new(), total, duration, count, changed: false }
     }
 
-    /// For lines that must not be torn.
+    /// For the console: it prints its lines between redraws.
     pub fn multi(&self) -> MultiProgress {
         self.multi.clone()
     }
 
-    /// Whether anybody sees it.
+    /// Whether nothing is shown.
     pub fn is_hidden(&self) -> bool {
         self.multi.is_hidden()
     }
 
-    /// Takes the newest values.
+    /// Takes the latest values.
     pub fn take(&mut self, samples: &[Sample], sources: &[Source]) {
         if self.is_hidden() {
             return;
@@ -98,11 +98,11 @@ impl Progress {
         }
     }
 
-    /// Removes the lines. After Ctrl-C they stay: the terminal has written `^C` behind them, and where the
-    /// cursor stands now is not known.
+    /// Removes the lines. After Ctrl-C they stay: the terminal has printed `^C`, so the position of the cursor is
+    /// unknown.
     pub fn finish(&mut self, interrupted: bool) {
         if interrupted && !self.is_hidden() {
-            // A terminal that takes no more is gone.
+            // If the terminal is gone, there is nothing to clean up.
             let _ = writeln!(io::stderr());
         } else {
             let _ = self.multi.clear();
@@ -111,28 +111,28 @@ impl Progress {
     }
 }
 
-/// How far one transfer has come: shown once it takes longer than a blink.
+/// The progress of one transfer, shown only if it takes long.
 #[derive(Debug)]
 pub struct Transfer {
     bar: Option<ProgressBar>,
-    /// How often it was told of bytes moved: it is told ten times a second.
-    told: Cell<u32>,
+    /// Calls of [`Transfer::moved`]: ten per second.
+    calls: Cell<u32>,
 }
 
-/// A blink: three tenths of a second.
-const BLINK: u32 = 3;
+/// The call from which on the progress is shown: after three tenths of a second.
+const FIRST_SHOWN_CALL: u32 = 3;
 
 impl Transfer {
-    /// A transfer that begins now; nothing is shown unless `show`.
+    /// A transfer that starts now; hidden unless `show`.
     pub fn new(show: bool) -> Transfer {
         let bar = show.then(|| ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()));
-        Transfer { bar, told: Cell::new(0) }
+        Transfer { bar, calls: Cell::new(0) }
     }
 
-    /// Takes how many bytes have moved, and of how many.
+    /// Takes the number of bytes moved, and the total if it is known.
     pub fn moved(&self, (done, total): (usize, Option<usize>)) {
-        self.told.set(self.told.get().saturating_add(1));
-        let Some(bar) = self.bar.as_ref().filter(|_| self.told.get() >= BLINK) else { return };
+        self.calls.set(self.calls.get().saturating_add(1));
+        let Some(bar) = self.bar.as_ref().filter(|_| self.calls.get() >= FIRST_SHOWN_CALL) else { return };
         if bar.is_hidden() {
             bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(RATE));
             bar.set_style(style("[{bar:27}] {bytes} of {total_bytes}, {binary_bytes_per_sec}").progress_chars("=> "));
@@ -151,14 +151,14 @@ impl Transfer {
     }
 }
 
-/// A bar of this length.
+/// A progress bar of this length.
 pub(super) fn bar(multi: &MultiProgress, length: u64) -> ProgressBar {
     let bar = multi.add(ProgressBar::new(length));
     bar.set_style(style("[{bar:27}] {msg}").progress_chars("=> "));
     bar
 }
 
-/// How a line looks.
+/// The style of a line.
 pub(super) fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }

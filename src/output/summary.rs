@@ -1,4 +1,4 @@
-//! The summary at the end of a recording: lines for people, one JSON object for programs.
+//! The summary of a recording: lines for people, one JSON object for programs.
 
 use super::events::remark_text;
 use super::text::{grouped, significant};
@@ -6,45 +6,45 @@ use crate::bus::time::spoken;
 use crate::measure::histogram::Histogram;
 use crate::measure::sample::Source;
 use crate::measure::statistics::{Jitter, Statistics};
-use crate::tasks::log::{RecordingReport, SyncStatistics};
+use crate::tasks::log::{RecordingReport, Remark, SyncStatistics};
 use serde::Serialize;
 use std::io::{self, Write};
 use std::time::Duration;
 
-/// What became of the rows.
+/// What was written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Written {
-    /// Lines of either layout.
+    /// Rows of either layout.
     pub rows: u64,
-    /// Of which so many were lost: they came faster than they could be written.
+    /// Rows among them that were lost: they came too fast, or could not be written.
     pub lost: u64,
-    /// Events that were lost in the same way.
+    /// Events that were lost.
     pub events_lost: u64,
-    /// Values that had no place in the wide layout.
+    /// Values that are in no row of layout `wide`.
     pub left_out: u64,
 }
 
-/// The summary in lines.
-pub fn lines(outcome: &RecordingReport, written: Written) -> Vec<String> {
+/// The summary as lines of text.
+pub fn lines(report: &RecordingReport, written: Written) -> Vec<String> {
     let mut head = format!(
         "{} rows in {}, {} timestamps, {} frames dropped, {} gaps",
         grouped(written.rows),
-        spoken(outcome.length),
-        outcome.timestamps,
-        grouped(outcome.dropped),
-        grouped(outcome.gaps)
+        spoken(report.length),
+        report.timestamps,
+        grouped(report.dropped),
+        grouped(report.gaps)
     );
-    let events = &outcome.events;
+    let events = &report.events;
     for (count, what) in [
-        (outcome.emergencies, ["emergency message", "emergency messages"]),
+        (report.emergencies, ["emergency message", "emergency messages"]),
         (events.restarts, ["restart", "restarts"]),
-        (events.silences, ["time that a node was silent", "times that a node was silent"]),
+        (events.silences, ["silent node", "silent nodes"]),
         (events.heartbeat_losses, ["heartbeat lost", "heartbeats lost"]),
         (events.changes, ["changed mapping or unit", "changed mappings or units"]),
-        (events.wrong_lengths, ["TPDO of a wrong length", "TPDOs of a wrong length"]),
-        (events.link_losses, ["time that the interface went down", "times that the interface went down"]),
+        (events.wrong_lengths, ["TPDO of the wrong length", "TPDOs of the wrong length"]),
+        (events.link_losses, ["interface loss", "interface losses"]),
         (events.bus_offs, ["bus-off", "bus-offs"]),
-        (outcome.skipped, ["poll skipped", "polls skipped"]),
+        (report.skipped, ["poll skipped", "polls skipped"]),
         (written.lost, ["row lost", "rows lost"]),
         (written.events_lost, ["event lost", "events lost"]),
     ] {
@@ -56,19 +56,19 @@ pub fn lines(outcome: &RecordingReport, written: Written) -> Vec<String> {
     let mut lines = vec![head];
     if events.not_recorded > 0 {
         let count = grouped(events.not_recorded);
-        lines.push(format!("{count} not recorded: it had to be read again first what the values mean"));
+        lines.push(format!("{count} TPDOs or polled values made no row: the setup of their node had to be read again"));
     }
-    lines.extend(syncs(&outcome.syncs));
-    for (source, statistics) in &outcome.statistics {
+    lines.extend(syncs(&report.syncs));
+    for (source, statistics) in &report.statistics {
         lines.push(signal(source, statistics));
     }
     if written.left_out > 0 {
         lines.push(format!(
-            "{} values have no place in the wide layout: late, or not the first in their cycle; --layout long has all",
+            "{} values are in no row: late, or not the first in their cycle (--layout long contains all values)",
             grouped(written.left_out)
         ));
     }
-    lines.extend(outcome.remarks.iter().map(remark_text));
+    lines.extend(report.remarks.iter().map(remark_text));
     lines
 }
 
@@ -77,7 +77,7 @@ fn syncs(syncs: &SyncStatistics) -> Option<String> {
     let quantile = |share| delays.quantile(share).map(spoken);
     let (p50, p99) = (quantile(0.5)?, quantile(0.99)?);
     let (min, max) = (spoken(delays.shortest()?), spoken(delays.longest()?));
-    Some(format!("{} SYNC sent, after their time by min {min}  p50 {p50}  p99 {p99}  max {max}", grouped(syncs.sent)))
+    Some(format!("{} SYNC sent, delay min {min}  p50 {p50}  p99 {p99}  max {max}", grouped(syncs.sent)))
 }
 
 fn signal(source: &Source, statistics: &Statistics) -> String {
@@ -105,7 +105,7 @@ fn signal(source: &Source, statistics: &Statistics) -> String {
     line.trim_end().to_owned()
 }
 
-/// How times are distributed, in seconds.
+/// The distribution of times, in seconds.
 #[derive(Serialize)]
 struct Spread {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -127,8 +127,11 @@ impl Spread {
     }
 }
 
-/// The summary as one JSON object.
-pub fn json(out: &mut dyn Write, outcome: &RecordingReport, written: Written) -> io::Result<()> {
+/// Writes the summary as one JSON object. `complete` is false if the recording ended before --count or --duration.
+///
+/// # Errors
+/// The output cannot be written.
+pub fn json(out: &mut dyn Write, report: &RecordingReport, written: Written, complete: bool) -> io::Result<()> {
     #[derive(Serialize)]
     struct Signal<'a> {
         node: u8,
@@ -148,6 +151,7 @@ pub fn json(out: &mut dyn Write, outcome: &RecordingReport, written: Written) ->
     }
     #[derive(Serialize)]
     struct Summary<'a> {
+        complete: bool,
         rows: u64,
         rows_lost: u64,
         events_lost: u64,
@@ -171,10 +175,11 @@ pub fn json(out: &mut dyn Write, outcome: &RecordingReport, written: Written) ->
         bus_offs: u64,
         receive_buffer_bytes: Option<usize>,
         lost_nodes: Vec<u8>,
+        left_operational: Vec<u8>,
         remarks: Vec<String>,
         signals: Vec<Signal<'a>>,
     }
-    let signals = outcome.statistics.iter().map(|(source, statistics)| Signal {
+    let signals = report.statistics.iter().map(|(source, statistics)| Signal {
         node: source.node.get(),
         signal: &source.signal,
         unit: &source.unit,
@@ -195,21 +200,22 @@ pub fn json(out: &mut dyn Write, outcome: &RecordingReport, written: Written) ->
             max: jitter.max.as_secs_f64(),
         }),
     });
-    let events = &outcome.events;
+    let events = &report.events;
     let summary = Summary {
+        complete,
         rows: written.rows,
         rows_lost: written.lost,
         events_lost: written.events_lost,
         values_left_out: written.left_out,
-        length_s: outcome.length.as_secs_f64(),
-        timestamps: outcome.timestamps.to_string(),
-        dropped: outcome.dropped,
-        gaps: outcome.gaps,
-        emergencies: outcome.emergencies,
-        skipped_polls: outcome.skipped,
-        syncs: outcome.syncs.sent,
-        syncs_left_out: outcome.syncs.left_out,
-        sync_delay_s: Spread::of(&outcome.syncs.delays),
+        length_s: report.length.as_secs_f64(),
+        timestamps: report.timestamps.to_string(),
+        dropped: report.dropped,
+        gaps: report.gaps,
+        emergencies: report.emergencies,
+        skipped_polls: report.skipped,
+        syncs: report.syncs.sent,
+        syncs_left_out: report.syncs.left_out,
+        sync_delay_s: Spread::of(&report.syncs.delays),
         restarts: events.restarts,
         node_losses: events.silences,
         heartbeat_losses: events.heartbeat_losses,
@@ -218,10 +224,20 @@ pub fn json(out: &mut dyn Write, outcome: &RecordingReport, written: Written) ->
         wrong_lengths: events.wrong_lengths,
         link_losses: events.link_losses,
         bus_offs: events.bus_offs,
-        receive_buffer_bytes: outcome.receive_buffer.map(|buffer| buffer.bytes),
-        lost_nodes: outcome.lost.iter().map(|node| node.get()).collect(),
-        remarks: outcome.remarks.iter().map(remark_text).collect(),
+        receive_buffer_bytes: report.receive_buffer.map(|buffer| buffer.bytes),
+        lost_nodes: report.lost.iter().map(|node| node.get()).collect(),
+        left_operational: left_operational(report),
+        remarks: report.remarks.iter().map(remark_text).collect(),
         signals: signals.collect(),
     };
     super::json::line(out, &summary)
+}
+
+/// The nodes that were started and stay operational, because their previous state is unknown.
+fn left_operational(report: &RecordingReport) -> Vec<u8> {
+    let nodes = report.remarks.iter().filter_map(|remark| match remark {
+        Remark::LeftOperational(nodes) => Some(nodes),
+        _ => None,
+    });
+    nodes.flatten().map(|node| node.get()).collect()
 }

@@ -41,7 +41,6 @@ use poll::Poll;
 pub use producer::SyncStatistics;
 use recording::Recording;
 pub use remark::{Remark, SilenceReason};
-pub use silence::text as silence_text;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;

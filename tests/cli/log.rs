@@ -105,7 +105,7 @@ fn count<'a>(rows: impl IntoIterator<Item = &'a Row>) -> BTreeMap<(&'a str, &'a 
 }
 
 #[test]
-fn all_four_at_once_are_what_they_sent() {
+fn rows_match_what_four_devices_sent() {
     let mut first_values = BTreeSet::new();
     for seed in [0, 1, 7, 12345] {
         let bench = everybody(seed);
@@ -132,13 +132,13 @@ fn all_four_at_once_are_what_they_sent() {
 }
 
 #[test]
-fn two_runs_give_the_same_bytes() {
+fn two_runs_write_the_same_bytes() {
     let run = || everybody(3).run("log 1-3,127 --sync 10ms --duration 1s").exit(0).stdout;
     assert_eq!(run(), run());
 }
 
 #[test]
-fn json_lines_are_the_same_rows() {
+fn json_lines_contain_the_same_rows() {
     let csv = rows(&everybody(5).run("log 1-3,127 --sync 10ms --duration 2s").exit(0).stdout);
     let json = everybody(5).run("log 1-3,127 --sync 10ms --duration 2s --format json").exit(0).json();
     assert_eq!(csv.len(), json.len());
@@ -165,7 +165,7 @@ fn sent(done: &Done, frame: &str) -> Vec<u64> {
 }
 
 #[test]
-fn syncs_are_as_many_as_asked_for_and_do_not_drift() {
+fn sync_count_is_exact_and_does_not_drift() {
     let done = one("mh4", "").run("log 5 --sync 10ms --duration 1s").exit(0);
     let syncs = sent(&done, "080#");
     assert_eq!(syncs.len(), 100);
@@ -178,23 +178,23 @@ fn syncs_are_as_many_as_asked_for_and_do_not_drift() {
 }
 
 #[test]
-fn sync_goes_out_on_the_identifier_of_1005h() {
+fn sync_uses_the_cob_id_of_1005h() {
     let done = one("mh4", "set = { \"0x1005\" = 0x90 }\n").run("log 5 --sync 10ms --count 10").exit(0);
     assert_eq!((sent(&done, "090#").len(), sent(&done, "080#").len()), (10, 0));
 }
 
 #[test]
-fn sync_is_refused_where_one_would_not_serve_all() {
+fn sync_is_refused_if_the_cob_ids_differ() {
     let bench = Bench::described(
         "[[device]]\nkind = \"mh4\"\nnode = 5\nset = { \"0x1005\" = 0x90 }\n[[device]]\nkind = \"mh4\"\nnode = 6\n",
     );
     let done = bench.run("log 5,6 --sync 10ms").exit(1);
-    assert_eq!(done.stderr, "cangauge: the nodes listen to different SYNC identifiers (1005h)\n");
+    assert_eq!(done.stderr, "cangauge: the nodes have different COB-IDs of SYNC (1005h)\n");
     assert_eq!(done.frames_of("000"), [""; 0], "nothing was started");
 }
 
 #[test]
-fn ten_rows_a_second_of_a_dps() {
+fn dps_sends_ten_rows_per_second() {
     let bench = one("dps", "");
     let done = bench.run("log 5 --duration 10s").exit(0);
     let rows = rows(&done.stdout);
@@ -207,7 +207,7 @@ fn ten_rows_a_second_of_a_dps() {
 }
 
 #[test]
-fn each_kind_alone() {
+fn each_device_alone() {
     for (kind, line) in [
         ("mh4", "log 5 --sync 20ms --count 50"),
         ("d20", "log 5 --sync 20ms --count 50"),
@@ -223,7 +223,7 @@ fn each_kind_alone() {
 }
 
 #[test]
-fn a_device_that_was_set_up_otherwise() {
+fn changed_setup_is_decoded() {
     // An event timer, another unit (mbar), another digit count: all is read from the device.
     let bench = one("mh4", "start = true\nset = { \"0x1800:2\" = 254, \"0x1800:5\" = 50 }\n");
     let rows = rows(&bench.run("log 5 --duration 1s").exit(0).stdout);
@@ -232,7 +232,7 @@ fn a_device_that_was_set_up_otherwise() {
 }
 
 #[test]
-fn a_count_ends_in_the_middle_of_a_frame() {
+fn count_ends_in_the_middle_of_a_frame() {
     let bench = one("mc1609", "");
     let rows = rows(&bench.run("log 5 --count 6").exit(0).stdout);
     assert_eq!(
@@ -244,7 +244,7 @@ fn a_count_ends_in_the_middle_of_a_frame() {
 }
 
 #[test]
-fn only_what_was_asked_for() {
+fn only_requested_signals_are_recorded() {
     let bench = one("mc1609", "");
     let rows_of = |line: &str| rows(&bench.run(line).exit(0).stdout);
     let ch5 = rows_of("log 5 ch5 --count 10");
@@ -266,7 +266,7 @@ fn only_what_was_asked_for() {
 }
 
 #[test]
-fn of_several_nodes_each_gives_what_it_has() {
+fn nodes_without_a_requested_signal_are_excused() {
     let bench = everybody(0);
     for line in ["log 1-3,127 pressure --sync 10ms --count 50", "log 1-3,127 pressure --poll 100ms --count 30"] {
         let done = bench.run(line).exit(0);
@@ -303,14 +303,14 @@ fn polled_values() {
 }
 
 #[test]
-fn a_poll_that_is_too_fast_is_skipped_and_counted() {
+fn too_fast_polls_are_skipped_and_counted() {
     let done = Bench::of("mc1609@3").run("log 3 --poll 1ms --duration 500ms").exit(0);
     let rows = rows(&done.stdout);
     assert!(rows.len() > 300 && done.stderr.contains("polls skipped"), "{} rows, {}", rows.len(), done.stderr);
 }
 
 #[test]
-fn passive_sends_nothing_and_needs_to_know_the_device() {
+fn passive_sends_nothing_and_needs_a_mapping() {
     let bench = one("dps", "start = true\n");
     let done = bench.run("log 5 --passive --device dps --duration 2s").exit(0);
     assert_true(&rows(&done.stdout), &truth(&bench));
@@ -318,7 +318,7 @@ fn passive_sends_nothing_and_needs_to_know_the_device() {
     let done = bench.run("log 5 --passive --duration 2s").exit(2);
     assert_eq!(
         done.stderr,
-        "cangauge: node 5: its TPDOs come, and nothing told their mapping: no guess is made\n\
+        "cangauge: node 5: it sends TPDOs, and their mapping is unknown\n\
          hint: name the device: --device 5=mh4 (or a file), or record from the start of a log that reads it\n"
     );
     assert_eq!(done.stdout, "");
@@ -327,7 +327,7 @@ fn passive_sends_nothing_and_needs_to_know_the_device() {
 }
 
 #[test]
-fn what_was_sent_while_the_devices_were_read_is_not_in_the_log() {
+fn frames_before_the_recording_make_no_rows() {
     // A node that runs already sends before, during and after the reading: the log begins with the recording.
     let bench = one("dps", "start = true\nset = { \"0x1017\" = 100 }\n");
     let done = bench.run("log 5 --duration 3s").exit(0);
@@ -337,7 +337,7 @@ fn what_was_sent_while_the_devices_were_read_is_not_in_the_log() {
 }
 
 #[test]
-fn the_trace_and_the_log_tell_the_same_times() {
+fn trace_and_rows_have_the_same_times() {
     let bench = one("mh4", "");
     let done = bench.run("log 5 --sync 10ms --count 20").exit(0);
     let on_the_wire: Vec<u64> = done

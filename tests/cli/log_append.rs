@@ -6,7 +6,7 @@ use std::fs;
 const HEADER: &str = "time,elapsed_s,node,signal,value,unit,status,raw";
 
 #[test]
-fn a_second_run_goes_on_behind_the_first() {
+fn second_run_continues_the_file() {
     let bench = Bench::of("dps@127");
     bench.run("log 127 --count 3 -o run.csv --append").exit(0);
     let first = bench.text("run.csv");
@@ -26,7 +26,7 @@ fn a_second_run_goes_on_behind_the_first() {
 }
 
 #[test]
-fn a_line_that_was_cut_off_goes() {
+fn cut_off_line_is_removed() {
     let bench = Bench::of("dps@127");
     bench.run("log 127 --count 3 -o run.csv").exit(0);
     let whole = bench.text("run.csv");
@@ -75,7 +75,7 @@ fn other_columns_are_refused() {
 }
 
 #[test]
-fn json_lines_and_files_with_a_mark_are_continued() {
+fn json_lines_and_files_with_byte_order_mark_are_continued() {
     let bench = Bench::of("dps@127");
     for _ in 0..2 {
         bench.run("log 127 --count 2 --format json -o run.json --append").exit(0);

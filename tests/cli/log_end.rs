@@ -1,4 +1,4 @@
-//! How a recording begins and ends: states put back, nodes that are silent, Ctrl-C.
+//! How a recording starts and ends: NMT states restored, silent nodes, Ctrl-C.
 
 use super::Bench;
 use serde_json::json;
@@ -22,7 +22,7 @@ fn mh4_is_silent_without_sync() {
 }
 
 #[test]
-fn a_state_that_was_known_is_put_back() {
+fn known_state_is_restored() {
     let with = |more: &str| {
         Bench::described(&format!("[[device]]\nkind = \"mh4\"\nnode = 5\n{more}set = {{ \"0x1017\" = 100 }}\n"))
     };
@@ -30,16 +30,16 @@ fn a_state_that_was_known_is_put_back() {
     assert_eq!(done.frames_of("000"), ["0105", "8005"]);
     assert!(!done.stderr.contains("stays operational"), "{}", done.stderr);
     let last = done.frames.iter().rposition(|frame| frame == "080#").expect("a SYNC");
-    assert!(done.frames[last..].contains(&"000#8005".to_owned()), "put back at the end");
+    assert!(done.frames[last..].contains(&"000#8005".to_owned()), "restored at the end");
     let done = with("start = true\n").run("log 5 --sync 10ms --count 10").exit(0);
     assert_eq!(done.frames_of("000"), [""; 0], "it was operational already");
-    // On a failure, too: what comes to nothing leaves nothing behind.
+    // Also after a failure.
     let done = with("").run("log 5").exit(3);
     assert_eq!(done.frames_of("000"), ["0105", "8005"]);
 }
 
 #[test]
-fn a_state_that_nothing_told_is_not_guessed() {
+fn unknown_state_is_not_guessed() {
     let done = Bench::of("mh4@5,mh4@6").run("log 5 --sync 10ms --count 10").exit(0);
     assert_eq!(done.frames_of("000"), ["0105"], "named nodes only");
     let said = "node 5 was started; its previous state is unknown, so it stays operational\n";
@@ -47,7 +47,7 @@ fn a_state_that_nothing_told_is_not_guessed() {
 }
 
 #[test]
-fn no_nmt_leaves_nmt_alone() {
+fn no_nmt_sends_no_nmt_command() {
     let bench = Bench::described("[[device]]\nkind = \"dps\"\nnode = 5\nstart = true\n");
     let done = bench.run("log 5 --count 3 --no-nmt").exit(0);
     assert_eq!(done.frames_of("000"), [""; 0]);
@@ -67,7 +67,7 @@ fn named_nodes_must_answer() {
 }
 
 #[test]
-fn a_node_that_gives_nothing_among_others() {
+fn silent_node_among_others_is_partial_success() {
     let done = Bench::of("mh4@1,dps@127").run("log 1,127 --duration 2s").exit(7);
     assert!(done.stdout.lines().skip(1).all(|line| line.contains(",127,pressure,")), "{}", done.stdout);
     assert!(
@@ -75,26 +75,24 @@ fn a_node_that_gives_nothing_among_others() {
         "{}",
         done.stderr
     );
-    assert!(done.stderr.ends_with("cangauge: node 1 lost: silent at the end\n"), "{}", done.stderr);
+    assert!(done.stderr.ends_with("cangauge: node 1 lost: no measurements at the end\n"), "{}", done.stderr);
 }
 
 #[test]
-fn signals_that_nobody_has() {
+fn unknown_signals_are_refused() {
     let bench = Bench::of("mh4@1,dps@127");
     bench
         .run("log 1,127 presure --sync 10ms")
         .fails(2, "cangauge: no node has a signal \"presure\"\nhint: there are: pressure, temperature\n");
-    bench
-        .run("log 127 pressure.status")
-        .fails(2, "cangauge: no node has an object that tells the status of pressure\n");
+    bench.run("log 127 pressure.status").fails(2, "cangauge: no node has a status object for pressure\n");
     bench
         .run("log 127 0x6132:1")
-        .fails(6, "cangauge: no TPDO carries 0x6132:1\nhint: read it by SDO instead: add --poll 100ms\n");
+        .fails(6, "cangauge: no TPDO contains 0x6132:1\nhint: read it by SDO instead: add --poll 100ms\n");
     bench.run("log 127 0x6132:1 --poll 100ms --count 3").exit(0);
 }
 
 #[test]
-fn the_summary() {
+fn summary_has_the_statistics_of_the_rows() {
     let bench = Bench::of("dps@127");
     let done = bench.run("log 127 --count 20 --summary sum.json").exit(0);
     let lines: Vec<&str> = done.stderr.lines().collect();
@@ -105,7 +103,6 @@ fn the_summary() {
         (&summary["rows"], &summary["timestamps"], &summary["dropped"], &summary["gaps"], &summary["lost_nodes"]),
         (&json!(20), &json!("simulated"), &json!(0), &json!(0), &json!([]))
     );
-    // The statistics are those of the rows.
     let values: Vec<f64> = done
         .stdout
         .lines()
@@ -138,7 +135,7 @@ fn the_summary() {
 #[test]
 fn gaps_jitter_and_syncs_in_the_summary() {
     let bench = Bench::of("dps@127,mh4@5");
-    // Every 100 ms, and so 19 intervals that are longer than the 99 ms allowed.
+    // 19 intervals of 100 ms are longer than the allowed 99 ms.
     let done = bench.run("log 127 --count 20 --max-gap 99ms --summary sum.json").exit(0);
     assert!(done.stderr.contains(", 19 gaps\n"), "{}", done.stderr);
     assert!(done.stderr.contains("  every 100 ms, jitter p99 "), "{}", done.stderr);
@@ -149,26 +146,26 @@ fn gaps_jitter_and_syncs_in_the_summary() {
     assert!((seconds("interval_s", "p50") - 0.1).abs() < 0.000_03 && seconds("jitter_s", "max") < 0.000_5, "{signal}");
     let done = bench.run("log 127 --count 20 --max-gap 101ms").exit(0);
     assert!(done.stderr.contains(", 0 gaps\n"), "{}", done.stderr);
-    // Four PDOs, ten times each: a gap is one of a PDO, whatever it carries.
+    // Four TPDOs, ten times each: gaps are counted per TPDO, not per value.
     let done = Bench::of("mc1609@3").run("log 3 --count 160 --max-gap 99ms").exit(0);
     assert!(done.stderr.contains(", 36 gaps\n"), "{}", done.stderr);
     let done = bench.run("log 5 --sync 10ms --count 50 --summary - -o run.csv").exit(0);
     let summary = &done.json()[0];
     assert_eq!((&summary["syncs"], &summary["syncs_left_out"]), (&json!(50), &json!(0)));
     assert!(summary["sync_delay_s"]["max"].as_f64().is_some_and(|delay| delay < 0.001), "{summary}");
-    assert!(done.stderr.contains("50 SYNC sent, after their time by min "), "{}", done.stderr);
+    assert!(done.stderr.contains("50 SYNC sent, delay min "), "{}", done.stderr);
     bench.run("log 127 --max-gap 3").exit(2);
 }
 
 #[test]
-fn an_overload_is_told_as_it_comes() {
+fn overload_is_reported_at_once() {
     let bench = Bench::described(
         "[[device]]\nkind = \"mh4\"\nnode = 5\n\
          [[device.overload]]\nchannel = 1\nfrom = \"700ms\"\nuntil = \"800ms\"\ndirection = \"high\"\n",
     );
     let done = bench.run("log 5 --sync 10ms --duration 1s").exit(0);
-    let told = "warning: node 5: emergency F001h, user input overload";
-    assert!(done.stderr.lines().any(|line| line.starts_with(told)), "{}", done.stderr);
+    let text = "warning: node 5: emergency F001h, user input overload";
+    assert!(done.stderr.lines().any(|line| line.starts_with(text)), "{}", done.stderr);
     // (1 SYNC of at most 50 bits and 1 TPDO of at most 135) in 10 ms, of 250 kbit/s.
     assert!(done.stderr.starts_with("SYNC every 10 ms with its TPDOs takes 7.4 % of the bus\n"), "{}", done.stderr);
     assert!(done.stderr.contains("node 5: emergency over (0000h)"), "{}", done.stderr);
@@ -181,11 +178,11 @@ fn signal(child: &std::process::Child, name: &str) {
     assert!(status.success());
 }
 
-/// On the real clock: a person stops it.
+/// On the real clock.
 #[test]
 #[cfg(unix)]
-fn ctrl_c_finishes_the_file() {
-    for name in ["INT", "TERM"] {
+fn signals_end_a_recording_with_success() {
+    for name in ["INT", "TERM", "HUP"] {
         let bench = Bench::real("dps@127");
         let mut command = bench.traced(&["log", "127"]);
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
@@ -209,7 +206,7 @@ fn ctrl_c_finishes_the_file() {
 
 #[test]
 #[cfg(unix)]
-fn ctrl_c_before_there_was_a_row() {
+fn ctrl_c_before_the_first_row_is_interrupted() {
     let bench = Bench::real("mh4@1");
     let words = ["-b", &bench.bus, "--trace", "-", "log", "1", "-o", "run.csv"];
     let mut child = bench.command(&words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
@@ -225,4 +222,87 @@ fn ctrl_c_before_there_was_a_row() {
     assert_eq!(child.wait().expect("its end").code(), Some(130), "{rest}");
     assert_eq!(rest, "cangauge: interrupted\n");
     assert_eq!(bench.files(), [""; 0], "no file is left");
+}
+
+/// On the real clock. The reader takes the header, at least.
+#[cfg(unix)]
+fn end_early(words: &[&str], end: impl FnOnce(&mut std::process::Child)) -> (Option<i32>, String, serde_json::Value) {
+    let bench = Bench::real("dps@127");
+    let words: Vec<&str> = [&["log", "127", "--summary", "sum.json"], words].concat();
+    let mut command = bench.traced(&words);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
+    end(&mut child);
+    let output = child.wait_with_output().expect("its end");
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    let text = std::fs::read_to_string(bench.path("sum.json")).unwrap_or_default();
+    let summary = serde_json::from_str(&text).unwrap_or_default();
+    (output.status.code(), stderr, summary)
+}
+
+#[cfg(unix)]
+fn read_lines(child: &mut std::process::Child, count: usize) -> BufReader<std::process::ChildStdout> {
+    let mut reader = BufReader::with_capacity(16, child.stdout.take().expect("stdout"));
+    let mut text = String::new();
+    for _ in 0..count {
+        reader.read_line(&mut text).expect("a line");
+    }
+    reader
+}
+
+#[test]
+#[cfg(unix)]
+fn interrupted_before_its_planned_end_is_not_complete() {
+    for limit in [["--duration", "1h"], ["--count", "100000"]] {
+        let (code, stderr, summary) = end_early(&limit, |child| {
+            let mut reader = read_lines(child, 2);
+            signal(child, "INT");
+            std::io::Read::read_to_string(&mut reader, &mut String::new()).expect("the rest");
+        });
+        assert_eq!((code, &summary["complete"]), (Some(130), &json!(false)), "{stderr}");
+        let written = summary["rows"].as_u64().expect("rows");
+        let word = if written == 1 { "row" } else { "rows" };
+        let message = format!("cangauge: interrupted before the end: {written} {word} written\n");
+        assert!(stderr.ends_with(&message), "{stderr}");
+    }
+    let (code, stderr, summary) = end_early(&[], |child| {
+        let mut reader = read_lines(child, 2);
+        signal(child, "INT");
+        std::io::Read::read_to_string(&mut reader, &mut String::new()).expect("the rest");
+    });
+    assert_eq!((code, &summary["complete"]), (Some(0), &json!(true)), "{stderr}");
+}
+
+#[test]
+#[cfg(unix)]
+fn closed_output_before_the_planned_end_is_not_complete() {
+    for limit in [["--duration", "1h"], ["--count", "100000"]] {
+        let (code, stderr, summary) = end_early(&limit, |child| drop(read_lines(child, 2)));
+        assert_eq!((code, &summary["complete"]), (Some(8), &json!(false)), "{stderr}");
+        assert!(stderr.contains("cangauge: the output was closed before the end: "), "{stderr}");
+    }
+    // Without a planned end, the reader decides when it has enough.
+    let (code, stderr, _) = end_early(&[], |child| drop(read_lines(child, 2)));
+    assert_eq!((code, stderr.contains("cangauge:")), (Some(0), false), "{stderr}");
+}
+
+#[test]
+#[cfg(unix)]
+fn hangup_is_ignored_under_nohup() {
+    let bench = Bench::real("dps@127");
+    let command = bench.traced(&["log", "127", "--duration", "2s", "-o", "run.csv"]);
+    let program = command.get_program().to_owned();
+    let arguments: Vec<_> = command.get_args().map(ToOwned::to_owned).collect();
+    let mut nohup = Command::new("sh");
+    nohup.args(["-c", "trap '' HUP; exec \"$0\" \"$@\""]).arg(program).args(arguments);
+    if let Some(folder) = command.get_current_dir() {
+        nohup.current_dir(folder);
+    }
+    let mut child = nohup.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("a shell");
+    while !bench.path("trace").metadata().is_ok_and(|trace| trace.len() > 0) {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended");
+        std::thread::yield_now();
+    }
+    signal(&child, "HUP");
+    let output = child.wait_with_output().expect("its end");
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -12,7 +12,7 @@ fn overload() -> Bench {
 }
 
 #[test]
-fn emergencies_with_the_time_of_the_rows() {
+fn emergencies_have_the_time_of_the_rows() {
     let bench = overload();
     let done = bench.run("log 5 --sync 10ms --duration 1s -o run.csv --events events.csv").exit(0);
     let text = bench.text("events.csv");
@@ -39,7 +39,7 @@ fn emergencies_with_the_time_of_the_rows() {
 }
 
 #[test]
-fn the_file_of_a_quiet_recording_has_a_header() {
+fn file_without_events_has_a_header() {
     let bench = Bench::of("dps@127");
     bench.run("log 127 --count 3 --events events.csv").exit(0);
     assert_eq!(bench.text("events.csv"), format!("{HEADER}\n"));
@@ -50,7 +50,7 @@ fn the_file_of_a_quiet_recording_has_a_header() {
 }
 
 #[test]
-fn its_form_is_that_of_the_rows_and_it_is_continued_with_them() {
+fn events_use_the_separators_of_the_rows_and_are_continued() {
     let bench = overload();
     let words =
         "log 5 --sync 10ms --duration 1s -o run.csv --events events.csv --append --delimiter ; --decimal , --time unix";

@@ -5,7 +5,7 @@ use std::fs;
 use std::process::Stdio;
 
 #[test]
-fn a_file_that_exists_is_not_touched() {
+fn existing_file_is_refused() {
     let bench = Bench::of("mh4@1");
     fs::write(bench.path("run.csv"), "old\n").expect("written");
     let done = bench.run("log 1 --sync 10ms --count 5 -o run.csv");
@@ -24,7 +24,7 @@ fn a_file_that_exists_is_not_touched() {
 }
 
 #[test]
-fn the_file_has_what_stdout_would_have() {
+fn file_has_the_same_bytes_as_stdout() {
     let bench = Bench::of("mh4@1,dps@127");
     let printed = bench.run("log 1,127 --sync 10ms --count 100").exit(0).stdout;
     bench.run("log 1,127 --sync 10ms --count 100 -o run.csv").prints("");
@@ -57,7 +57,7 @@ fn links_and_pipes() {
 }
 
 #[test]
-fn places_where_nothing_can_be_written() {
+fn unwritable_places_fail_before_the_bus_is_used() {
     let bench = Bench::of("mh4@1");
     let done = bench.run("log 1 --sync 10ms -o no/such/folder.csv").exit(8);
     assert_eq!(done.stderr, "cangauge: create no/such/folder.csv: No such file or directory (os error 2)\n");
@@ -75,7 +75,7 @@ fn a_full_disk() {
         8,
         "SYNC every 10 ms with its TPDOs takes 7.4 % of the bus\nwarning: 5 rows could not be written\ncangauge: write /dev/full: No space left on device (os error 28)\n",
     );
-    // It is noticed while it runs, and the node is put back.
+    // The failure ends the recording, and the node's state is restored.
     let heartbeat = Bench::described("[[device]]\nkind = \"mh4\"\nnode = 1\nset = { \"0x1017\" = 100 }\n");
     let done = heartbeat.run("log 1 --sync 10ms --duration 1h -o /dev/full").exit(8);
     assert_eq!(done.frames_of("000"), ["0101", "8001"]);
@@ -83,12 +83,12 @@ fn a_full_disk() {
 }
 
 #[test]
-fn what_was_received_is_handed_over_within_a_second() {
+fn rows_are_handed_over_within_a_second() {
     // A reader that goes after the first line ends a recording of an hour at the next rows, on the real clock.
     use std::io::{BufRead, BufReader};
     let begun = std::time::Instant::now();
     let bench = Bench::real("dps@127");
-    let mut command = bench.traced(&["log", "127", "--duration", "1h"]);
+    let mut command = bench.traced(&["log", "127"]);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
     let mut line = String::new();
     BufReader::new(child.stdout.take().expect("stdout")).read_line(&mut line).expect("a line");

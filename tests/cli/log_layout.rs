@@ -73,7 +73,7 @@ fn wide_rows_of_polling_and_as_json() {
 }
 
 #[test]
-fn a_late_answer_stands_in_the_row_of_its_poll() {
+fn late_answer_is_in_the_row_of_its_poll() {
     // The second device takes as long as a cycle and a half.
     let bench = Bench::described(
         "[[device]]\nkind = \"dps\"\nnode = 1\n[[device]]\nkind = \"dps\"\nnode = 2\nlatency = \"150ms\"\n",
@@ -85,7 +85,7 @@ fn a_late_answer_stands_in_the_row_of_its_poll() {
 }
 
 #[test]
-fn a_node_that_is_silent_leaves_its_cells_empty() {
+fn silent_node_has_empty_cells() {
     let done = Bench::of("mh4@1,dps@127").run("log 1,127 --sync 1s --count 3 --layout wide --no-nmt");
     assert_eq!(done.code, Some(3), "nobody was started: {}", done.stderr);
     let bench =
@@ -100,9 +100,9 @@ fn a_node_that_is_silent_leaves_its_cells_empty() {
 }
 
 #[test]
-fn several_values_a_cycle_are_said_to_have_no_place() {
+fn second_value_in_a_cycle_is_left_out_and_reported() {
     let done = Bench::of("mh4@1,dps@127").run("log 1,127 --sync 1s --count 3 --layout wide --summary -").exit(0);
-    let said = "values have no place in the wide layout: late, or not the first in their cycle; --layout long has all";
+    let said = "values are in no row: late, or not the first in their cycle (--layout long contains all values)";
     assert!(done.stderr.contains(said), "{}", done.stderr);
     let summary: serde_json::Value = serde_json::from_str(done.stdout.lines().last().expect("a line")).expect("JSON");
     assert_eq!(summary["rows"], 3);
@@ -110,7 +110,7 @@ fn several_values_a_cycle_are_said_to_have_no_place() {
 }
 
 #[test]
-fn a_unit_that_changes_starts_new_columns() {
+fn changed_unit_starts_new_columns() {
     // What log itself sends cannot change a unit; the shape of the change is held by the tests of the rows.
     let done = Bench::of("mh4@1").run("log 1 pressure pressure.status --sync 10ms --count 2 --layout wide").exit(0);
     let head = "time,elapsed_s,1.pressure [bar],1.pressure.status,1.pressure.status [code],1.pressure.status.status";
@@ -118,7 +118,7 @@ fn a_unit_that_changes_starts_new_columns() {
 }
 
 #[test]
-fn for_spreadsheets_of_other_countries() {
+fn separators_and_times_for_spreadsheets() {
     let plain = Bench::of("dps@127").run("log 127 --count 5").exit(0);
     let words = ["log", "127", "--count", "5", "--delimiter", ";", "--decimal", ",", "--bom", "--time", "excel"];
     let bench = Bench::of("dps@127");
@@ -145,16 +145,16 @@ fn for_spreadsheets_of_other_countries() {
 }
 
 #[test]
-fn what_does_not_go_together_is_refused() {
+fn contradicting_options_are_refused() {
     let bench = Bench::of("mh4@1");
-    let wide = "--layout wide needs --sync or --poll: a row is one of their cycles";
+    let wide = "--layout wide needs --sync or --poll: each row is one of their cycles";
     bench.run("log 1 --layout wide").refuses(wide);
     bench.run("log 1 --layout wide --passive --device mh4").refuses(wide);
-    bench.run("log 1 --sync 10ms --decimal ,").refuses("the decimal sign cannot be the delimiter, too");
+    bench.run("log 1 --sync 10ms --decimal ,").refuses("the decimal sign and the delimiter must differ");
     let error = bench.run("log 1 --sync 10ms --bom --format json").exit(2).error();
     assert_eq!(error["error"]["message"], "--delimiter, --decimal and --bom are for CSV");
-    bench.run("log 1 --sync 10ms --delimiter :").refuses("\":\" is no delimiter (, ; | or tab)");
-    bench.run("log 1 --sync 10ms -o a.csv --events a.csv").refuses("a.csv is named twice");
+    bench.run("log 1 --sync 10ms --delimiter :").refuses("\":\" is not a delimiter (, ; | or tab)");
+    bench.run("log 1 --sync 10ms -o a.csv --events a.csv").refuses("a.csv is used for two outputs");
     assert_eq!(bench.files(), [""; 0]);
     let hint = |done: Done| done.stderr.lines().nth(1).map(str::to_owned);
     assert_eq!(hint(bench.run("log 1 --decimal ,")).as_deref(), Some("hint: add --delimiter ';'"));

@@ -16,7 +16,7 @@ fn names(numbers: std::ops::RangeInclusive<u32>) -> Vec<String> {
 }
 
 #[test]
-fn by_time_no_row_is_lost_or_doubled() {
+fn rotation_by_time_neither_loses_nor_repeats_rows() {
     let whole = Bench::of("mh4@1").run("log 1 --sync 10ms --duration 5s").exit(0).stdout;
     let bench = Bench::of("mh4@1");
     bench.run("log 1 --sync 10ms --duration 5s -o run.csv --rotate 2s").prints("");
@@ -33,7 +33,7 @@ fn by_time_no_row_is_lost_or_doubled() {
 }
 
 #[test]
-fn by_size_no_row_is_lost_or_doubled() {
+fn rotation_by_size_neither_loses_nor_repeats_rows() {
     for line in ["--sync 10ms", "--sync 10ms --format json", "--sync 10ms --layout wide"] {
         let whole = Bench::of("mh4@1").run(&format!("log 1 {line} --duration 2s")).exit(0).stdout;
         let bench = Bench::of("mh4@1");
@@ -50,7 +50,7 @@ fn by_size_no_row_is_lost_or_doubled() {
 }
 
 #[test]
-fn existing_files_stay_unless_forced() {
+fn existing_files_are_kept_without_force() {
     let bench = Bench::of("dps@127");
     fs::write(bench.path("run-0002.csv"), "old\n").expect("written");
     let log = "log 127 --duration 3s -o run.csv --rotate 1s";
@@ -70,7 +70,7 @@ fn existing_files_stay_unless_forced() {
 }
 
 #[test]
-fn append_goes_on_with_the_next_number() {
+fn append_continues_with_the_next_number() {
     let bench = Bench::of("dps@127");
     let log = "log 127 --duration 2s -o run.csv --rotate 1s --append";
     bench.run(log).exit(0);

@@ -74,7 +74,7 @@ fn each_channel_is_learned_with_its_own_digits_and_none_is_guessed() {
         replay(&bench, "t.log", "log 5")
     };
     let said = log(&objects).exit(2).stderr;
-    assert!(said.contains("its TPDOs come, and nothing told their mapping"), "{said}");
+    assert!(said.contains("it sends TPDOs, and their mapping is unknown"), "{said}");
     objects.push((0x6132, 2, Some(1)));
     let done = log(&objects).exit(0);
     let rows: Vec<&str> = done.stdout.lines().skip(1).map(|row| row.splitn(4, ',').last().unwrap_or(row)).collect();
@@ -95,8 +95,10 @@ fn nothing_can_be_sent_into_it() {
         "cangauge: the recording t.log is receive only\n\
          hint: commands that only listen work on it: log, scan --passive, nmt watch\n"
     );
-    replay(&bench, "t.log", "log 1 --sync 10ms").refuses("a recording (replay:) receives only: --sync and --poll send");
-    replay(&bench, "t.log", "log 1 --poll 10ms").refuses("a recording (replay:) receives only: --sync and --poll send");
+    replay(&bench, "t.log", "log 1 --sync 10ms")
+        .refuses("a recording (replay:) is receive-only: --sync and --poll send");
+    replay(&bench, "t.log", "log 1 --poll 10ms")
+        .refuses("a recording (replay:) is receive-only: --sync and --poll send");
 }
 
 #[test]

@@ -85,7 +85,7 @@ impl Station for Babbler {
 }
 
 #[test]
-fn garbage_changes_no_row_and_ends_nothing() {
+fn garbage_changes_no_row_and_ends_no_recording() {
     for mode in [Mode::Sync(Duration::from_millis(10)), Mode::AsSent] {
         let folder = tempfile::tempdir().expect("a folder");
         let mut bus = Bench::from_toml(BENCH, folder.path()).expect("a bench").open().expect("a bus");

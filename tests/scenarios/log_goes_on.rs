@@ -1,5 +1,5 @@
-//! A recording goes on by itself, whatever happens to nodes, mapping and interface; and no row is made by a
-//! mapping, a unit or digits that are not those of the device when it sent it.
+//! A recording continues by itself after changes of nodes, mapping and interface. No row is decoded with a mapping, unit or
+//! digits that the device did not have when it sent the frame.
 
 use super::Kept;
 use cangauge::bus::memory::{MemoryBus, Outbox, Station};
@@ -28,7 +28,7 @@ fn node(id: u8) -> NodeId {
     NodeId::new(id).expect("a node-ID")
 }
 
-/// Somebody else on the bus, who sends what he was told and listens to nobody.
+/// Another station on the bus: it sends given frames and ignores all others.
 pub(super) struct Other {
     frames: VecDeque<(Mono, Frame)>,
 }
@@ -60,18 +60,18 @@ impl Station for Other {
     fn sent(&mut self, _: Mono, _: &Frame) {}
 }
 
-/// What a recording gave, beside what the simulator says that it sent.
+/// A recording, and what the simulator reports to have sent.
 struct Run {
     kept: Kept,
     outcome: RecordingReport,
-    /// The simulator's own lines from the first row to the last.
+    /// The lines of the simulator from the first row to the last.
     sent: Vec<String>,
-    /// The NMT commands on the bus, ours among them.
+    /// All NMT commands on the bus.
     commands: Vec<String>,
 }
 
 impl Run {
-    /// Every row says what the simulator says of the same moment; how many of its lines are missing.
+    /// Compares the rows with the lines of the simulator. Returns how many of its lines have no row.
     #[track_caller]
     fn missing(&self) -> usize {
         let mut sent = self.sent.iter();
@@ -94,7 +94,7 @@ impl Run {
         changes.collect()
     }
 
-    /// The units of the rows, each run of the same once.
+    /// The units of the rows, without repetitions.
     fn units(&self) -> Vec<&str> {
         let mut units: Vec<&str> = self.kept.rows.iter().filter_map(|row| row.split(',').nth(4)).collect();
         units.dedup();
@@ -176,7 +176,7 @@ const BAR: [u8; 4] = [0x00, 0x00, 0x4e, 0x00];
 fn nothing(_: &mut Master<'_>) {}
 
 #[test]
-fn a_node_that_restarts_is_started_again_and_nothing_else_changes() {
+fn restarted_node_is_started_again() {
     let run = record(DPS, Mode::AsSent, &[(2000, "000#8105")], &nothing);
     assert_eq!(run.missing(), 0);
     assert!(run.has(&Note::Restarted(node(5))));
@@ -188,7 +188,7 @@ fn a_node_that_restarts_is_started_again_and_nothing_else_changes() {
 }
 
 #[test]
-fn what_was_not_stored_is_gone_after_a_restart_and_no_row_is_read_by_it() {
+fn unit_that_was_not_stored_is_not_used_after_a_restart() {
     // In bar; by its factory settings it comes back in psi.
     let before = |master: &mut Master<'_>| write(master, UNIT, &BAR);
     for mode in [Mode::AsSent, Mode::Poll(Duration::from_millis(20))] {
@@ -214,7 +214,7 @@ fn what_was_not_stored_is_gone_after_a_restart_and_no_row_is_read_by_it() {
 }
 
 #[test]
-fn a_node_that_starts_by_itself_is_not_recorded_until_it_was_read() {
+fn node_that_starts_by_itself_is_read_before_it_is_recorded() {
     let devices = format!("{MH4}start = true\n");
     let run = record(&devices, SYNC, &[(2000, "000#8105"), (2030, "000#0105")], &nothing);
     assert!(run.missing() > 0 && run.outcome.events.not_recorded > 0, "{:?}", run.outcome.events);
@@ -222,7 +222,7 @@ fn a_node_that_starts_by_itself_is_not_recorded_until_it_was_read() {
 }
 
 #[test]
-fn a_mapping_that_somebody_else_changes() {
+fn mapping_changed_by_another_master() {
     // Switched off, emptied, status first, two entries, switched on: as CiA 301 has it.
     let writes = [
         (2000, "605#23001801850100C0"),
@@ -247,7 +247,7 @@ fn a_mapping_that_somebody_else_changes() {
 }
 
 #[test]
-fn a_unit_that_somebody_else_changes() {
+fn unit_changed_by_another_master() {
     let run = record(DPS, Mode::AsSent, &[(2000, "605#2331610100004E00")], &nothing);
     assert_eq!(run.units(), ["psi", "bar"]);
     assert_eq!(run.missing() as u64, run.outcome.events.not_recorded);
@@ -255,7 +255,7 @@ fn a_unit_that_somebody_else_changes() {
 }
 
 #[test]
-fn a_mapping_that_was_changed_behind_the_back_shows_in_its_length() {
+fn wrong_length_makes_the_node_read_again() {
     // A frame of the node that is shorter than its mapping: it is read again, once, and nothing has changed.
     let others = [(2000, "185#01"), (2200, "185#01"), (2400, "185#01")];
     let run = record(MH4, SYNC, &others, &nothing);
@@ -265,7 +265,7 @@ fn a_mapping_that_was_changed_behind_the_back_shows_in_its_length() {
 }
 
 #[test]
-fn who_only_listens_reads_by_no_old_mapping_either() {
+fn passive_recording_uses_no_old_mapping() {
     let folder = tempfile::tempdir().expect("a folder");
     let text = format!("clock = \"virtual\"\nrecord = \"truth.csv\"\n{DPS}");
     let mut bus = Bench::from_toml(&text, folder.path()).expect("a bench").open().expect("a bus");
@@ -286,7 +286,7 @@ fn who_only_listens_reads_by_no_old_mapping_either() {
 }
 
 #[test]
-fn a_heartbeat_that_stops_is_told_and_so_is_a_state() {
+fn lost_heartbeat_and_changed_state_are_reported() {
     let devices = format!("{MH4}set = {{ \"0x1017\" = 100 }}\n");
     let run = record(&devices, SYNC, &[(2000, "000#8005"), (2600, "000#0105")], &nothing);
     assert!(run.has(&Note::State(node(5), NmtState::PreOperational)), "{:?}", run.kept.notes);
@@ -303,7 +303,7 @@ fn a_heartbeat_that_stops_is_told_and_so_is_a_state() {
     assert!(kept.notes.contains(&Note::ReadAgain(node(5), Vec::new())), "a boot-up may have been missed");
 }
 
-/// A bus whose interface does what it is told at its time.
+/// A bus whose interface reports given events at given times.
 struct Shaky {
     inner: MemoryBus,
     /// Events at their times; while the link is down nothing goes through.
@@ -374,7 +374,7 @@ fn shaken(events: &[(u64, Event)]) -> (Kept, RecordingReport) {
 }
 
 #[test]
-fn an_interface_that_goes_down_and_comes_back() {
+fn interface_goes_down_and_comes_back() {
     let (kept, outcome) = shaken(&[(2000, Event::Link(false)), (3000, Event::Link(true))]);
     assert_eq!((outcome.events.link_losses, outcome.events.changes, outcome.gaps), (1, 1, 1));
     assert!(outcome.lost.is_empty() && outcome.events.silences == 0, "nobody is blamed for the interface");
@@ -386,7 +386,7 @@ fn an_interface_that_goes_down_and_comes_back() {
 }
 
 #[test]
-fn what_the_kernel_drops_is_counted() {
+fn dropped_frames_are_counted() {
     let (kept, outcome) = shaken(&[(1500, Event::Dropped(5)), (2500, Event::Dropped(30))]);
     assert_eq!(outcome.dropped, 5 + 30 + 7);
     let told: Vec<_> = kept.notes.iter().filter(|note| matches!(note, Note::Dropped(_))).collect();
@@ -394,7 +394,7 @@ fn what_the_kernel_drops_is_counted() {
 }
 
 #[test]
-fn a_controller_that_switches_itself_off_and_is_restarted() {
+fn bus_off_controller_is_restarted() {
     let fault = |fault, time| (time, Event::Fault(fault, Stamp { mono: at(time), ..Stamp::default() }));
     let (kept, outcome) = shaken(&[fault(Fault::BusOff, 2000), fault(Fault::Restarted, 2500)]);
     assert_eq!((outcome.events.bus_offs, outcome.events.changes), (1, 1));
@@ -403,7 +403,7 @@ fn a_controller_that_switches_itself_off_and_is_restarted() {
 }
 
 #[test]
-fn sixteen_nodes_are_polled_side_by_side() {
+fn sixteen_nodes_are_polled_in_parallel() {
     let devices: String = (1..=16).map(|id| format!("[[device]]\nkind = \"mh4\"\nnode = {id}\n")).collect();
     let text = format!("clock = \"virtual\"\nbit_rate = 1000000\n{devices}");
     let mut bus = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
@@ -420,7 +420,7 @@ fn sixteen_nodes_are_polled_side_by_side() {
 }
 
 #[test]
-fn syncs_and_how_well_they_kept_their_time() {
+fn sync_delays_are_measured() {
     let run = record(MH4, SYNC, &[], &nothing);
     let syncs = &run.outcome.syncs;
     assert_eq!((syncs.sent, syncs.left_out, syncs.delays.count()), (SECONDS * 100, 0, SECONDS * 100));
@@ -437,7 +437,7 @@ fn syncs_and_how_well_they_kept_their_time() {
 }
 
 #[test]
-fn a_gap_is_what_the_user_says() {
+fn max_gap_decides_what_is_a_gap() {
     for (longest, gaps) in [(99, 1), (200, 0)] {
         let text = format!("clock = \"virtual\"\n{MH4}");
         let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
@@ -451,7 +451,7 @@ fn a_gap_is_what_the_user_says() {
 }
 
 #[test]
-fn a_restart_among_frames_that_were_lost() {
+fn restart_among_lost_frames_is_detected() {
     let dropped = [(2400, Event::Dropped(30)), (2500, Event::Dropped(3)), (3500, Event::Dropped(1))];
     let (kept, outcome) = shaken(&dropped);
     assert_eq!((outcome.dropped, outcome.events.changes, outcome.events.silences), (34 + 7, 1, 0));

@@ -58,19 +58,19 @@ fn record(mode: Mode) -> (MemoryBus, Kept, Result<u64, Failure>) {
 }
 
 #[test]
-fn a_second_sync_is_refused_before_anything_is_started() {
+fn second_sync_producer_is_refused_before_any_node_is_started() {
     let (bus, kept, outcome) = record(Mode::Sync(Duration::from_millis(10)));
     let failure = outcome.expect_err("refused");
     assert_eq!(failure.kind(), Kind::CheckFailed);
-    assert_eq!(ErrorMessage::of(&failure).message, "somebody else sends SYNC on this bus: nothing was started");
-    assert!(ErrorMessage::of(&failure).hint.is_some_and(|hint| hint.starts_with("leave --sync out")));
+    assert_eq!(ErrorMessage::of(&failure).message, "another node sends SYNC on this bus: nothing was started");
+    assert!(ErrorMessage::of(&failure).hint.is_some_and(|hint| hint.starts_with("omit --sync")));
     assert_eq!(kept.rows, [""; 0]);
     let state = bus.stations::<Device>().next().and_then(Device::state);
     assert_eq!(state, Some(State::PreOperational));
 }
 
 #[test]
-fn without_sync_of_ones_own_theirs_is_recorded() {
+fn sync_of_another_producer_is_recorded() {
     let (_, kept, outcome) = record(Mode::AsSent);
     assert_eq!(outcome.unwrap() / 20, 1, "one every 50 ms for a second");
     assert!((19..=21).contains(&kept.rows.len()), "{}", kept.rows.len());

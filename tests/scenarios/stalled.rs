@@ -100,7 +100,7 @@ fn plan(mode: Mode, duration: Duration) -> Plan {
 }
 
 #[test]
-fn syncs_that_were_missed_are_left_out() {
+fn missed_syncs_are_omitted() {
     let text = "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
     let mut bus = stalled(text, 1000..1503, false);
     let period = Duration::from_millis(10);
@@ -122,7 +122,7 @@ fn syncs_that_were_missed_are_left_out() {
 }
 
 #[test]
-fn what_came_before_the_end_is_recorded_whatever_its_time_says() {
+fn frames_before_the_end_are_recorded_whatever_their_time() {
     let text = "clock = \"virtual\"\n[[device]]\nkind = \"dps\"\nnode = 5\n";
     let mut bus = stalled(text, 1000..1503, true);
     let plan = plan(Mode::AsSent, Duration::from_secs(60));

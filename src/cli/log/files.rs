@@ -1,60 +1,62 @@
-//! The files of `cangauge log`, and the form of what stands in them.
+//! The output files of `cangauge log`, and their format.
 
 use super::super::exit::FileError;
 use super::super::file::{Existing, OutFile};
 use crate::output::events::Events;
+use crate::output::failure::ErrorMessage;
 use crate::output::rows::{
     Dialect, ExistingLines, FileFormat, HeaderMismatch, Layout, LineWriter, QUEUE_CAPACITY, Rotation, Rows, Series,
     Setup, Target, TimeForm, existing_lines,
 };
-use crate::tasks::{Failure, Kind};
+use crate::tasks::Failure;
+use crate::tasks::log::LogFailure;
 use clap::{Args, ValueEnum};
 use std::fs::OpenOptions;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Where rows and events go, and how they look.
+/// The output options.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output options")]
 pub(super) struct Files {
     /// Write to a file instead of stdout
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
-    /// Overwrite files that exist
+    /// Overwrite existing files
     #[arg(long, conflicts_with = "append")]
     force: bool,
-    /// Continue files that exist and have the same columns; a last line that was cut off goes
+    /// Continue existing files with the same columns. A last line that was cut off is removed
     #[arg(long, requires = "output")]
     append: bool,
-    /// One line per value, or one per cycle of --sync or --poll
+    /// One row per value, or one per cycle of --sync or --poll
     #[arg(long, value_name = "LAYOUT", default_value = "long")]
     layout: LayoutArg,
-    /// Begin a new file after this time or before this size: 10m, 1h, 100MB, 1GiB. For run.csv they are
+    /// Start a new file after this time or at this size: 10m, 1h, 100MB, 1GiB. The files for run.csv are
     /// run-0001.csv and so on
     #[arg(long, value_name = "DUR|SIZE", requires = "output")]
     rotate: Option<RotationArg>,
-    /// Write what happens on the way, with its time, as CSV: emergencies, gaps, losses, reboots
+    /// Write events as CSV: emergencies, gaps, node losses, reboots
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
     /// Write the summary as JSON to a file; - for stdout
     #[arg(long, value_name = "FILE")]
     pub(super) summary: Option<PathBuf>,
-    /// Between the columns of CSV: , ; | or tab [default: ,]
+    /// Delimiter of CSV: , ; | or tab [default: ,]
     #[arg(long, value_name = "CHAR")]
     delimiter: Option<Delimiter>,
     /// Decimal sign of CSV: . or , [default: .]
     #[arg(long, value_name = "CHAR")]
     decimal: Option<Decimal>,
-    /// Begin CSV with a byte order mark, which some spreadsheets ask for
+    /// Start CSV with a byte order mark, which some spreadsheets need
     #[arg(long)]
     bom: bool,
-    /// Times as text (RFC 3339), as seconds since 1970, or as the days that spreadsheets count; all UTC
+    /// Format of times: text (RFC 3339), seconds since 1970, or days as in spreadsheets; all UTC
     #[arg(long, value_name = "FORM", default_value = "rfc3339")]
     time: TimeArg,
 }
 
-// No doc comments on the variants: clap would spread each over lines of its own in every help text.
+// The variants have no doc comments: clap would print each on a line of its own.
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum LayoutArg {
@@ -79,7 +81,7 @@ impl FromStr for Delimiter {
         match text {
             "," | ";" | "|" | "\t" => Ok(Delimiter(text.as_bytes()[0])),
             "tab" | "\\t" => Ok(Delimiter(b'\t')),
-            _ => Err(format!("\"{text}\" is no delimiter (, ; | or tab)")),
+            _ => Err(format!("\"{text}\" is not a delimiter (, ; | or tab)")),
         }
     }
 }
@@ -93,7 +95,7 @@ impl FromStr for Decimal {
     fn from_str(text: &str) -> Result<Decimal, String> {
         match text {
             "." | "," => Ok(Decimal(text.as_bytes()[0])),
-            _ => Err(format!("\"{text}\" is no decimal sign (. or ,)")),
+            _ => Err(format!("\"{text}\" is not a decimal sign (. or ,)")),
         }
     }
 }
@@ -101,11 +103,11 @@ impl FromStr for Decimal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct RotationArg(Rotation);
 
-/// A file for every second is short enough.
-const SHORTEST: std::time::Duration = std::time::Duration::from_secs(1);
+/// The shortest time of a file.
+const MIN_FILE_TIME: std::time::Duration = std::time::Duration::from_secs(1);
 
-/// A file has room for some rows.
-const SMALLEST: u64 = 1000;
+/// The smallest size of a file, in bytes.
+const MIN_FILE_SIZE: u64 = 1000;
 
 impl FromStr for RotationArg {
     type Err = String;
@@ -121,60 +123,64 @@ impl FromStr for RotationArg {
             let factor: u64 = factors.find(|(name, _)| *name == prefix).map(|(_, factor)| factor).ok_or_else(wrong)?;
             let size = number.parse::<u64>().ok().and_then(|number| number.checked_mul(factor)).ok_or_else(wrong)?;
             return match size {
-                SMALLEST.. => Ok(RotationArg(Rotation::Size(size))),
+                MIN_FILE_SIZE.. => Ok(RotationArg(Rotation::Size(size))),
                 _ => Err(format!("\"{text}\" is too small for a file (1kB or more)")),
             };
         }
         match humantime::parse_duration(text) {
-            // Ten months to one, ten megabytes to the other.
+            // 10M could be months or megabytes.
             Ok(_) if text.contains('M') => Err(wrong()),
-            Ok(length) if length >= SHORTEST => Ok(RotationArg(Rotation::Every(length))),
+            Ok(length) if length >= MIN_FILE_TIME => Ok(RotationArg(Rotation::Every(length))),
             Ok(_) => Err(format!("\"{text}\" is too short for a file (1s or more)")),
             Err(_) => Err(wrong()),
         }
     }
 }
 
-/// The files, open, and what is to stand in them.
-pub(super) struct Opened {
+/// The open files.
+pub(super) struct OpenFiles {
     pub(super) rows: Option<OutFile>,
     pub(super) events: Option<OutFile>,
     pub(super) summary: Option<OutFile>,
     series: Option<Series>,
     setup: Setup,
-    /// The length of what stays.
+    /// How many bytes of the existing file are kept.
     keep: u64,
-    events_kept: Option<ExistingLines>,
+    /// What the existing file of events contains.
+    existing_events: Option<ExistingLines>,
 }
 
 impl Files {
-    /// Whether a row is a cycle.
+    /// Whether the layout is wide.
     pub(super) fn is_wide(&self) -> bool {
         self.layout == LayoutArg::Wide
     }
 
-    /// What can be known to be wrong before anything is opened.
-    pub(super) fn refuse(&self, format: FileFormat, has_cycles: bool) -> Result<(), Failure> {
-        let refuse = |message: &str, hint: &str| Err(Failure::new(Kind::Usage, message).hint(hint));
+    /// Refuses options that do not fit together, before anything is opened.
+    pub(super) fn check(&self, format: FileFormat, has_cycles: bool) -> Result<(), ErrorMessage> {
+        let refuse = |message: &str, hint: &str| Err(ErrorMessage::usage(message).hint(hint));
         if self.is_wide() && !has_cycles {
             return refuse(
-                "--layout wide needs --sync or --poll: a row is one of their cycles",
-                "add --sync 100ms or --poll 100ms, or leave --layout wide out",
+                "--layout wide needs --sync or --poll: each row is one of their cycles",
+                "add --sync 100ms or --poll 100ms, or omit --layout wide",
             );
         }
         let of_csv = self.delimiter.is_some() || self.decimal.is_some() || self.bom;
         if format == FileFormat::JsonLines && of_csv {
-            return refuse("--delimiter, --decimal and --bom are for CSV", "leave --format json out, or them");
+            return refuse("--delimiter, --decimal and --bom are for CSV", "omit --format json or these options");
         }
         let Dialect { delimiter, decimal, .. } = self.dialect();
         if delimiter == decimal {
-            return refuse("the decimal sign cannot be the delimiter, too", "add --delimiter ';'");
+            return refuse("the decimal sign and the delimiter must differ", "add --delimiter ';'");
         }
         let files = [&self.output, &self.events, &self.summary].into_iter().flatten();
         let files: Vec<&PathBuf> = files.filter(|path| path.as_path() != Path::new("-")).collect();
         for (at, path) in files.iter().enumerate() {
             if files[..at].contains(path) {
-                return refuse(&format!("{} is named twice", path.display()), "each output needs a file of its own");
+                return refuse(
+                    &format!("{} is used for two outputs", path.display()),
+                    "each output needs a file of its own",
+                );
             }
         }
         Ok(())
@@ -201,8 +207,8 @@ impl Files {
         }
     }
 
-    /// Opens everything, before the bus.
-    pub(super) fn open(&self, format: FileFormat, count: Option<u64>) -> anyhow::Result<Opened> {
+    /// Opens all files, before the bus is opened.
+    pub(super) fn open(&self, format: FileFormat, count: Option<u64>) -> anyhow::Result<OpenFiles> {
         let setup = Setup {
             format,
             layout: if self.is_wide() { Layout::Wide } else { Layout::Long },
@@ -214,7 +220,7 @@ impl Files {
         };
         let open = |path: &PathBuf| OutFile::open(path, self.existing());
         let mut opened =
-            Opened { rows: None, events: None, summary: None, series: None, setup, keep: 0, events_kept: None };
+            OpenFiles { rows: None, events: None, summary: None, series: None, setup, keep: 0, existing_events: None };
         match &self.output {
             Some(base) if self.rotate.is_some() => self.open_first(base, &mut opened)?,
             Some(path) => {
@@ -233,14 +239,16 @@ impl Files {
             None => {}
         }
         if let (false, Some(file)) = (self.is_wide(), &opened.rows) {
-            opened.setup.check_long().map_err(|other| other_head(file.path(), &other))?;
+            opened.setup.check_long().map_err(|mismatch| header_mismatch(file.path(), mismatch))?;
         }
         opened.events = self.events.as_ref().map(open).transpose()?;
         if let Some(file) = &mut opened.events {
-            opened.events_kept = file.look()?;
+            opened.existing_events = file.look()?;
             let expected = Events::header(self.dialect());
-            if let Some(kept) = opened.events_kept.as_ref().filter(|kept| kept.header != expected) {
-                return Err(other_head(file.path(), &HeaderMismatch { found: kept.header.clone(), expected }).into());
+            if let Some(kept) = opened.existing_events.as_ref().filter(|kept| kept.header != expected) {
+                return Err(
+                    header_mismatch(file.path(), HeaderMismatch { found: kept.header.clone(), expected }).into()
+                );
             }
         }
         let summary = self.summary.as_ref().filter(|path| path.as_path() != Path::new("-"));
@@ -251,8 +259,8 @@ impl Files {
         Ok(opened)
     }
 
-    /// The first file of many.
-    fn open_first(&self, base: &Path, opened: &mut Opened) -> anyhow::Result<()> {
+    /// Opens the first file of a series.
+    fn open_first(&self, base: &Path, opened: &mut OpenFiles) -> anyhow::Result<()> {
         let numbers = Series::existing(base)
             .map_err(|source| FileError { what: format!("create {}", Series::name(base, 1).display()), source })?;
         let mut first = 1;
@@ -260,8 +268,10 @@ impl Files {
         match (numbers.last(), self.existing()) {
             (Some(_), Existing::Refuse) => {
                 let name = Series::name(base, *numbers.first().unwrap_or(&1));
-                let failure = Failure::new(Kind::Usage, format!("{} exists", name.display()));
-                return Err(failure.hint("overwrite with --force, go on with --append, or name another file").into());
+                let failure = ErrorMessage::usage(format!("{} exists", name.display()));
+                return Err(failure
+                    .hint("overwrite with --force, continue with --append, or choose another file")
+                    .into());
             }
             (Some(last), Existing::Continue) => {
                 let path = Series::name(base, *last);
@@ -290,8 +300,8 @@ impl Files {
     }
 }
 
-impl Opened {
-    /// The rows' writer; where the bus does not wait for who is slow, a thread writes.
+impl OpenFiles {
+    /// The writer of the rows. If the bus does not wait for the program, a thread writes.
     pub(super) fn rows(&mut self, waits: bool) -> anyhow::Result<Rows> {
         let target = match &self.rows {
             Some(file) => file.target(self.keep)?,
@@ -300,18 +310,18 @@ impl Opened {
         Ok(Rows::new(line_writer(target, self.series.take(), waits)?, self.setup.clone()))
     }
 
-    /// The events' writer, if events are wanted.
+    /// The writer of the events, if they are wanted.
     pub(super) fn events(&self, waits: bool) -> anyhow::Result<Option<Events>> {
         let Some(file) = &self.events else { return Ok(None) };
-        let (dialect, kept) = (self.setup.dialect, self.events_kept.as_ref());
+        let (dialect, kept) = (self.setup.dialect, self.existing_events.as_ref());
         let target = file.target(kept.map_or(0, |kept| kept.length))?;
         let writer = line_writer(target, None, waits)?;
         Ok(Some(Events::new(writer, dialect, self.setup.time, kept.is_some())))
     }
 
-    /// That the file which was to be continued has other columns.
-    pub(super) fn other_head(&self, other: &HeaderMismatch) -> Failure {
-        other_head(self.rows.as_ref().map_or(Path::new("stdout"), OutFile::path), other)
+    /// The name of the rows' file.
+    pub(super) fn rows_name(&self) -> String {
+        self.rows.as_ref().map_or_else(|| "stdout".to_owned(), |file| file.path().display().to_string())
     }
 }
 
@@ -323,9 +333,9 @@ fn line_writer(target: Target, series: Option<Series>, waits: bool) -> anyhow::R
     Ok(writer.map_err(|source| FileError { what: "start a thread".to_owned(), source })?)
 }
 
-fn other_head(path: &Path, other: &HeaderMismatch) -> Failure {
-    let message = format!("{} has other columns: \"{}\", not \"{}\"", path.display(), other.found, other.expected);
-    Failure::new(Kind::Usage, message).hint("name another file, or overwrite it with --force")
+fn header_mismatch(path: &Path, mismatch: HeaderMismatch) -> Failure {
+    let HeaderMismatch { found, expected } = mismatch;
+    Failure::general(LogFailure::OtherColumns { file: path.display().to_string(), found, expected })
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! The text of the events of a recording.
 
+use super::super::failure::reason_text;
 use super::{Weight, Words};
 use crate::bus::time::spoken;
 use crate::bus::{Fault, ReceiveBuffer};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
 use crate::output::failure::ErrorMessage;
-use crate::tasks::log::{Change, Note, Remark, TpdoChange, silence_text};
+use crate::tasks::log::{Change, Note, Remark, TpdoChange};
 
 /// The text of a recording's event.
 pub fn words(note: &Note) -> Words {
@@ -119,7 +120,7 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::SyncsOmittedTooSlow(count) => format!("{count} SYNC omitted: the program was stopped or too slow"),
         Remark::SmallReceiveBuffer(buffer) => format!("frames were dropped: {}", buffer_text(*buffer)),
         Remark::NoMeasurements(node, reason) => {
-            format!("node {node}: no measurements: {}", silence_text(*reason, *node).0)
+            format!("node {node}: no measurements: {}", reason_text(*reason))
         }
     }
 }

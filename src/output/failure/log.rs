@@ -1,10 +1,98 @@
 //! Text for causes: nothing was recorded, or a recording ended early.
 
 use super::Words;
+use crate::bus::time::spoken;
+use crate::canopen::id::NodeId;
 use crate::tasks::Failure;
-use crate::tasks::log::LogFailure;
+use crate::tasks::log::{LogFailure, SilenceReason};
 
 /// The message and the hint for a cause.
-pub(super) fn words(_failure: &Failure, cause: &LogFailure) -> Words {
-    match *cause {}
+pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
+    match cause {
+        LogFailure::UnknownSignal { name, known } => {
+            Words::new(format!("no node has a signal \"{name}\"")).hint(format!("there are: {}", known.join(", ")))
+        }
+        LogFailure::NoStatus { signal } => Words::new(format!("no node has a status object for {signal}")),
+        LogFailure::NotMapped { name } => {
+            Words::new(format!("no TPDO contains {name}")).hint("read it by SDO instead: add --poll 100ms")
+        }
+        LogFailure::DifferentSyncIds => Words::new("the nodes have different COB-IDs of SYNC (1005h)"),
+        LogFailure::SecondSyncProducer => Words::new("another node sends SYNC on this bus: nothing was started")
+            .hint("omit --sync: the nodes send on the SYNC that is already there"),
+        LogFailure::UnknownMapping => {
+            let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
+            Words::new("it sends TPDOs, and their mapping is unknown").hint(format!(
+                "name the device: --device {node}=mh4 (or a file), or record from the start of a log that reads it"
+            ))
+        }
+        LogFailure::NothingReceived { within, nodes } => {
+            let node = match nodes.as_slice() {
+                [only] => only.to_string(),
+                _ => "all".to_owned(),
+            };
+            Words::new(format!("no measurements within {}: no TPDO received", spoken(*within)))
+                .hint(format!("--passive starts no node: omit it, or: cangauge nmt start {node}"))
+        }
+        LogFailure::NoMeasurements { within, node, reason, of_several } => {
+            let (within, why) = (spoken(*within), reason_text(*reason));
+            let words = Words::new(if *of_several {
+                format!("no measurements from any node within {within}; node {node}: {why}")
+            } else {
+                format!("no measurements within {within}: {why}")
+            });
+            match reason_hint(*reason, *node) {
+                Some(hint) => words.hint(hint),
+                None => words,
+            }
+        }
+        LogFailure::NodesLost { nodes, .. } => {
+            let names: Vec<String> = nodes.iter().map(|node| node.to_string()).collect();
+            let word = if nodes.len() == 1 { "node" } else { "nodes" };
+            Words::new(format!("{word} {} lost: no measurements at the end", names.join(", ")))
+        }
+        LogFailure::OtherColumns { file, found, expected } => {
+            Words::new(format!("{file} has other columns: \"{found}\", not \"{expected}\""))
+                .hint("choose another file, or overwrite it with --force")
+        }
+        LogFailure::OutputClosed { rows } => {
+            Words::new(format!("the output was closed before the end: {} written", count(*rows)))
+        }
+        LogFailure::EndedEarly { rows } => Words::new(format!("interrupted before the end: {} written", count(*rows))),
+        LogFailure::RowsLost { rows, output } => {
+            Words::new(format!("{} lost: {output} could not keep up", count(*rows)))
+        }
+        LogFailure::EventsLost { output } => Words::new(format!("events lost: {output} could not keep up")),
+    }
+}
+
+fn count(rows: u64) -> String {
+    if rows == 1 { "1 row".to_owned() } else { format!("{rows} rows") }
+}
+
+/// Why a node sends no measurements.
+pub(in crate::output) fn reason_text(reason: SilenceReason) -> String {
+    match reason {
+        SilenceReason::NoAnswer => "it does not answer".to_owned(),
+        SilenceReason::NoTpdo => "it has no TPDO".to_owned(),
+        SilenceReason::AllTpdosDisabled => "all its TPDOs are disabled (bit 31 of 1800h:1)".to_owned(),
+        SilenceReason::NothingMapped => "nothing is mapped into its TPDOs".to_owned(),
+        SilenceReason::WaitsForSync(number) => format!("{number} waits for SYNC, and no node sends SYNC"),
+        SilenceReason::NoEventTimer(number) => {
+            format!("{number} has no event timer (1800h:5 is 0), and its value does not change enough")
+        }
+        SilenceReason::WrongLength => "its TPDOs have another length than their mapping".to_owned(),
+        SilenceReason::Unknown => "its TPDOs should be sent; is it started?".to_owned(),
+    }
+}
+
+fn reason_hint(reason: SilenceReason, node: NodeId) -> Option<String> {
+    match reason {
+        SilenceReason::NoAnswer | SilenceReason::WrongLength => None,
+        SilenceReason::NoTpdo
+        | SilenceReason::AllTpdosDisabled
+        | SilenceReason::NothingMapped
+        | SilenceReason::NoEventTimer(_) => Some("read by SDO instead: add --poll 100ms".to_owned()),
+        SilenceReason::WaitsForSync(_) => Some(format!("add --sync 100ms, or read by SDO: --poll 100ms (node {node})")),
+        SilenceReason::Unknown => Some(format!("cangauge nmt state {node}")),
+    }
 }

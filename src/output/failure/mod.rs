@@ -19,6 +19,8 @@ mod sdo;
 mod settings;
 mod store;
 
+pub(super) use log::reason_text;
+
 use super::json;
 use super::notes::{Told, effect};
 use crate::canopen::id::NodeId;

@@ -1,15 +1,16 @@
 //! Checks before a recording changes anything.
 
-use super::{Mode, Plan};
-use crate::bus::BusError;
+use super::{LogFailure, Mode, Plan};
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::booted;
 use crate::canopen::pdo::Transmission;
-use crate::master::{Error, Happening, Master};
+use crate::master::{Happening, Master};
 use crate::measure::decode::Wanted;
 use crate::node::Node;
-use crate::tasks::{Failure, Kind};
+use crate::node::wait::{Policy, wait};
+use crate::tasks::Failure;
 use std::collections::BTreeSet;
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// Every requested signal must exist, and must be mapped into a TPDO unless it is polled.
@@ -32,37 +33,37 @@ pub(super) fn check_wanted(instruments: &[Node], plan: &Plan) -> Result<(), Fail
             }
         };
         if !instruments.iter().any(carried) {
-            let has = |name: &str, told: bool| {
+            let has = |name: &str, with_status: bool| {
                 let signals = instruments.iter().flat_map(|instrument| &instrument.signals);
-                signals.filter(|signal| signal.name == name).any(|signal| !told || signal.status.is_some())
+                signals.filter(|signal| signal.name == name).any(|signal| !with_status || signal.status.is_some())
             };
             let name = match item {
                 Wanted::Signal(name) | Wanted::Status(name) if !has(name, false) => {
-                    let mut names: Vec<&str> = Vec::new();
-                    for signal in instruments.iter().flat_map(|instrument| &instrument.signals) {
-                        if !names.contains(&signal.name.as_str()) {
-                            names.push(&signal.name);
-                        }
-                    }
-                    return Err(Failure::new(Kind::Usage, format!("no node has a signal \"{name}\""))
-                        .hint(format!("there are: {}", names.join(", "))));
+                    return Err(Failure::general(unknown_signal(name, instruments)));
                 }
                 Wanted::Status(name) if !has(name, true) => {
-                    let message = format!("no node has an object that tells the status of {name}");
-                    return Err(Failure::new(Kind::Usage, message));
+                    return Err(Failure::general(LogFailure::NoStatus { signal: name.clone() }));
                 }
                 Wanted::Signal(name) => name.clone(),
                 Wanted::Status(name) => format!("{name}.status"),
                 Wanted::Object(object) => object.to_string(),
             };
-            if polled {
-                continue;
+            if !polled {
+                return Err(Failure::general(LogFailure::NotMapped { name }));
             }
-            return Err(Failure::new(Kind::Unexpected, format!("no TPDO carries {name}"))
-                .hint("read it by SDO instead: add --poll 100ms"));
         }
     }
     Ok(())
+}
+
+fn unknown_signal(name: &str, nodes: &[Node]) -> LogFailure {
+    let mut known: Vec<String> = Vec::new();
+    for signal in nodes.iter().flat_map(|node| &node.signals) {
+        if !known.contains(&signal.name) {
+            known.push(signal.name.clone());
+        }
+    }
+    LogFailure::UnknownSignal { name: name.to_owned(), known }
 }
 
 /// Refuses if another node sends SYNC: two SYNC producers would double every synchronous TPDO. Adds nodes that restart
@@ -75,26 +76,24 @@ pub(super) fn refuse_second_sync(
 ) -> Result<(), Failure> {
     let ids: BTreeSet<CanId> = instruments.iter().map(|instrument| instrument.sync).collect();
     if ids.len() > 1 {
-        return Err(Failure::new(Kind::CheckFailed, "the nodes listen to different SYNC identifiers (1005h)"));
+        return Err(Failure::general(LogFailure::DifferentSyncIds));
     }
     let length = (period * 3).clamp(Duration::from_millis(200), Duration::from_secs(2));
     let until = master.now() + length;
-    loop {
-        match master.next(until)? {
-            Happening::Frame(received) if ids.contains(&received.frame.id()) && !received.frame.is_remote() => {
-                return Err(Failure::new(
-                    Kind::CheckFailed,
-                    "somebody else sends SYNC on this bus: nothing was started",
-                )
-                .hint("leave --sync out: the nodes send on the SYNC that is there"));
-            }
-            Happening::Frame(received) => restarted.extend(booted(&received.frame)),
-            Happening::Deadline => return Ok(()),
-            Happening::Interrupted => return Err(Error::Interrupted.into()),
-            Happening::Link(false) => return Err(BusError::Down(master.bus().name().to_owned()).into()),
-            _ => {}
+    let second = wait(master, until, Policy::Command, |_, event| match event {
+        Happening::Frame(received) if ids.contains(&received.frame.id()) && !received.frame.is_remote() => {
+            ControlFlow::Break(())
         }
+        Happening::Frame(received) => {
+            restarted.extend(booted(&received.frame));
+            ControlFlow::Continue(())
+        }
+        _ => ControlFlow::Continue(()),
+    })?;
+    if second.done().is_none() {
+        return Ok(());
     }
+    Err(Failure::general(LogFailure::SecondSyncProducer))
 }
 
 /// The share of the bus (0 to 1) that SYNC at this interval and the TPDOs after it take, at the greatest frame length;

@@ -1,16 +1,112 @@
 //! Causes of failures: nothing was recorded, or a recording ended early.
 
+use super::SilenceReason;
+use crate::canopen::id::NodeId;
 use crate::tasks::Kind;
 use crate::tasks::failure::Cause;
+use std::time::Duration;
 
 /// Nothing was recorded, or a recording ended early.
 #[derive(Clone, Debug, PartialEq)]
-pub enum LogFailure {}
+pub enum LogFailure {
+    /// No node has a signal with this name. The nodes have the known ones.
+    UnknownSignal {
+        /// The signal or object.
+        name: String,
+        /// The signals of the nodes.
+        known: Vec<String>,
+    },
+    /// No node has a status object for this signal.
+    NoStatus {
+        /// The signal.
+        signal: String,
+    },
+    /// No TPDO contains this signal or object.
+    NotMapped {
+        /// The signal or object.
+        name: String,
+    },
+    /// The nodes have different COB-IDs of SYNC (1005h).
+    DifferentSyncIds,
+    /// Another node sends SYNC.
+    SecondSyncProducer,
+    /// The node sends TPDOs whose mapping is unknown.
+    UnknownMapping,
+    /// A passive recording received no TPDO of these nodes.
+    NothingReceived {
+        /// How long it waited.
+        within: Duration,
+        /// The nodes.
+        nodes: Vec<NodeId>,
+    },
+    /// The node, or with `of_several` each of several nodes, sent no measurements, for this reason.
+    NoMeasurements {
+        /// How long it waited.
+        within: Duration,
+        /// The node.
+        node: NodeId,
+        /// The reason.
+        reason: SilenceReason,
+        /// Whether several nodes were to be recorded.
+        of_several: bool,
+    },
+    /// These nodes stopped before the end. With `all`, no node was left.
+    NodesLost {
+        /// The nodes.
+        nodes: Vec<NodeId>,
+        /// Whether no other node is left.
+        all: bool,
+    },
+    /// The file to be continued has other columns.
+    OtherColumns {
+        /// The name of the file.
+        file: String,
+        /// Its first line.
+        found: String,
+        /// The columns of the new rows.
+        expected: String,
+    },
+    /// The reader closed the output before the planned end. This many rows were written.
+    OutputClosed {
+        /// Number of rows.
+        rows: u64,
+    },
+    /// Ctrl-C before the planned end. This many rows were written.
+    EndedEarly {
+        /// Number of rows.
+        rows: u64,
+    },
+    /// The output could not keep up: this many rows were lost.
+    RowsLost {
+        /// Number of rows.
+        rows: u64,
+        /// The name of the file or stream.
+        output: String,
+    },
+    /// The output of the events could not keep up.
+    EventsLost {
+        /// The name of the file or stream.
+        output: String,
+    },
+}
 
 impl LogFailure {
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
-        match *self {}
+        match self {
+            LogFailure::UnknownSignal { .. }
+            | LogFailure::NoStatus { .. }
+            | LogFailure::UnknownMapping
+            | LogFailure::OtherColumns { .. } => Kind::Usage,
+            LogFailure::NotMapped { .. } => Kind::Unexpected,
+            LogFailure::DifferentSyncIds | LogFailure::SecondSyncProducer => Kind::CheckFailed,
+            LogFailure::NothingReceived { .. }
+            | LogFailure::NoMeasurements { .. }
+            | LogFailure::NodesLost { all: true, .. } => Kind::NoAnswer,
+            LogFailure::NodesLost { all: false, .. } => Kind::Partial,
+            LogFailure::OutputClosed { .. } | LogFailure::RowsLost { .. } | LogFailure::EventsLost { .. } => Kind::Io,
+            LogFailure::EndedEarly { .. } => Kind::Interrupted,
+        }
     }
 }
 

@@ -170,7 +170,7 @@ impl SetupListener {
         tpdos.retain(|tpdo| has_digits(&instrument, tpdo));
         instrument.tpdos = tpdos;
         if !instrument.tpdos.is_empty() {
-            decoder.renew(instrument.layout(), &self.wanted);
+            decoder.replace(instrument.layout(), &self.wanted);
             self.decoded = decoder.can_ids().collect();
             self.not_understood.remove(&node);
         }

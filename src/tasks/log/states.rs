@@ -1,16 +1,20 @@
 //! The NMT states that a recording changes and restores.
 
 use super::{Mode, Plan, Remark};
-use crate::bus::BusError;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtCommand, NmtState, booted};
 use crate::master::{Error, Happening, Master};
 use crate::node::Node;
+use crate::node::wait::{Policy, wait};
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// With a slower heartbeat the state of a node counts as unknown.
 const MAX_HEARTBEAT_PERIOD: Duration = Duration::from_secs(2);
+
+/// How often it is checked whether the last commands were sent.
+const SEND_INTERVAL: Duration = Duration::from_millis(10);
 
 /// The nodes that were started, and their previous states.
 #[derive(Debug, Default)]
@@ -60,10 +64,9 @@ impl NmtStates {
             master.send(command.frame(Some(node)));
         }
         while master.is_sending() {
-            let until = master.now() + Duration::from_millis(10);
-            if let Happening::Link(false) = master.next(until)? {
-                return Err(Error::Bus(BusError::Down(master.bus().name().to_owned())));
-            }
+            // Ctrl-C does not end the restoring.
+            let until = master.now() + SEND_INTERVAL;
+            wait(master, until, Policy::Observe, |_, _| ControlFlow::<()>::Continue(()))?;
         }
         Ok(())
     }
@@ -91,25 +94,16 @@ fn heartbeats(
     let mut known = BTreeMap::new();
     let Some(longest) = expected.values().max() else { return Ok(known) };
     let until = master.now() + *longest * 3 / 2;
-    while known.len() < expected.len() {
-        match master.next(until)? {
-            Happening::Frame(received) => {
-                restarted.extend(booted(&received.frame));
-                if let Some((node, Life::State(state))) = Life::parse(&received.frame)
-                    && expected.contains_key(&node)
-                {
-                    known.insert(node, state);
-                }
+    wait(master, until, Policy::Command, |_, event| {
+        if let Happening::Frame(received) = event {
+            restarted.extend(booted(&received.frame));
+            if let Some((node, Life::State(state))) = Life::parse(&received.frame)
+                && expected.contains_key(&node)
+            {
+                known.insert(node, state);
             }
-            Happening::Deadline => break,
-            Happening::Interrupted => return Err(Error::Interrupted),
-            Happening::Link(false) => return Err(Error::Bus(BusError::Down(master.bus().name().to_owned()))),
-            Happening::Sdo(..)
-            | Happening::Fault(..)
-            | Happening::Dropped(_)
-            | Happening::Link(true)
-            | Happening::Ended => {}
         }
-    }
+        if known.len() == expected.len() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
     Ok(known)
 }

@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 impl Recording<'_> {
     /// Reports COB-IDs that two nodes use for TPDOs.
     pub(in crate::tasks::log) fn report_shared_cob_ids(&mut self, at: Stamp, observer: &mut dyn Observer) {
-        for (id, (one, other)) in self.decoder.take_contested() {
+        for (id, (one, other)) in self.decoder.take_shared_cob_ids() {
             self.remark(Remark::SharedCobId(id, [one, other]), at, observer);
         }
     }
@@ -178,7 +178,7 @@ impl Recording<'_> {
                     observer.note(&Note::Unreadable(node, Box::new(failure)), at);
                 }
             }
-            None => self.decoder.renew(instrument.layout(), &self.plan.wanted),
+            None => self.decoder.replace(instrument.layout(), &self.plan.wanted),
         }
         self.update_sources();
         self.emergencies.watch(&instrument);

@@ -4,6 +4,7 @@ use super::Recording;
 use crate::bus::Mono;
 use crate::canopen::id::CanId;
 use crate::master::{Error, Happening, Master};
+use crate::node::wait::{self, Policy, Until, Waiter};
 use crate::tasks::log::producer::Producer;
 use crate::tasks::log::{FIRST_SAMPLE_TIMEOUT, Mode, Note, Observer, TICK};
 use std::ops::ControlFlow;
@@ -64,7 +65,9 @@ impl Recording<'_> {
             }
             _ => None,
         };
-        let result = self.run_loop(start, producer.as_mut(), master, observer);
+        let schedule = Schedule::new(start, self.plan.duration, master.bus().is_live());
+        let mut recorder = Loop { recording: self, schedule, producer: producer.as_mut(), observer };
+        let result = wait::run(master, Policy::Record, &mut recorder);
         self.timestamps = master.bus().timestamps();
         if let Some(producer) = producer {
             self.tally.syncs = producer.finish(master);
@@ -75,35 +78,6 @@ impl Recording<'_> {
             observer.note(&Note::Dropped(late_drops), master.bus().now());
         }
         result
-    }
-
-    fn run_loop(
-        &mut self,
-        start: Mono,
-        mut producer: Option<&mut Producer>,
-        master: &mut Master<'_>,
-        observer: &mut dyn Observer,
-    ) -> Result<(), Error> {
-        let mut schedule = Schedule::new(start, self.plan.duration, master.bus().is_live());
-        loop {
-            let until = self.next_deadline(&schedule, producer.as_deref());
-            let happening = match schedule.interrupted_at {
-                Some(at) => master.drain(at)?,
-                None => master.next(until)?,
-            };
-            if let Some(producer) = &mut producer {
-                producer.check_sent(master);
-            }
-            let flow = match happening {
-                Happening::Deadline => self.deadline(until, &mut schedule, producer.as_deref_mut(), master, observer),
-                Happening::Ended => ControlFlow::Break(()),
-                Happening::Interrupted => self.interrupt(&mut schedule, master)?,
-                other => self.received(other, master, observer)?,
-            };
-            if flow.is_break() {
-                return Ok(());
-            }
-        }
     }
 
     /// The moment at which the loop must act if nothing is received.
@@ -154,7 +128,7 @@ impl Recording<'_> {
         observer.tick(master.bus().now(), self.tally.rows)
     }
 
-    /// Ctrl-C. The first one still records the frames that were received before it; the second one does not wait.
+    /// Ctrl-C. After the first one, the frames received before it are still recorded. The second one does not wait.
     fn interrupt(&mut self, schedule: &mut Schedule, master: &Master<'_>) -> Result<ControlFlow<()>, Error> {
         let is_second = std::mem::replace(&mut self.interrupted, true);
         if self.tally.rows == 0 {
@@ -166,20 +140,45 @@ impl Recording<'_> {
         schedule.interrupted_at = Some(master.now());
         Ok(ControlFlow::Continue(()))
     }
+}
 
-    fn received(
-        &mut self,
-        happening: Happening,
-        master: &mut Master<'_>,
-        observer: &mut dyn Observer,
-    ) -> Result<ControlFlow<()>, Error> {
-        match happening {
-            Happening::Frame(received) => return Ok(self.frame(&received, master, observer)),
-            Happening::Sdo(ticket, result) => return self.answer(ticket, result, master, observer),
-            Happening::Fault(fault, at) => self.fault(fault, at, master, observer),
-            Happening::Dropped(count) => self.dropped(count, master, observer),
-            Happening::Link(up) => self.link(up, master, observer),
-            Happening::Deadline | Happening::Ended | Happening::Interrupted => {}
+/// The recording while it waits.
+struct Loop<'l, 'p> {
+    recording: &'l mut Recording<'p>,
+    schedule: Schedule,
+    producer: Option<&'l mut Producer>,
+    observer: &'l mut dyn Observer,
+}
+
+impl Waiter for Loop<'_, '_> {
+    type Output = ();
+    type Error = Error;
+
+    fn until(&self) -> Until {
+        match self.schedule.interrupted_at {
+            Some(at) => Until::Drained(at),
+            None => Until::Deadline(self.recording.next_deadline(&self.schedule, self.producer.as_deref())),
+        }
+    }
+
+    fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Error> {
+        if let Some(producer) = &mut self.producer {
+            producer.check_sent(master);
+        }
+        let Loop { recording, schedule, producer, observer } = self;
+        match event {
+            Happening::Frame(received) => return Ok(recording.frame(&received, master, *observer)),
+            Happening::Sdo(ticket, result) => return recording.answer(ticket, result, master, *observer),
+            Happening::Deadline => {
+                // Nothing has changed since `until` returned this moment.
+                let now = recording.next_deadline(schedule, producer.as_deref());
+                return Ok(recording.deadline(now, schedule, producer.as_deref_mut(), master, *observer));
+            }
+            Happening::Interrupted => return recording.interrupt(schedule, master),
+            Happening::Ended => return Ok(ControlFlow::Break(())),
+            Happening::Fault(fault, at) => recording.fault(fault, at, master, *observer),
+            Happening::Dropped(count) => recording.dropped(count, master, *observer),
+            Happening::Link(up) => recording.link(up, master, *observer),
         }
         Ok(ControlFlow::Continue(()))
     }

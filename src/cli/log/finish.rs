@@ -1,0 +1,137 @@
+//! The end of `cangauge log`: what is still to be written, the summary, and the exit code.
+
+use super::super::exit::{Several, stdout};
+use super::super::file::OutFile;
+use super::files::OpenFiles;
+use super::recorder::{Recorder, Unwritten};
+use crate::bus::interrupt::Interrupts;
+use crate::measure::expression::verdict::Verdict;
+use crate::output::console::Console;
+use crate::output::events::Events;
+use crate::output::summary::{self, Written};
+use crate::tasks::check::all_satisfied;
+use crate::tasks::log::{LogFailure, RecordingReport};
+use crate::tasks::{Failure, Kind};
+use std::io::{self, Write};
+
+/// How long Ctrl-C waits for a blocked output, in tenths of a second.
+const FLUSH_TIMEOUT: u32 = 20;
+
+/// Waits until everything is written, or until the user does not want to wait any longer.
+pub(super) fn wait_for_writers(mut recorder: Recorder, interrupted: bool) -> (Written, Option<Unwritten>) {
+    let mut interrupts = Interrupts::new().ok();
+    let mut waited = 0;
+    let mut give_up = || {
+        waited += 1;
+        interrupted && waited > FLUSH_TIMEOUT || interrupts.as_mut().is_some_and(Interrupts::take)
+    };
+    let rows = recorder.rows.finish(&mut give_up);
+    let events = recorder.events.as_mut().map_or(Ok(()), |events| events.finish(&mut give_up));
+    let written = Written {
+        rows: recorder.rows.count(),
+        lost: recorder.rows.lost(),
+        events_lost: recorder.events.as_ref().map_or(0, Events::lost),
+        left_out: recorder.rows.left_out(),
+    };
+    let error = recorder.error.or(rows.err().map(Unwritten::Rows)).or(events.err().map(Unwritten::Events));
+    (written, error)
+}
+
+impl Unwritten {
+    /// Whether the rows' output was closed by its reader.
+    pub(super) fn is_closed_output(&self) -> bool {
+        matches!(self, Unwritten::Rows(error) if error.kind() == io::ErrorKind::BrokenPipe)
+    }
+
+    /// The error of the file or stream. If rows were lost, prints how many.
+    pub(super) fn into_error(self, console: &Console, files: &OpenFiles, lost: u64) -> anyhow::Error {
+        let (file, error) = match (self, &files.events) {
+            (Unwritten::Events(error), Some(file)) => return file.error(error),
+            (Unwritten::Rows(error) | Unwritten::Events(error), _) => (&files.rows, error),
+        };
+        if lost > 0 && error.kind() != io::ErrorKind::BrokenPipe {
+            console.warn(&format!("{lost} {} could not be written", if lost == 1 { "row" } else { "rows" }));
+        }
+        match file {
+            Some(file) => file.error(error),
+            None => stdout(error),
+        }
+    }
+}
+
+/// A recording that has at least one row.
+pub(super) struct Finished {
+    pub(super) report: RecordingReport,
+    pub(super) verdicts: Vec<Verdict>,
+    pub(super) written: Written,
+    /// Whether --count or --duration was given.
+    pub(super) is_limited: bool,
+    /// Whether the reader closed the output.
+    pub(super) is_closed: bool,
+}
+
+impl Finished {
+    /// Whether the recording ended as planned. Without --count and --duration, every end is planned.
+    fn is_complete(&self) -> bool {
+        !(self.is_limited && (self.is_closed || self.report.interrupted))
+    }
+
+    /// Writes the summary as JSON, to a file or to stdout.
+    pub(super) fn write_summary(&self, is_wanted: bool, files: &mut OpenFiles) -> anyhow::Result<()> {
+        if !is_wanted {
+            return Ok(());
+        }
+        let mut text = Vec::new();
+        summary::json(&mut text, &self.report, self.written, self.is_complete())?;
+        match &mut files.summary {
+            Some(file) => file.write(&text),
+            None if self.is_closed => Ok(()),
+            None => io::stdout().lock().write_all(&text).map_err(stdout),
+        }
+    }
+
+    /// Success, or the failures; the first one gives the exit code.
+    pub(super) fn result(&self, files: &OpenFiles) -> anyhow::Result<()> {
+        let unmet = all_satisfied(&self.verdicts, &[]).err();
+        let (failed, without_data) = match unmet {
+            Some(unmet) if unmet.kind() == Kind::CheckFailed => (Some(unmet), None),
+            unmet => (None, unmet),
+        };
+        let own = [self.ended_early(), self.too_slow(files), self.lost_nodes()];
+        let own = own.into_iter().flatten().map(Failure::general);
+        let failures: Vec<Failure> = failed.into_iter().chain(own).chain(without_data).collect();
+        match failures.first().map(Failure::kind) {
+            None => Ok(()),
+            Some(kind) => Err(Several { kind, failures }.into()),
+        }
+    }
+
+    fn ended_early(&self) -> Option<LogFailure> {
+        let rows = self.written.rows.saturating_sub(self.written.lost);
+        match (self.is_complete(), self.is_closed) {
+            (true, _) => None,
+            (false, true) => Some(LogFailure::OutputClosed { rows }),
+            (false, false) => Some(LogFailure::EndedEarly { rows }),
+        }
+    }
+
+    /// Rows or events that the output could not take in time.
+    fn too_slow(&self, files: &OpenFiles) -> Option<LogFailure> {
+        let name = |file: &Option<OutFile>| {
+            file.as_ref().map_or_else(|| "stdout".to_owned(), |file| file.path().display().to_string())
+        };
+        match (self.written.lost, self.written.events_lost) {
+            _ if self.is_closed => None,
+            (0, 0) => None,
+            (0, _) => Some(LogFailure::EventsLost { output: name(&files.events) }),
+            (rows, _) => Some(LogFailure::RowsLost { rows, output: name(&files.rows) }),
+        }
+    }
+
+    /// Nodes that stopped before the end.
+    fn lost_nodes(&self) -> Option<LogFailure> {
+        let nodes = self.report.lost.clone();
+        let all = self.report.statistics.iter().all(|(source, _)| nodes.contains(&source.node));
+        (!nodes.is_empty()).then_some(LogFailure::NodesLost { nodes, all })
+    }
+}

@@ -1,0 +1,168 @@
+//! Writes and shows a recording while it runs.
+
+use super::super::recording::print_event;
+use crate::bus::claim::Claims;
+use crate::bus::{Mono, Stamp};
+use crate::measure::sample::{Sample, Source};
+use crate::output::console::Console;
+use crate::output::events::{Events, Weight, Words, words};
+use crate::output::progress::Progress;
+use crate::output::rows::Rows;
+use crate::tasks::Failure;
+use crate::tasks::log::{LogFailure, Note, Observer};
+use std::io;
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+/// How often lost rows and changed columns are looked for.
+const CHECK_INTERVAL: Duration = Duration::from_millis(100);
+
+/// What could not be written.
+#[derive(Debug)]
+pub(super) enum Unwritten {
+    Rows(io::Error),
+    Events(io::Error),
+}
+
+/// Writes rows and events, and shows them.
+pub(super) struct Recorder {
+    pub(super) rows: Rows,
+    pub(super) events: Option<Events>,
+    pub(super) progress: Progress,
+    pub(super) console: Console,
+    pub(super) error: Option<Unwritten>,
+    /// The name of the rows' file.
+    file: String,
+    /// The nodes that no other cangauge may use until the recording runs.
+    pub(super) claims: Option<Claims>,
+    start: Option<Mono>,
+    checked: Option<Mono>,
+    lost: u64,
+    is_losing: bool,
+    column_changes: u64,
+}
+
+impl Recorder {
+    pub(super) fn new(
+        rows: Rows,
+        file: String,
+        events: Option<Events>,
+        progress: Progress,
+        console: Console,
+    ) -> Recorder {
+        Recorder {
+            rows,
+            events,
+            progress,
+            console,
+            error: None,
+            claims: None,
+            file,
+            start: None,
+            checked: None,
+            lost: 0,
+            is_losing: false,
+            column_changes: 0,
+        }
+    }
+
+    /// Ends the recording if something could not be written, or if it has enough rows.
+    fn proceed(&mut self, result: io::Result<()>) -> ControlFlow<()> {
+        if let Err(error) = result {
+            self.error.get_or_insert(Unwritten::Rows(error));
+        }
+        if self.error.is_some() || self.rows.is_complete() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    fn event(&mut self, words: &Words, at: Stamp) {
+        print_event(&self.console, words);
+        let elapsed = self.rows.elapsed(at);
+        if let Some(Err(error)) = self.events.as_mut().map(|events| events.add(at, elapsed, words)) {
+            self.error.get_or_insert(Unwritten::Events(error));
+        }
+    }
+
+    fn warn(&mut self, event: &'static str, text: String, at: Stamp) {
+        self.event(&Words::of_all(event, Weight::Warning, text), at);
+    }
+
+    fn put(&mut self, cycle: Option<u64>, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
+        self.progress.take(samples, sources);
+        let mut result = self.rows.put(cycle, samples, sources);
+        if let (Ok(()), Some(last)) = (&result, samples.last()) {
+            result = self.rows.advance(last.at);
+            self.check_rows(last.at);
+        }
+        self.proceed(result)
+    }
+
+    /// Reports changed columns, and when rows start and stop being lost.
+    fn check_rows(&mut self, at: Stamp) {
+        if self.checked.is_some_and(|checked| at.mono.since(checked) < CHECK_INTERVAL) {
+            return;
+        }
+        self.checked = Some(at.mono);
+        if let Some(Err(error)) = self.events.as_mut().map(Events::write_header) {
+            self.error.get_or_insert(Unwritten::Events(error));
+        }
+        let changes = self.rows.column_changes();
+        if changes > std::mem::replace(&mut self.column_changes, changes) {
+            let text = "a mapping or a unit has changed: the rows continue with new columns, a file in the next file";
+            self.warn("columns", text.to_owned(), at);
+        }
+        let lost = self.rows.overflowed();
+        let more = lost > std::mem::replace(&mut self.lost, lost);
+        match (self.is_losing, more) {
+            (false, true) => {
+                self.is_losing = true;
+                self.warn("rows-lost", "the output cannot keep up: rows are being lost".to_owned(), at);
+            }
+            (true, false) => {
+                self.is_losing = false;
+                self.warn("rows-again", format!("rows are written again; {lost} rows lost so far"), at);
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Observer for Recorder {
+    fn sources(&mut self, sources: &[Source]) -> Result<(), Failure> {
+        self.rows.set_sources(sources).map_err(|mismatch| {
+            Failure::general(LogFailure::OtherColumns {
+                file: self.file.clone(),
+                found: mismatch.found,
+                expected: mismatch.expected,
+            })
+        })
+    }
+
+    fn cycle(&mut self, number: u64, at: Stamp) -> ControlFlow<()> {
+        let result = self.rows.start_cycle(number, at);
+        self.proceed(result)
+    }
+
+    fn polled(&mut self, cycle: u64, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
+        self.put(Some(cycle), samples, sources)
+    }
+
+    fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
+        self.claims = None;
+        self.put(None, samples, sources)
+    }
+
+    fn note(&mut self, note: &Note, at: Stamp) {
+        self.event(&words(note), at);
+    }
+
+    fn tick(&mut self, at: Stamp, _rows: u64) -> ControlFlow<()> {
+        self.claims = None;
+        let start = *self.start.get_or_insert(at.mono);
+        self.progress.tick(at.mono.since(start), self.rows.count());
+        let result = self.rows.advance(at);
+        if self.rows.count() > 0 {
+            self.check_rows(at);
+        }
+        self.proceed(result)
+    }
+}
