@@ -6,6 +6,7 @@ use super::channels::{Channels, status};
 use super::emergency::Emergencies;
 use super::lss::Slave;
 use super::memory::Memory;
+use super::model::Direction;
 use super::nmt::{Command, State};
 use super::objects::{Area, Objects};
 use super::record::{Line, Recorder, line, plain};
@@ -19,7 +20,7 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::device::quirk::Quirk;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 /// Duration of a reset of the node.
@@ -64,6 +65,8 @@ pub struct Device {
     toggle: bool,
     /// The next time at which an overload may begin or end.
     next_overload_change: Option<Mono>,
+    /// Channels that are overloaded, with the direction.
+    overloaded: BTreeMap<u8, Direction>,
     /// Answers that are not due yet.
     delayed: VecDeque<(Mono, Frame)>,
     recorder: Option<Recorder>,
@@ -110,6 +113,7 @@ impl Device {
             heartbeat: None,
             toggle: false,
             next_overload_change: None,
+            overloaded: BTreeMap::new(),
             delayed: VecDeque::new(),
             recorder: None,
             in_transit: VecDeque::new(),
@@ -373,12 +377,19 @@ impl Device {
     fn update_overloads(&mut self, now: Mono) {
         let time = now.since_start();
         self.next_overload_change = self.memory.channels.next_overload_change(time).map(Mono::at);
-        let Some(code) = self.setup.sim.overload_emcy else { return };
         let Memory { objects, channels, emergencies, .. } = &mut self.memory;
         for (channel, overload) in channels.overloads(time) {
-            match overload {
-                Some(_) => emergencies.raise(objects, code, channel, status(overload)),
-                None => emergencies.clear(objects, code, channel),
+            let before = match overload {
+                Some(direction) => self.overloaded.insert(channel, direction),
+                None => self.overloaded.remove(&channel),
+            };
+            if let Some(direction) = overload.filter(|_| overload != before) {
+                objects.count(counter(direction));
+            }
+            match (self.setup.sim.overload_emcy, overload) {
+                (Some(code), Some(_)) => emergencies.raise(objects, code, channel, status(overload)),
+                (Some(code), None) => emergencies.clear(objects, code, channel),
+                (None, _) => {}
             }
         }
     }
@@ -521,6 +532,14 @@ impl Station for Device {
     fn told_bit_rate(&mut self, bit_rate: u32) {
         let settings = &mut self.memory.settings;
         settings.set_bus_bit_rate(bit_rate, self.setup.bit_rate.is_some());
+    }
+}
+
+/// The name of the object that counts the overloads of a direction (DPS 2004h and 2005h).
+fn counter(direction: Direction) -> &'static str {
+    match direction {
+        Direction::High => "span-overflow-count",
+        Direction::Low => "span-underflow-count",
     }
 }
 

@@ -24,6 +24,8 @@ pub(super) struct Emergencies {
     /// Pending codes with their channels; channel 0 is the device itself.
     pending: BTreeMap<u16, BTreeSet<u8>>,
     history: VecDeque<u32>,
+    /// The number of errors in 1003h:0, for a device whose 1003h has no other entry.
+    count: u8,
     waiting: VecDeque<[u8; 8]>,
     /// End of the inhibit time.
     free: Mono,
@@ -67,6 +69,7 @@ impl Emergencies {
             }));
             self.history.truncate(entries);
         }
+        self.count = self.count.saturating_add(1);
         self.publish(objects);
         self.queue(objects, code, extra);
     }
@@ -85,6 +88,7 @@ impl Emergencies {
     /// Deletes the history; pending errors stay pending.
     pub(super) fn clear_history(&mut self, objects: &mut Objects) {
         self.history.clear();
+        self.count = 0;
         self.publish(objects);
     }
 
@@ -93,6 +97,7 @@ impl Emergencies {
         self.pending.clear();
         self.again = None;
         self.history.clear();
+        self.count = 0;
         self.waiting.clear();
     }
 
@@ -104,9 +109,10 @@ impl Emergencies {
     /// Writes register and history into their objects.
     pub(super) fn publish(&self, objects: &mut Objects) {
         objects.put(ERROR_REGISTER, vec![self.register()]);
-        let count = u8::try_from(self.history.len()).unwrap_or(u8::MAX);
-        objects.put(HISTORY, vec![count]);
-        for sub in 1..=u8::try_from(self.capacity(objects)).unwrap_or(u8::MAX) {
+        let capacity = u8::try_from(self.capacity(objects)).unwrap_or(u8::MAX);
+        let entries = u8::try_from(self.history.len()).unwrap_or(u8::MAX);
+        objects.put(HISTORY, vec![if capacity == 0 { self.count } else { entries }]);
+        for sub in 1..=capacity {
             let error = self.history.get(usize::from(sub) - 1).copied().unwrap_or(0);
             objects.put(HISTORY.with_sub(sub), error.to_le_bytes().to_vec());
         }
@@ -294,5 +300,12 @@ mod tests {
         let mut emergencies = Emergencies::new(&model.description);
         emergencies.raise(&mut objects, 0x3201, 1, 0x03);
         assert_eq!(frames(&objects, &mut emergencies), ["085#0132050000000000"]);
+        // The appendix lists 1003h:0 only, so the errors are counted without entries.
+        assert_eq!(objects.number(HISTORY), 1);
+        emergencies.clear(&mut objects, 0x3201, 1);
+        emergencies.raise(&mut objects, 0x3201, 1, 0x05);
+        assert_eq!(objects.number(HISTORY), 2);
+        emergencies.clear_history(&mut objects);
+        assert_eq!(objects.number(HISTORY), 0);
     }
 }

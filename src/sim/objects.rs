@@ -182,6 +182,15 @@ impl Objects {
         }
     }
 
+    /// Adds 1 to the objects with this name, if the device has any.
+    pub(super) fn count(&mut self, name: &str) {
+        let specs = Arc::clone(&self.specs);
+        for (object, spec) in specs.iter().filter(|(_, spec)| spec.name == name) {
+            let number = self.number(*object).saturating_add(1).to_le_bytes();
+            self.put(*object, number[..spec.data_type.width().unwrap_or(4).min(4)].to_vec());
+        }
+    }
+
     /// Sets and stores a value, as if it had been written and stored before.
     pub(super) fn preset(&mut self, object: ObjectId, bytes: Vec<u8>) {
         if self.has(object) {

@@ -280,6 +280,30 @@ fn dps_has_its_emergency_and_no_status() {
 }
 
 #[test]
+fn dps_counts_overloads_by_direction() {
+    let mut setup = still("dps", 127, 50.0);
+    let overload = |from, until, direction| {
+        (1, Overload { from: Duration::from_millis(from), until: Duration::from_millis(until), direction })
+    };
+    setup.overloads = vec![
+        overload(100, 200, Direction::High),
+        overload(300, 400, Direction::Low),
+        overload(500, 600, Direction::High),
+    ];
+    let mut bus = bus([setup]);
+    hear(&mut bus, ms(700));
+    // 2004h: above the span twice; 2005h: below it once; 1003h:0: three errors.
+    play(
+        &mut bus,
+        &[
+            ("67F#4004200000000000", "5FF#4204200002000000"),
+            ("67F#4005200000000000", "5FF#4205200001000000"),
+            ("67F#4003100000000000", "5FF#4203100003000000"),
+        ],
+    );
+}
+
+#[test]
 fn mc1609_sends_16_temperatures_in_four_tpdos() {
     let mut setup = still("mc1609", 3, 0.0);
     for channel in &mut setup.channels {

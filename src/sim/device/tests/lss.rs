@@ -152,6 +152,19 @@ fn lss_works_in_the_listed_states_only() {
     play(&mut bus, &[(select[0], "-"), (&product, "-"), (&revision, "-"), (select[3], "7E4#4401000000000000")]);
 }
 
+/// Figure 3 and table 10 of the DPS manual: NMT and LSS are available in the stopped state.
+#[test]
+fn dps_answers_lss_in_pre_operational_and_stopped() {
+    let mut bus = bus([still("dps", 127, 1.0)]);
+    let [vendor, product, revision, serial] =
+        ["7E5#4062030000000000", "7E5#4150314400000000", "7E5#4200000100000000", "7E5#43224E0000000000"];
+    play(&mut bus, &[(vendor, "77F#00"), (product, "-"), (revision, "-"), (serial, "7E4#4400000000000000")]);
+    play(&mut bus, &[("7E5#0400000000000000", "-"), ("000#027F", "-")]);
+    play(&mut bus, &[(vendor, "-"), (product, "-"), (revision, "-"), (serial, "7E4#4400000000000000")]);
+    play(&mut bus, &[("7E5#0400000000000000", "-"), ("000#017F", "-")]);
+    play(&mut bus, &[(vendor, "-"), (product, "-"), (revision, "-"), (serial, "-")]);
+}
+
 #[test]
 fn a_bit_rate_by_object() {
     let mut bus = bus([still("mh4", 5, 1.0)]);
