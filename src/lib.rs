@@ -1,34 +1,118 @@
-//! `cangauge`: find, configure and log CANopen measuring devices (CiA 404).
+//! `cangauge`: find, configure, check and record CANopen measuring devices (CiA 404).
 //!
-//! The layers, from the wire up. Each uses only those named after its arrow; `tests/layers.rs` holds that.
+//! This crate is a library and a command line program. A program that uses the library only needs
+//! `default-features = false`: the feature `cli` contains the command line and its dependencies.
 //!
-//! - [`canopen`] → nothing. CiA 301 as pure state machines and codecs. Decoding is total; never does I/O,
-//!   reads a clock, prints, or knows a device by name.
-//! - [`device`] → canopen. What is known of measuring devices: descriptions, units, CiA 404. Data first.
-//! - [`bus`] → canopen (frames). The trait [`bus::Bus`] and its transports. The only place with sockets,
-//!   clocks, signals and `unsafe`.
-//! - [`master`] → bus (the trait), device, canopen. Drives the machines over a bus: deadlines, retries,
-//!   matching. Never prints; time is told by what is received.
-//! - [`sim`] → bus, device, canopen (frames, ids, values only). Simulated devices, written from the
-//!   standard and the manuals and not with the client's encoders.
-//! - [`measure`] → device, canopen, bus (moments). From TPDOs and SDO answers to samples, and their
-//!   statistics. Drives no bus. When something came is an argument.
-//! - [`node`] → master, measure, device, canopen, bus (the trait). One node that the program talks to: what is known
-//!   of it, the only way to read and write it, the only wait loop.
-//! - [`tasks`] → node, measure, master, device, canopen, bus (the trait). The procedures that users think in.
-//!   They return reports and print nothing.
-//! - [`output`] → tasks (reports), node, measure, device, canopen (values), bus (moments, faults). Rows and text; knows no
-//!   transport and no command line.
-//! - [`cli`] → tasks, output, node, measure, master, sim, bus, device, canopen (values). Holds no protocol bytes and
-//!   no sockets. One file a subcommand.
+//! # Layers
+//!
+//! Each layer uses only the layers named after its arrow. `tests/layers.rs` checks this.
+//!
+//! - [`canopen`] → nothing. The protocols of CiA 301 and CiA 305 as state machines and codecs. Decoding is total:
+//!   each frame of 0 to 8 bytes gives a result or an error. No I/O, no clock, no device names.
+//! - [`device`] → canopen. Facts about devices: descriptions, units, channels of CiA 404, EDS files.
+//! - [`bus`] → canopen (frames). The trait [`bus::Bus`] and its transports: SocketCAN, recordings, memory. The only
+//!   layer with sockets, clocks, signals and `unsafe`.
+//! - [`master`] → bus (the trait), device, canopen. Drives the state machines: deadlines, retries, matching of answers,
+//!   many transfers in parallel.
+//! - [`measure`] → device, canopen, bus (moments). From frames and answers to samples: decoding, status, statistics,
+//!   expressions. It drives no bus.
+//! - [`node`] → master, measure, device, canopen, bus (the trait). One node: its identity, signals and TPDOs, and how it
+//!   is read, written and waited for.
+//! - [`sim`] → bus, device, canopen (values). Simulated devices. They are written from the standard and the manuals, not
+//!   with the encoders of the client.
+//! - [`tasks`] → node, measure, master, device, canopen, bus (the trait). The procedures of the commands: set a node-ID,
+//!   map a TPDO, record, check. They return typed reports and typed failures, and print nothing.
+//! - [`output`] → tasks (reports), node, measure, device, canopen (values), bus (moments, faults). All sentences, tables
+//!   and file formats. Part of the feature `cli`.
+//! - [`cli`] → tasks, output, node, measure, master, sim, bus, device, canopen (values). Arguments and help texts, one
+//!   file for each command. Part of the feature `cli`.
+//!
+//! # Read a sensor
+//!
+//! The simulated bus needs no hardware. On Linux, `cangauge::bus::socketcan` opens a real interface.
+//!
+//! ```
+//! use cangauge::canopen::id::NodeId;
+//! use cangauge::master::{Master, Timing};
+//! use cangauge::measure::sample::Number;
+//! use cangauge::node::{Overrides, survey::survey_nodes};
+//! use cangauge::sim::Bench;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut bus = Bench::parse("mh4@1,dps@127")?.open()?;
+//! let mut master = Master::new(&mut bus, Timing::default());
+//! let ids = [NodeId::new(1)?, NodeId::new(127)?];
+//! master.listen_to(&ids)?;
+//! for node in survey_nodes(&mut master, &ids, &Overrides::new())? {
+//!     for signal in &node.signals {
+//!         let (object, data_type) = signal.value;
+//!         let value = master.read(node.id, object, data_type)??;
+//!         let number = Number::from_value(&value, signal.digits.unwrap_or(0)).ok_or("not a number")?;
+//!         let unit = signal.unit.map(|unit| unit.to_string()).unwrap_or_default();
+//!         println!("node {}: {} = {number} {unit}", node.id, signal.name);
+//!     }
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Decode a TPDO
+//!
+//! Each mapping entry is a word of 1A00h: index, sub-index and number of bits.
+//!
+//! ```
+//! use cangauge::canopen::frame::Frame;
+//! use cangauge::canopen::pdo::{MappingEntry, lay_out};
+//! use cangauge::canopen::value::{DataType, Value};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // TPDO1 of an MH-4: pressure (6130h:1, REAL32) and its status (6150h:1, UNSIGNED8).
+//! let fields = lay_out(&[0x6130_0120, 0x6150_0108].map(MappingEntry::from_word));
+//! let frame: Frame = "181#2ED5A43F00".parse()?;
+//! let (bytes, length) = fields[0].bytes(frame.data()).ok_or("the frame is too short")?;
+//! assert_eq!(DataType::Real32.decode(&bytes[..length])?, Value::Real32(1.2877557));
+//! let (bytes, length) = fields[1].bytes(frame.data()).ok_or("the frame is too short")?;
+//! assert_eq!(DataType::Unsigned(1).decode(&bytes[..length])?, Value::Unsigned(0));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Simulate a device
+//!
+//! A bench file describes devices (`man cangauge-bench`). With the virtual clock, waiting takes no time.
+//!
+//! ```
+//! use cangauge::bus::{Bus, Event, Filters};
+//! use cangauge::sim::Bench;
+//! use std::path::Path;
+//! use std::time::Duration;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let bench = "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\nstart = true\n";
+//! let mut bus = Bench::from_toml(bench, Path::new(""))?.open()?;
+//! bus.listen(&Filters::All)?;
+//! let end = bus.now().mono + Duration::from_secs(1);
+//! let mut ids = Vec::new();
+//! bus.send(&"080#".parse()?)?; // SYNC
+//! while let Event::Frame(received) = bus.receive(end)? {
+//!     ids.push(received.frame.id().to_string());
+//! }
+//! assert_eq!(ids, ["705", "185"]); // boot-up, then TPDO1
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod bus;
 pub mod canopen;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod cli;
 pub mod device;
 pub mod master;
 pub mod measure;
 pub mod node;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod output;
 pub mod sim;
 pub mod tasks;

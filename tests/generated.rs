@@ -1,8 +1,9 @@
-//! `completions/` and `man/` are what the definition of the command line says, to the byte.
+//! `completions/` and `man/` are generated from the command line and from `src/cli/man/`.
 //!
-//! `UPDATE_GENERATED=1 cargo test --test generated` writes them anew.
+//! `UPDATE_GENERATED=1 cargo test --test generated` rewrites them.
 
 use cangauge::cli::{Cli, program};
+use cangauge::sim::Bench;
 use clap::{Command, CommandFactory};
 use clap_complete::Shell;
 use clap_mangen::Man;
@@ -11,7 +12,14 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// A folder's files by name.
+/// The date in the manual pages. Change it with the release.
+const DATE: &str = "2026-11-28";
+
+/// Hand-written pages, and sections that are added to a generated page of the same name. `@DATE@` and `@VERSION@` are
+/// replaced.
+const HAND_WRITTEN: &str = "src/cli/man";
+
+/// The files of a folder by name.
 type Files = BTreeMap<String, Vec<u8>>;
 
 fn completions() -> Files {
@@ -33,48 +41,110 @@ fn man() -> Files {
     let mut root = program().disable_help_subcommand(true);
     root.build();
     let mut pages = Files::new();
+    let mut hand_written = hand_written();
     let mut waiting = vec![root];
     while let Some(command) = waiting.pop() {
         waiting.extend(command.get_subcommands().filter(|command| !command.is_hide_set()).cloned());
         let name = Man::new(command.clone()).get_filename();
-        pages.insert(name, page(command).expect("memory"));
+        let page = page(command, hand_written.remove(&name).as_ref()).expect("memory");
+        pages.insert(name, page);
     }
+    // The other hand-written texts are complete pages.
+    pages.extend(hand_written.into_iter().map(|(name, text)| (name, text.into_bytes())));
     pages
 }
 
-/// A page as `Man::render` makes it, but with the paragraphs below the options under headings of their own
-/// and line by line, as they are in the help.
-fn page(command: Command) -> io::Result<Vec<u8>> {
+fn version() -> String {
+    format!("cangauge {}", env!("CARGO_PKG_VERSION"))
+}
+
+/// The hand-written pages and sections by file name.
+fn hand_written() -> BTreeMap<String, String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(HAND_WRITTEN);
+    let entries = fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path());
+    entries
+        .map(|path| {
+            let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+            let text = fs::read_to_string(&path).expect("a text");
+            (name, text.replace("@DATE@", DATE).replace("@VERSION@", &version()))
+        })
+        .collect()
+}
+
+/// Escapes a text for roff.
+fn escape(text: &str) -> String {
+    text.replace('\\', "\\e").replace('-', "\\-")
+}
+
+/// The page of a command. It differs from `Man::render`: the synopsis is short, the text after the options keeps its
+/// lines and has a heading for each paragraph, hand-written sections follow, and the last section names related pages.
+fn page(command: Command, hand_written: Option<&String>) -> io::Result<Vec<u8>> {
     let notes = command.get_after_help().map(ToString::to_string).unwrap_or_default();
     let has_subcommands = command.has_subcommands();
-    let version = format!("cangauge {}", env!("CARGO_PKG_VERSION"));
-    let man = Man::new(command).source(version).manual("cangauge");
+    let (synopsis, see_also) = (synopsis(&command), see_also(&command));
+    let title = command.get_display_name().unwrap_or(command.get_name()).to_uppercase();
+    let man = Man::new(command).title(title).date(DATE).source(version()).manual("cangauge");
     let mut page = Vec::new();
     man.render_title(&mut page)?;
     man.render_name_section(&mut page)?;
-    man.render_synopsis_section(&mut page)?;
+    page.extend(synopsis.as_bytes());
     man.render_description_section(&mut page)?;
     man.render_options_section(&mut page)?;
     if has_subcommands {
         man.render_subcommands_section(&mut page)?;
     }
     for paragraph in notes.split("\n\n").filter(|paragraph| !paragraph.is_empty()) {
-        let heading = paragraph.split([':', ',']).next().unwrap_or_default();
-        let text = paragraph.strip_prefix(heading).and_then(|text| text.strip_prefix(':')).unwrap_or(paragraph);
+        let heading = paragraph.split([':', ',', '(']).next().unwrap_or_default().trim_end();
+        let text = paragraph.split_once(":\n").map_or(paragraph, |(_, text)| text);
         writeln!(page, ".SH \"{}\"\n.nf", heading.to_uppercase())?;
-        for line in text.strip_prefix('\n').unwrap_or(text.trim_start()).lines() {
-            let line = line.replace('\\', "\\e").replace('-', "\\-");
-            // A point or an apostrophe at its begin would be a command.
+        for line in text.lines() {
+            // A point or an apostrophe at the start of a line would be a macro.
             let guard = if line.starts_with(['.', '\'']) { "\\&" } else { "" };
-            writeln!(page, "{guard}{line}")?;
+            writeln!(page, "{guard}{}", escape(line))?;
         }
         writeln!(page, ".fi")?;
     }
-    // Each section brings the definition of the apostrophe: once is enough.
+    page.extend(hand_written.map(String::as_bytes).unwrap_or_default());
+    page.extend(see_also.as_bytes());
+    // Each section starts with the definition of the apostrophe: once is enough.
     let text = String::from_utf8_lossy(&page);
     let preamble: String = text.split_inclusive('\n').take(2).collect();
-    let body = text.replace(&preamble, "");
-    Ok((preamble + &body).into_bytes())
+    let body = text.replace(&preamble, "").replace(".br\n\n.br\n", ".sp\n");
+    let body: Vec<&str> = body.lines().map(str::trim_end).collect();
+    Ok((preamble + &body.join("\n") + "\n").into_bytes())
+}
+
+/// The usage line of the help, with the names of the arguments in italics.
+fn synopsis(command: &Command) -> String {
+    let usage = command.clone().render_usage().to_string();
+    let mut text = String::from(".SH SYNOPSIS\n.nf\n");
+    for line in usage.trim_start_matches("Usage: ").lines().map(str::trim).filter(|line| !line.is_empty()) {
+        let name = line.find(" [").into_iter().chain(line.find(" <")).min().unwrap_or(line.len());
+        let (name, arguments) = line.split_at(name);
+        let arguments = escape(arguments).replace('<', "\\fI").replace('>', "\\fR");
+        text.push_str(&format!("\\fB{}\\fR{arguments}\n", escape(name)));
+    }
+    text + ".fi\n"
+}
+
+/// References to the pages of the subcommands, of the parent commands and of the formats.
+fn see_also(command: &Command) -> String {
+    let page = command.get_display_name().unwrap_or(command.get_name());
+    let mut pages: Vec<(String, u8)> = command
+        .get_subcommands()
+        .filter(|sub| !sub.is_hide_set())
+        .map(|sub| (format!("{page}-{}", sub.get_name()), 1))
+        .collect();
+    pages.extend(page.match_indices('-').map(|(at, _)| (page[..at].to_owned(), 1)));
+    if ["cangauge", "cangauge-log", "cangauge-check"].contains(&page) {
+        pages.push(("cangauge-recording".to_owned(), 5));
+    }
+    if ["cangauge", "cangauge-sim"].contains(&page) {
+        pages.push(("cangauge-bench".to_owned(), 5));
+    }
+    pages.push(("cangauge-concepts".to_owned(), 7));
+    let lines: Vec<String> = pages.iter().map(|(name, section)| format!(".BR {} ({section})", escape(name))).collect();
+    format!(".SH SEE ALSO\n{}\n", lines.join(",\n"))
 }
 
 fn check(folder: &str, wanted: &Files) {
@@ -128,4 +198,36 @@ fn man_pages_are_up_to_date() {
         assert!(page.is_ascii(), "{name} is for any terminal");
     }
     check("man", &pages);
+}
+
+/// The names in the error of an unknown key are all keys that the parser knows.
+#[test]
+fn every_key_of_a_bench_file_has_an_entry_in_its_page() {
+    let page = &hand_written()["cangauge-bench.5"];
+    let device = "[[device]]\nkind = \"mh4\"\nnode = 5\n";
+    let channel = format!("{device}[[device.channel]]\nchannel = 1\n");
+    let overload = format!("{device}[[device.overload]]\nchannel = 1\nfrom = \"1s\"\ndirection = \"low\"\n");
+    for table in ["", device, &format!("{device}[device.lss]\n"), &channel, &overload] {
+        let error = Bench::from_toml(&format!("{table}unknown = 1\n"), Path::new("")).err().expect(table).to_string();
+        let names: Vec<&str> = error.split('`').skip(3).step_by(2).collect();
+        assert!(names.len() > 3, "{error}");
+        for name in names {
+            let entry = format!("\\fB{name}\\fR");
+            assert!(
+                page.contains(&entry)
+                    || page.contains(&format!("\\fB[[device.{name}]]\\fR"))
+                    || page.contains(&format!("\\fB[[{name}]]\\fR")),
+                "{name} is not in cangauge-bench.5"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_example_of_the_bench_page_is_a_bench() {
+    let page = &hand_written()["cangauge-bench.5"];
+    let example = page.split(".EX\n").nth(1).and_then(|rest| rest.split(".EE").next()).expect("an example");
+    if let Err(error) = Bench::from_toml(&example.replace("\\-", "-"), Path::new("")) {
+        panic!("{error}");
+    }
 }

@@ -1,10 +1,9 @@
 //! `cangauge check`.
 
 use super::args::{BusSpec, Duration, Nodes};
-use super::exit::stdout;
 use super::file::OutFile;
 use super::recording::{print_event, refuse_to_send, sync_interval};
-use super::{Format, Global, open};
+use super::{Global, open};
 use crate::bus::Stamp;
 use crate::bus::claim::{Claim, Claims};
 use crate::canopen::id::NodeId;
@@ -14,12 +13,12 @@ use crate::measure::sample::{Sample, Source};
 use crate::output::check_progress::CheckProgress;
 use crate::output::console::Console;
 use crate::output::events::{remark_text, words};
+use crate::output::failure::ErrorMessage;
 use crate::output::{junit, verdict};
 use crate::tasks::check::{CheckOptions, CheckReport, all_satisfied, check};
 use crate::tasks::log::{Mode, Note, Observer};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
-use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -95,21 +94,21 @@ impl Check {
         if let Some(mut file) = file {
             file.write(junit::document(&report).as_bytes())?;
         }
-        print(&report, global.format).map_err(stdout)?;
+        global.print(&verdict::rows(&report))?;
         Ok(all_satisfied(&report.verdicts, &report.failures)?)
     }
 
     /// Checks the arguments that need no bus.
-    fn validate(&self, global: &Global) -> Result<(), Failure> {
+    fn validate(&self, global: &Global) -> anyhow::Result<()> {
         if let Nodes::These(nodes) = &self.nodes {
-            self.expressions.iter().try_for_each(|expression| expression.check_nodes(nodes))?;
+            self.expressions.iter().try_for_each(|expression| expression.check_nodes(nodes)).map_err(Failure::from)?;
         }
         let function = self.expressions.iter().find_map(Expression::needs_many_samples);
         let is_replay = matches!(global.bus, Some(BusSpec::Replay(_)));
         match function.filter(|_| self.duration.is_none() && !is_replay) {
             Some(function) => {
                 let message = format!("{}() needs more than one reading", function.as_str());
-                Err(Failure::new(Kind::Usage, message).hint("measure for some time: --for 10s"))
+                Err(ErrorMessage::usage(message).hint("measure for some time: --for 10s").into())
             }
             None => Ok(()),
         }
@@ -151,16 +150,6 @@ impl Check {
             (None, None) => Mode::AsSent,
         }
     }
-}
-
-fn print(report: &CheckReport, format: Format) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    match format {
-        Format::Text => verdict::lines(&mut out, &report.verdicts, &report.failures)?,
-        Format::Json => verdict::json(&mut out, &report.verdicts, &report.failures)?,
-        Format::Csv => verdict::csv(&mut out, &report.verdicts, &report.failures)?,
-    }
-    out.flush()
 }
 
 /// Shows the progress of a check on stderr.

@@ -68,10 +68,9 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bus::{Mono, Stamp, Wall};
+    use crate::bus::{BusError, Mono, Stamp, Wall};
     use crate::canopen::id::NodeId;
     use crate::measure::expression::verdict::Reason;
-    use crate::tasks::Kind;
     use std::time::Duration;
 
     #[test]
@@ -89,7 +88,7 @@ mod tests {
             verdicts: vec![ok, fail, none],
             started: Some(Stamp { mono: Mono::START, wall: Wall::at(Duration::from_secs(1_700_000_000)) }),
             length: Duration::from_millis(1500),
-            failures: vec![Failure::new(Kind::NoAnswer, "\"no\" <answer> & more\u{1b}\n")],
+            failures: vec![BusError::NoInterface("<a> & 'b'\u{1b}\n".to_owned()).into()],
             remarks: Vec::new(),
         };
         assert_eq!(
@@ -104,7 +103,7 @@ mod tests {
              \x20     <failure type=\"check-failed\" message=\"\">a in 1..2: </failure>\n\
              \x20   </testcase>\n\
              \x20   <testcase classname=\"cangauge\" name=\"|a| &lt; 1\" time=\"1.500\">\n\
-             \x20     <error type=\"no-answer\" message=\"no data: &quot;no&quot; &lt;answer&gt; &amp; more\u{fffd}&#10;\">|a| &lt; 1: no data: &quot;no&quot; &lt;answer&gt; &amp; more\u{fffd}&#10;</error>\n\
+             \x20     <error type=\"no-answer\" message=\"no data: there is no CAN interface &quot;&lt;a&gt; &amp; &apos;b&apos;\u{fffd}&#10;&quot;\">|a| &lt; 1: no data: there is no CAN interface &quot;&lt;a&gt; &amp; &apos;b&apos;\u{fffd}&#10;&quot;</error>\n\
              \x20   </testcase>\n\
              \x20 </testsuite>\n\
              </testsuites>\n"

@@ -1,13 +1,13 @@
-//! Verdicts as text, JSON Lines and CSV.
+//! Verdicts: their columns and their text.
 
 use super::failure::ErrorMessage;
+use super::report::{Cell, Column, Report};
 use super::table::{Align, write};
 use super::text::{grouped, significant};
-use crate::canopen::id::NodeId;
 use crate::measure::expression::verdict::{Outcome, QuantityValue, Reason, Verdict, Violation};
-use crate::measure::sample::Status;
+use crate::measure::sample::{Number, Status};
 use crate::tasks::Failure;
-use serde::Serialize;
+use crate::tasks::check::CheckReport;
 use std::io::{self, Write};
 
 /// Significant digits of a calculated value.
@@ -17,26 +17,12 @@ const CALCULATED_DIGITS: usize = 7;
 const MAX_EXACT_LENGTH: usize = 11;
 
 /// The word for an outcome in text output.
-pub fn word(outcome: Outcome) -> &'static str {
+fn word(outcome: Outcome) -> &'static str {
     match outcome {
         Outcome::Ok => "ok",
         Outcome::Fail => "FAIL",
         Outcome::NoData => "none",
     }
-}
-
-/// Writes the verdicts as aligned lines. If the nodes differ, there is a column for the node.
-pub fn lines(out: &mut dyn Write, verdicts: &[Verdict], failures: &[Failure]) -> io::Result<()> {
-    let has_several_nodes = verdicts.windows(2).any(|pair| pair[0].node != pair[1].node);
-    let row = |verdict: &Verdict| {
-        let node = verdict.node.map_or_else(|| "-".to_owned(), |node| node.to_string());
-        let mut row = vec![format!("{:<4}", word(verdict.outcome))];
-        row.extend(has_several_nodes.then_some(node));
-        row.extend([verdict.text.clone(), findings(verdict, failures)]);
-        row
-    };
-    let rows: Vec<Vec<String>> = verdicts.iter().map(row).collect();
-    write(out, &[Align::Left; 4][..if has_several_nodes { 4 } else { 3 }], &rows)
 }
 
 /// The values that led to a verdict: `10.003 bar (n 100, 9.998..10.009)`.
@@ -71,7 +57,7 @@ pub fn findings(verdict: &Verdict, failures: &[Failure]) -> String {
 }
 
 /// The text of a reason. [`Reason::Failed`] takes the message of the failure.
-pub fn reason_text(reason: &Reason, failures: &[Failure]) -> String {
+fn reason_text(reason: &Reason, failures: &[Failure]) -> String {
     match reason {
         Reason::Failed(at) => {
             failures.get(*at).map_or_else(|| "not measured".to_owned(), |failure| ErrorMessage::of(failure).message)
@@ -127,36 +113,6 @@ fn number(quantity: &QuantityValue, value: f64) -> String {
     }
 }
 
-#[derive(Serialize)]
-struct JsonValue<'a> {
-    quantity: &'a str,
-    value: Option<f64>,
-    unit: Option<String>,
-    min: Option<f64>,
-    max: Option<f64>,
-}
-
-#[derive(Serialize)]
-struct JsonViolation {
-    time: String,
-    elapsed_s: f64,
-    values: Vec<Option<f64>>,
-    status: Option<&'static str>,
-}
-
-#[derive(Serialize)]
-struct JsonVerdict<'a> {
-    expression: &'a str,
-    node: Option<u8>,
-    verdict: &'a str,
-    count: u64,
-    violations: u64,
-    invalid: u64,
-    values: Vec<JsonValue<'a>>,
-    first: Option<JsonViolation>,
-    reason: Option<String>,
-}
-
 /// The word for an outcome in JSON and CSV.
 fn field(outcome: Outcome) -> &'static str {
     match outcome {
@@ -166,45 +122,83 @@ fn field(outcome: Outcome) -> &'static str {
     }
 }
 
-/// Writes the verdicts as JSON Lines.
-pub fn json(out: &mut dyn Write, verdicts: &[Verdict], failures: &[Failure]) -> io::Result<()> {
-    for verdict in verdicts {
-        let values = verdict.values.iter().map(|value| {
-            let (min, max) = value.range.unzip();
-            let unit = value.unit.map(|unit| unit.to_string());
-            JsonValue { quantity: &value.name, value: value.value, unit, min, max }
-        });
-        let first = verdict.first.as_ref().map(|first| JsonViolation {
-            time: humantime::format_rfc3339_micros(first.at.wall.system_time()).to_string(),
-            elapsed_s: (first.elapsed.as_secs_f64() * 1e6).round() / 1e6,
-            values: first.values.clone(),
-            status: first.status.map(Status::as_str),
-        });
-        let object = JsonVerdict {
-            expression: &verdict.text,
-            node: verdict.node.map(NodeId::get),
-            verdict: field(verdict.outcome),
-            count: verdict.count,
-            violations: verdict.violations,
-            invalid: verdict.invalid,
-            values: values.collect(),
-            first,
-            reason: verdict.reason.as_ref().map(|reason| reason_text(reason, failures)),
-        };
-        super::json::line(out, &object)?;
-    }
-    Ok(())
+/// A verdict with the failures that its reason refers to.
+#[derive(Clone, Copy, Debug)]
+pub struct VerdictRow<'a> {
+    verdict: &'a Verdict,
+    failures: &'a [Failure],
 }
 
-/// Writes the verdicts as CSV.
-pub fn csv(out: &mut dyn Write, verdicts: &[Verdict], failures: &[Failure]) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(["expression", "node", "verdict", "count", "violations", "invalid", "findings"])?;
-    for verdict in verdicts {
-        let node = verdict.node.map(|node| node.to_string()).unwrap_or_default();
-        let [count, violations, invalid] = [verdict.count, verdict.violations, verdict.invalid].map(|n| n.to_string());
-        let findings = findings(verdict, failures);
-        csv.write_record([&verdict.text, &node, field(verdict.outcome), &count, &violations, &invalid, &findings])?;
+/// The rows of a check.
+pub fn rows(report: &CheckReport) -> Vec<VerdictRow<'_>> {
+    report.verdicts.iter().map(|verdict| VerdictRow { verdict, failures: &report.failures }).collect()
+}
+
+impl Report for VerdictRow<'_> {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("expression"),
+        Column::new("node"),
+        Column::new("verdict"),
+        Column::new("count"),
+        Column::new("violations"),
+        Column::new("invalid"),
+        Column::new("values").json_only(),
+        Column::new("first").json_only(),
+        Column::new("reason").json_only(),
+        Column::new("findings").csv_only(),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let VerdictRow { verdict, failures } = self;
+        vec![
+            verdict.text.as_str().into(),
+            verdict.node.into(),
+            field(verdict.outcome).into(),
+            verdict.count.into(),
+            verdict.violations.into(),
+            verdict.invalid.into(),
+            Cell::List(verdict.values.iter().map(quantity_cell).collect()),
+            verdict.first.as_ref().map_or(Cell::Null, violation_cell),
+            verdict.reason.as_ref().map(|reason| reason_text(reason, failures)).into(),
+            findings(verdict, failures).into(),
+        ]
     }
-    csv.flush()
+
+    fn text(reports: &[Self], out: &mut dyn Write) -> io::Result<()> {
+        let has_several_nodes = reports.windows(2).any(|pair| pair[0].verdict.node != pair[1].verdict.node);
+        let row = |row: &VerdictRow<'_>| {
+            let VerdictRow { verdict, failures } = row;
+            let node = verdict.node.map_or_else(|| "-".to_owned(), |node| node.to_string());
+            let mut cells = vec![format!("{:<4}", word(verdict.outcome))];
+            cells.extend(has_several_nodes.then_some(node));
+            cells.extend([verdict.text.clone(), findings(verdict, failures)]);
+            cells
+        };
+        let rows: Vec<Vec<String>> = reports.iter().map(row).collect();
+        write(out, &[Align::Left; 4][..if has_several_nodes { 4 } else { 3 }], &rows)
+    }
+}
+
+fn real(value: Option<f64>) -> Cell {
+    value.map(Number::Real64).into()
+}
+
+fn quantity_cell(value: &QuantityValue) -> Cell {
+    let (min, max) = value.range.unzip();
+    Cell::Object(vec![
+        ("quantity", value.name.as_str().into()),
+        ("value", real(value.value)),
+        ("unit", value.unit.map(|unit| unit.to_string()).into()),
+        ("min", real(min)),
+        ("max", real(max)),
+    ])
+}
+
+fn violation_cell(first: &Violation) -> Cell {
+    Cell::Object(vec![
+        ("time", humantime::format_rfc3339_micros(first.at.wall.system_time()).to_string().into()),
+        ("elapsed_s", Cell::Real(first.elapsed.as_secs_f64(), 6)),
+        ("values", Cell::List(first.values.iter().map(|&value| real(value)).collect())),
+        ("status", first.status.into()),
+    ])
 }

@@ -14,9 +14,9 @@ use crate::measure::expression::verdict::{MissingData, Outcome, Reason, Verdict}
 use crate::measure::sample::{Sample, Source};
 use crate::node::survey::survey_each;
 use crate::node::{Node, Overrides};
+use crate::tasks::Failure;
 use crate::tasks::log::{self, Mode, Note, Observer, RecordingReport, Remark, log};
 use crate::tasks::read::{Target, requests, sample, targets};
-use crate::tasks::{Failure, Kind};
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -76,18 +76,18 @@ impl CheckReport {
 /// `check-failed` if an expression is not satisfied. Otherwise, if data is missing: the failure that all missing data
 /// has in common, else `no-answer`.
 pub fn all_satisfied(verdicts: &[Verdict], failures: &[Failure]) -> Result<(), Failure> {
-    let count = |outcome| verdicts.iter().filter(|verdict| verdict.outcome == outcome).count();
-    let (failed, without, all) = (count(Outcome::Fail), count(Outcome::NoData), verdicts.len());
-    let word = if all == 1 { "check" } else { "checks" };
-    if failed > 0 {
-        return Err(Failure::new(Kind::CheckFailed, format!("{failed} of {all} {word} failed")));
+    let failed: Vec<Verdict> = verdicts.iter().filter(|verdict| verdict.outcome == Outcome::Fail).cloned().collect();
+    let without = verdicts.iter().filter(|verdict| verdict.outcome == Outcome::NoData).count();
+    let all = verdicts.len();
+    if !failed.is_empty() {
+        return Err(Failure::general(CheckFailure::NotSatisfied { failed, all }));
     }
     if without == 0 {
         return Ok(());
     }
     Err(match failures {
         [first, others @ ..] if others.iter().all(|other| other.kind() == first.kind()) => first.clone(),
-        _ => Failure::new(Kind::NoAnswer, format!("no data for {without} of {all} {word}")),
+        _ => Failure::general(CheckFailure::NoData { without, all }),
     })
 }
 

@@ -49,9 +49,19 @@ fn one_reading() {
          ok    temperature < 60     25.5 degC\n\
          FAIL  pressure >= 1.3 bar  1.25 bar\n"
     );
-    assert_eq!(done.stderr, "cangauge: 2 of 3 checks failed\n");
+    assert_eq!(
+        done.stderr,
+        "cangauge: 2 of 3 checks failed: node 5: pressure < 1.25: 1.25 bar; node 5: pressure >= 1.3 bar: 1.25 bar\n"
+    );
     check(&bench, &["5", "0x6130:1 == 1.25 and pressure.status == 0"])
         .prints("ok    0x6130:1 == 1.25 and pressure.status == 0  0x6130:1 1.25, pressure.status 0\n");
+}
+
+#[test]
+fn the_error_names_expression_and_value() {
+    let bench = constant();
+    let error = check(&bench, &["5", "pressure < 1 bar", "-q", "-f", "json"]).exit(1).error();
+    assert_eq!(error["error"]["message"], json!("1 of 1 check failed: node 5: pressure < 1 bar: 1.25 bar"));
 }
 
 #[test]
@@ -158,7 +168,8 @@ fn an_invalid_sample_fails() {
     assert!(lines[0].contains(" (n 100, ") && lines[0].contains(" invalid, "), "{}", lines[0]);
     assert!(lines[1].starts_with("ok    invalid(pressure) in 15..25  "), "{}", lines[1]);
     assert!(lines[2].starts_with("FAIL  mean(pressure) < 1000  "), "{}", lines[2]);
-    assert_eq!(done.stderr.lines().last(), Some("cangauge: 2 of 3 checks failed"));
+    let last = done.stderr.lines().last().expect("an error");
+    assert!(last.starts_with("cangauge: 2 of 3 checks failed: node 5: pressure < 1000: overload-high at 0."), "{last}");
     let always = Bench::described(
         "[[device]]\nkind = \"mh4\"\nnode = 5\n[[device.overload]]\nchannel = 1\nfrom = \"0s\"\ndirection = \"low\"\n",
     );
@@ -255,7 +266,8 @@ fn log_with_expressions() {
     assert!(done.stderr.contains("ok: node 5: pressure in 1..2 bar: 1.25 bar (n "), "{}", done.stderr);
     let done = log(&["--expect", "pressure < 1 bar", "--summary", "summary.json"]).exit(1);
     assert!(done.stderr.contains("warning: failed: node 5: pressure < 1 bar: 1.25 bar at "), "{}", done.stderr);
-    assert_eq!(done.stderr.lines().last(), Some("cangauge: 1 of 1 check failed"));
+    let last = done.stderr.lines().last().expect("an error");
+    assert!(last.starts_with("cangauge: 1 of 1 check failed: node 5: pressure < 1 bar: 1.25 bar at "), "{last}");
     assert_eq!(bench.text("run.csv").lines().count(), 21, "the file stays");
     assert!(bench.text("summary.json").contains("\"rows\":20"));
     log(&["--expect", "6.pressure < 1"]).refuses("node 6 is not one of the given nodes");

@@ -21,18 +21,14 @@ fn examples() -> BTreeSet<String> {
         texts.push(command.render_long_help().to_string());
         commands.extend(command.get_subcommands().cloned());
     }
-    let lines = texts.iter().flat_map(|text| text.lines()).map(str::trim).map(|line| {
-        match line.strip_prefix("cargo run -- ") {
-            Some(rest) => format!("cangauge {rest}"),
-            None => line.to_owned(),
-        }
-    });
+    let lines = texts.iter().flat_map(|text| text.lines()).map(str::trim);
+    let lines = lines.map(|line| line.trim_start_matches("- ").to_owned());
     let examples = lines.filter(|line| line.starts_with("cangauge ") && !line.contains("CHANNEL"));
     examples.map(|line| line.split("  ").next().unwrap_or_default().trim_end_matches(" &").to_owned()).collect()
 }
 
 /// The words of a line as a shell makes them of it, as far as examples need it: blanks, and single quotes.
-fn words(line: &str) -> Vec<String> {
+pub(super) fn words(line: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     for (at, part) in line.split('\'').enumerate() {
         let mut pieces = if at % 2 == 1 { vec![part] } else { part.split(' ').collect() }.into_iter();

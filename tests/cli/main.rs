@@ -22,6 +22,7 @@ mod nmt;
 mod output;
 mod pdo;
 mod read;
+mod readme;
 mod replay;
 mod scan;
 mod sdo;

@@ -1,10 +1,34 @@
 //! Text for causes: a check failed or had no data.
 
 use super::Words;
+use crate::measure::expression::verdict::Verdict;
+use crate::output::verdict::findings;
 use crate::tasks::Failure;
 use crate::tasks::check::CheckFailure;
 
+/// How many failed expressions a message lists.
+const MAX_LISTED: usize = 3;
+
 /// The message and the hint for a cause.
 pub(super) fn words(_failure: &Failure, cause: &CheckFailure) -> Words {
-    match *cause {}
+    match cause {
+        CheckFailure::NotSatisfied { failed, all } => {
+            let mut list: Vec<String> = failed.iter().take(MAX_LISTED).map(describe).collect();
+            if failed.len() > MAX_LISTED {
+                list.push(format!("{} more", failed.len() - MAX_LISTED));
+            }
+            Words::new(format!("{} of {all} {} failed: {}", failed.len(), checks(*all), list.join("; ")))
+        }
+        CheckFailure::NoData { without, all } => Words::new(format!("no data for {without} of {all} {}", checks(*all))),
+    }
+}
+
+/// `node 5: pressure < 1 bar: 1.25 bar`.
+fn describe(verdict: &Verdict) -> String {
+    let node = verdict.node.map(|node| format!("node {node}: ")).unwrap_or_default();
+    format!("{node}{}: {}", verdict.text, findings(verdict, &[]))
+}
+
+fn checks(number: usize) -> &'static str {
+    if number == 1 { "check" } else { "checks" }
 }

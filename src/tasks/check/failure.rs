@@ -1,16 +1,35 @@
 //! Causes of failures: a check failed or had no data.
 
+use crate::measure::expression::verdict::Verdict;
 use crate::tasks::Kind;
 use crate::tasks::failure::Cause;
 
 /// A check failed or had no data.
 #[derive(Clone, Debug, PartialEq)]
-pub enum CheckFailure {}
+pub enum CheckFailure {
+    /// At least one expression is not satisfied.
+    NotSatisfied {
+        /// The verdicts of these expressions.
+        failed: Vec<Verdict>,
+        /// The number of all verdicts.
+        all: usize,
+    },
+    /// There is no data for at least one expression.
+    NoData {
+        /// The number of verdicts without data.
+        without: usize,
+        /// The number of all verdicts.
+        all: usize,
+    },
+}
 
 impl CheckFailure {
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
-        match *self {}
+        match self {
+            CheckFailure::NotSatisfied { .. } => Kind::CheckFailed,
+            CheckFailure::NoData { .. } => Kind::NoAnswer,
+        }
     }
 }
 

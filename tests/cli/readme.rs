@@ -1,0 +1,118 @@
+//! The README: its terminal picture shows real output, and its commands work as printed.
+
+use super::examples::words;
+use super::{ALL, Bench};
+use cangauge::cli::Cli;
+use clap::Parser;
+use clap::error::ErrorKind;
+use std::fs;
+use std::io::ErrorKind as IoError;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The commands of the terminal picture.
+const PICTURE: [&str; 4] = [
+    "cangauge -b sim scan",
+    "cangauge -b sim read 1,127",
+    "cangauge -b sim log 1,127 --sync 100ms --duration 10s -o run.csv",
+    "cangauge -b sim check 1 'pressure in 0.5..2 bar' 'temperature < 20 degC'",
+];
+
+/// The lines around the terminal picture.
+const START: &str = "<!-- terminal: UPDATE_GENERATED=1 cargo test --test cli readme -->\n";
+const END: &str = "<!-- end -->\n";
+
+fn path() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")
+}
+
+fn text() -> String {
+    fs::read_to_string(path()).expect("the README")
+}
+
+/// The fenced blocks of a language.
+fn blocks(language: &str) -> Vec<String> {
+    let start = format!("```{language}\n");
+    let text = text();
+    text.split(&start).skip(1).filter_map(|rest| rest.split("```").next()).map(str::to_owned).collect()
+}
+
+/// Runs the commands on the devices of `-b sim`, with the virtual clock: the output is always the same.
+fn picture() -> String {
+    let bench = Bench::of(ALL);
+    let mut picture = String::from("```text\n");
+    let mut code = None;
+    for command in PICTURE {
+        let words = words(command);
+        let words: Vec<&str> = words.iter().skip(3).map(String::as_str).collect();
+        let done = bench.run_words(&words);
+        picture.push_str(&format!("$ {command}\n{}{}\n", done.stdout, done.stderr));
+        code = done.code;
+    }
+    format!("{picture}$ echo $?\n{}\n```\n", code.expect("an exit code"))
+}
+
+#[test]
+fn the_terminal_picture_is_up_to_date() {
+    let readme = text();
+    let (before, rest) = readme.split_once(START).expect("the start of the picture");
+    let (_, after) = rest.split_once(END).expect("the end of the picture");
+    let wanted = format!("{before}{START}{}{END}{after}", picture());
+    if std::env::var_os("UPDATE_GENERATED").is_some_and(|value| value == "1") {
+        fs::write(path(), wanted).expect("written");
+    } else {
+        assert!(
+            readme == wanted,
+            "the picture is stale: UPDATE_GENERATED=1 cargo test --test cli readme\n{}",
+            picture()
+        );
+    }
+}
+
+/// The path of a shell that finds the program.
+fn search_path() -> String {
+    let folder = Path::new(env!("CARGO_BIN_EXE_cangauge")).parent().expect("a folder");
+    format!("{}:{}", folder.display(), std::env::var("PATH").unwrap_or_default())
+}
+
+#[test]
+#[cfg(unix)]
+fn commands_on_the_simulated_bus_work_as_printed() {
+    let blocks: Vec<String> = blocks("sh").into_iter().filter(|block| block.contains("-b sim ")).collect();
+    assert!(!blocks.is_empty());
+    for block in blocks {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut shell = Command::new("sh");
+        shell.env("PATH", search_path()).current_dir(folder.path()).args(["-e", "-c", &block]);
+        let done = shell.output().expect("sh");
+        assert!(done.status.success(), "{block}\n{}", String::from_utf8_lossy(&done.stderr));
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn the_python_example_works() {
+    let [example] = blocks("python").try_into().expect("one example");
+    let done = match Command::new("python3").env("PATH", search_path()).args(["-c", &example]).output() {
+        Err(error) if error.kind() == IoError::NotFound => return eprintln!("SKIPPED: there is no python3"),
+        done => done.expect("python3"),
+    };
+    let stdout = String::from_utf8_lossy(&done.stdout);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert_eq!(stdout.lines().count(), 3, "{stdout}");
+    assert!(stdout.starts_with("1 pressure 1.") && stdout.contains(" psi None\n"), "{stdout}");
+}
+
+#[test]
+fn commands_in_the_text_are_understood() {
+    let text = text();
+    let commands = text.split('`').skip(1).step_by(2).filter(|code| code.starts_with("cangauge "));
+    let commands: Vec<&str> = commands.filter(|code| !code.contains("COMMAND")).collect();
+    assert!(commands.len() > 3, "{commands:?}");
+    for command in commands {
+        match Cli::try_parse_from(words(command)) {
+            Err(error) if error.kind() != ErrorKind::DisplayHelp => panic!("{command}: {error}"),
+            _ => {}
+        }
+    }
+}
