@@ -95,20 +95,106 @@ const PRINTING: [&str; 5] = ["print", "println", "eprint", "eprintln", "dbg"];
 
 /// The files with `unsafe`: how often it occurs, and why.
 const UNSAFE: &[(&str, usize, &str)] = &[
-    ("bus/claim.rs", 1, "SO_PEERCRED: std has no stable call for the credentials of a peer"),
+    ("bus/claim/holder.rs", 1, "SO_PEERCRED: std has no stable call for the credentials of a peer"),
+    ("bus/interrupt.rs", 1, "sigaction: std cannot read the action of a signal"),
     ("bus/poll.rs", 2, "ppoll and poll: std cannot wait for a descriptor"),
     ("bus/socketcan/receive.rs", 3, "recvmmsg and its zeroed headers: no safe crate returns the drop counter"),
     ("bus/socketcan/socket.rs", 1, "SO_MEMINFO: neither socket2 nor the socketcan crate reads it"),
 ];
 
 /// The longest file in lines.
-const FILE_LINES: usize = 600;
+const FILE_LINES: usize = 500;
 
 /// The longest function in lines.
-const FUNCTION_LINES: usize = 120;
+const FUNCTION_LINES: usize = 60;
 
-/// Longer functions: file, name, and why it is not split.
-const LONG_FUNCTIONS: &[(&str, &str, &str)] = &[];
+/// Longer files and functions: file, function (empty for the file), and how long it may be. Remove an entry once it is
+/// split; a new one needs a reason.
+const LONG: &[(&str, &str, usize)] = &[
+    ("canopen/lss/fastscan.rs", "on_end", 71),
+    ("canopen/value.rs", "", 571),
+    ("canopen/value.rs", "encode_text", 65),
+    ("master/sdo.rs", "on_frame_of", 90),
+    ("output/info_json.rs", "object", 77),
+    ("output/summary.rs", "json", 101),
+    ("sim/sdo_server/tests.rs", "block_download", 62),
+    ("tasks/log.rs", "samples", 61),
+    ("tasks/lss/assign.rs", "carry_out", 62),
+    ("tasks/lss/only.rs", "only", 64),
+    ("tasks/pdo/watch.rs", "watch", 68),
+    ("tasks/settings/info.rs", "read", 64),
+];
+
+/// Rules that old code still breaks: the rule, the file, and how often. The numbers only go down.
+const REMAINING: &[(&str, &str, usize)] = &[
+    (COMMANDS, "tasks/autozero.rs", 8),
+    (COMMANDS, "tasks/autozero/channel.rs", 1),
+    (COMMANDS, "tasks/kept.rs", 3),
+    (COMMANDS, "tasks/lss/assign.rs", 1),
+    (COMMANDS, "tasks/lss/only.rs", 2),
+    (COMMANDS, "tasks/lss/presence.rs", 2),
+    (COMMANDS, "tasks/lss/progress.rs", 3),
+    (COMMANDS, "tasks/lss/retime.rs", 1),
+    (COMMANDS, "tasks/lss/single.rs", 1),
+    (COMMANDS, "tasks/lss/subject.rs", 1),
+    (COMMANDS, "tasks/nmt/startup.rs", 1),
+    (COMMANDS, "tasks/pdo/mend.rs", 3),
+    (COMMANDS, "tasks/pdo/nmt.rs", 2),
+    (COMMANDS, "tasks/pdo/report.rs", 1),
+    (COMMANDS, "tasks/pdo/watch.rs", 2),
+    (COMMANDS, "tasks/read.rs", 1),
+    (COMMANDS, "tasks/restore.rs", 3),
+    (COMMANDS, "tasks/sdo.rs", 1),
+    (COMMANDS, "tasks/settings/limits.rs", 2),
+    (COMMANDS, "tasks/store.rs", 3),
+    (FORMATS, "cli/autozero.rs", 3),
+    (FORMATS, "cli/check.rs", 3),
+    (FORMATS, "cli/errors.rs", 3),
+    (FORMATS, "cli/filter.rs", 3),
+    (FORMATS, "cli/info.rs", 3),
+    (FORMATS, "cli/limits.rs", 3),
+    (FORMATS, "cli/log.rs", 2),
+    (FORMATS, "cli/lss.rs", 10),
+    (FORMATS, "cli/lss/assign.rs", 4),
+    (FORMATS, "cli/mod.rs", 3),
+    (FORMATS, "cli/nmt.rs", 9),
+    (FORMATS, "cli/pdo.rs", 8),
+    (FORMATS, "cli/read.rs", 4),
+    (FORMATS, "cli/scan.rs", 3),
+    (FORMATS, "cli/sdo.rs", 4),
+    (FORMATS, "cli/store.rs", 3),
+    (WAITS, "tasks/autozero/samples.rs", 1),
+    (WAITS, "tasks/lss/presence.rs", 1),
+    (WAITS, "tasks/lss/retime.rs", 1),
+    (WAITS, "tasks/nmt/watch.rs", 1),
+    (WAITS, "tasks/pdo/device.rs", 1),
+    (WAITS, "tasks/pdo/identifiers.rs", 1),
+    (WAITS, "tasks/pdo/watch.rs", 1),
+];
+
+/// Every place that breaks one of the rules of [`REMAINING`].
+fn unfinished(source: &Source) -> Vec<(&'static str, usize)> {
+    let mut found = Vec::new();
+    let is_in = |layers: &[&str]| layers.contains(&source.layer());
+    if is_in(&["cli"]) && source.file != "cli/args.rs" {
+        let formats = source.paths_ending(&["Text", "Json", "Csv"], "Format");
+        found.extend(formats.map(|line| (FORMATS, line)));
+    }
+    if is_in(&["node", "tasks"]) {
+        let commands = source.texts.iter().filter(|(_, text)| text.contains("cangauge "));
+        found.extend(commands.map(|(line, _)| (COMMANDS, *line)));
+    }
+    if is_in(&["cli", "node", "output", "tasks"]) && source.file != "node/wait.rs" {
+        let waits = source.calls.iter().filter(|(_, on, method)| on == "master" && method == "next");
+        found.extend(waits.map(|(line, ..)| (WAITS, *line)));
+    }
+    found
+}
+
+/// Rule 9 of the design, and that only `output` writes text.
+const FORMATS: &str = "only output knows the formats";
+const COMMANDS: &str = "only output writes commands to type";
+const WAITS: &str = "only node/wait.rs waits for frames";
 
 fn is_part_of(path: &str, whole: &str) -> bool {
     path.strip_prefix(whole).is_some_and(|rest| rest.is_empty() || rest.starts_with("::"))
@@ -235,16 +321,36 @@ fn only_descriptions_know_devices_by_name() {
 
 #[test]
 fn files_and_functions_are_short() {
+    let limit = |file: &str, function: &str, usual: usize| {
+        LONG.iter().find(|(of, long, _)| *of == file && *long == function).map_or(usual, |(_, _, lines)| *lines)
+    };
     let mut found = Vec::new();
     for source in code::all_sources().iter() {
         let file = &source.file;
-        if source.lines > FILE_LINES {
-            found.push(format!("src/{file}: {} lines, more than {FILE_LINES}", source.lines));
+        let most = limit(file, "", FILE_LINES);
+        if source.lines > most {
+            found.push(format!("src/{file}: {} lines, more than {most}", source.lines));
         }
         for (line, name, lines) in &source.functions {
-            let listed = LONG_FUNCTIONS.iter().any(|(of, long, _)| of == file && long == name);
-            if *lines > FUNCTION_LINES && !listed {
-                found.push(format!("src/{file}:{line}: fn {name} has {lines} lines, more than {FUNCTION_LINES}"));
+            let most = limit(file, name, FUNCTION_LINES);
+            if *lines > most {
+                found.push(format!("src/{file}:{line}: fn {name} has {lines} lines, more than {most}"));
+            }
+        }
+    }
+    assert_none(&found);
+}
+
+#[test]
+fn one_place_writes_text_and_one_loop_waits() {
+    let mut found = Vec::new();
+    for source in sources() {
+        for rule in [FORMATS, COMMANDS, WAITS] {
+            let places: Vec<usize> =
+                unfinished(source).into_iter().filter(|(broken, _)| *broken == rule).map(|(_, line)| line).collect();
+            let remaining = REMAINING.iter().find(|(of, file, _)| *of == rule && *file == source.file);
+            if places.len() > remaining.map_or(0, |(_, _, count)| *count) {
+                found.push(format!("src/{}: {rule}: lines {places:?}", source.file));
             }
         }
     }

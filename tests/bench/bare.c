@@ -1,10 +1,10 @@
-/* The least that an SDO client can do: one send and one receive for each exchange, nothing checked but
- * the order. What is faster than this saves system calls; what is slower does something else too.
+/* A minimal SDO client: one send and one receive for each exchange. It checks only aborts. A faster client
+ * saves system calls; a slower one does additional work.
  *
  *     bare IFACE NODE reads COUNT      expedited uploads of 2002h
- *     bare IFACE NODE read|write|block-read|block-write BYTES      2000h; write fills it with zeros
+ *     bare IFACE NODE read|write|block-read|block-write BYTES      2000h; write sends zeros
  *
- * Prints the seconds that it took. Build: cc -O2 -o bare bare.c
+ * Prints the seconds used. Build: cc -O2 -o bare bare.c
  */
 #include <linux/can.h>
 #include <linux/can/raw.h>
@@ -122,8 +122,8 @@ int main(int argc, char **argv)
         bind(bus, (struct sockaddr *)&address, sizeof address))
         fail(argv[1]);
     long number = atol(argv[4]);
-    struct timespec begun, ended;
-    clock_gettime(CLOCK_MONOTONIC, &begun);
+    struct timespec start, end;
+    clock_gettime(CLOCK_MONOTONIC, &start);
     if (!strcmp(argv[3], "reads"))
         reads(number);
     else if (!strcmp(argv[3], "read"))
@@ -134,7 +134,7 @@ int main(int argc, char **argv)
         read_blocks();
     else
         write_blocks(number);
-    clock_gettime(CLOCK_MONOTONIC, &ended);
-    printf("%.6f\n", ended.tv_sec - begun.tv_sec + (ended.tv_nsec - begun.tv_nsec) / 1e9);
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    printf("%.6f\n", end.tv_sec - start.tv_sec + (end.tv_nsec - start.tv_nsec) / 1e9);
     return 0;
 }

@@ -1,10 +1,10 @@
-"""How fast cangauge transfers, beside python-canopen and beside the least that a client can do.
+"""Measures the SDO transfers of cangauge, python-canopen and a minimal client (bare.c).
 
     transfers.py BINARY BARE IFACE [RUNS]
 
-All three with the same device, the simulator in a process of its own, in turns; the medians of RUNS
-(5) runs. Only the ratios within one run mean anything. BARE is bare.c, built. cangauge's start, which
-its figures do not hold, is taken from a run that does the same with next to nothing.
+All three use the same simulated device in its own process, in turns. The table shows the medians of RUNS (5) runs.
+Compare only figures of one run. BARE is the compiled bare.c. The start-up time of cangauge is measured with a minimal
+transfer and subtracted.
 
     cargo build --release
     cc -O2 -o target/bare tests/bench/bare.c
@@ -29,13 +29,13 @@ SIZE = 100_000
 
 
 def seconds(action):
-    begun = time.perf_counter()
+    start = time.perf_counter()
     action()
-    return time.perf_counter() - begun
+    return time.perf_counter() - start
 
 
 class Clients:
-    """Each figure of each client: the seconds that it takes."""
+    """The figures of each client, in seconds."""
 
     def __init__(self, cangauge, bare, directory):
         self.cangauge, self.bare, self.directory = cangauge, bare, directory
@@ -51,7 +51,7 @@ class Clients:
         return seconds(lambda: self.cangauge.run("sdo", *arguments))
 
     def run_python(self, action):
-        # Connected it hears all that the others do, on the one CPU that they have too.
+        # Connect only for the measurement: a connected network processes all frames, and all clients share one CPU.
         with PythonMaster(self.cangauge.interface) as master:
             return seconds(lambda: action(master))
 

@@ -70,6 +70,13 @@ impl Source {
         self.paths.iter().filter(|(_, path)| !["crate", "cangauge", "super"].contains(&path[0].as_str()))
     }
 
+    /// The lines of paths such as `Format::Json`: one of `names` after `of`.
+    pub(crate) fn paths_ending(&self, names: &'static [&str], of: &'static str) -> impl Iterator<Item = usize> {
+        let is_one =
+            move |path: &[String]| matches!(path, [.., first, last] if first == of && names.contains(&last.as_str()));
+        self.paths.iter().filter(move |(_, path)| is_one(path)).map(|(line, _)| *line)
+    }
+
     fn add_use(&mut self, tree: &UseTree, before: &[String]) {
         let with = |name: &dyn ToString| before.iter().cloned().chain([name.to_string()]).collect::<Vec<_>>();
         match tree {
@@ -128,11 +135,11 @@ fn line(code: &impl Spanned) -> usize {
     code.span().start().line
 }
 
-/// Whether an item exists in tests only.
+/// Whether an item exists in tests only: `#[cfg(test)]` or `#[cfg(all(test, …))]`.
 fn is_test(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
-        let condition = || attribute.parse_args::<syn::Path>().is_ok_and(|condition| condition.is_ident("test"));
-        attribute.path().is_ident("cfg") && condition()
+        let condition = attribute.meta.require_list().map(|list| list.tokens.to_string()).unwrap_or_default();
+        attribute.path().is_ident("cfg") && (condition == "test" || condition.replace(' ', "").starts_with("all(test,"))
     })
 }
 
@@ -276,6 +283,8 @@ fn add_files(folder: &Path, files: &mut Vec<PathBuf>) {
 fn read_all() -> Vec<Source> {
     let mut paths = Vec::new();
     add_files(&folder(), &mut paths);
+    // The build script is not part of the program.
+    paths.retain(|path| *path != folder().join("build.rs"));
     paths.sort();
     let source = |path: PathBuf| {
         let file = path.strip_prefix(folder()).expect("a path below src").display().to_string();
