@@ -1,40 +1,39 @@
-//! A wrapper around any bus that goes wrong on purpose, for tests.
+//! A wrapper around a bus that injects faults, for tests.
 
 use super::{BitRateControl, Bus, BusError, Event, Fault, Mono, Received, delegate_bus};
 use crate::canopen::frame::Frame;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
-/// What is to go wrong. Frames are counted from 0, each direction for itself.
+/// The faults to inject. Frames are counted from 0, separately for each direction.
 #[derive(Clone, Debug, Default)]
 pub struct FaultPlan {
-    /// Calls of `send` that meet a full transmit queue.
+    /// Calls of `send` that find the transmit queue full.
     pub queue_full: BTreeSet<u64>,
-    /// Sent frames that never reach the wire although the bus took them.
+    /// Sent frames that are lost although `send` succeeds.
     pub lose_sent: BTreeSet<u64>,
     /// Received frames that are lost.
     pub lose: BTreeSet<u64>,
     /// Received frames that arrive twice.
     pub duplicate: BTreeSet<u64>,
-    /// Received frames that arrive later, behind those that came in the meantime.
+    /// Received frames that arrive late, after frames that came in the meantime.
     pub delay: BTreeMap<u64, Duration>,
-    /// Received frames that arrive with one byte changed: which, counted around the end, and what is turned over
-    /// in it.
+    /// Received frames with one changed byte: its index (modulo the length) and the bits to invert.
     pub garble: BTreeMap<u64, (usize, u8)>,
-    /// Received frames that arrive with no more than this many bytes.
+    /// Received frames that are cut to this number of bytes.
     pub truncate: BTreeMap<u64, usize>,
-    /// When the interface goes down, and for how long; for ever without a time.
+    /// When the interface goes down, and for how long; `None`: it stays down.
     pub down: Option<(Mono, Option<Duration>)>,
-    /// When nobody acknowledges and the transmit queue is full, and for how long.
+    /// When no node acknowledges and the transmit queue is full, and for how long.
     pub full: Option<(Mono, Duration)>,
-    /// When the controller switches itself off: what is sent from then on waits, until nothing more can wait.
+    /// When the controller goes bus-off. Frames sent after that wait until the queue is full.
     pub bus_off: Option<Mono>,
-    /// How long after that it is started again, and sends what waits; never without a time.
+    /// After which time it restarts and sends the waiting frames; `None`: never.
     pub restart_after: Option<Duration>,
 }
 
-/// How many frames wait in a controller that is off.
-const OFF_QUEUE: usize = 10;
+/// How many frames can wait in a controller that is bus-off.
+const BUS_OFF_QUEUE_LENGTH: usize = 10;
 
 /// A bus that follows a [`FaultPlan`].
 pub struct Faulty<B> {
@@ -42,28 +41,28 @@ pub struct Faulty<B> {
     plan: FaultPlan,
     sends: u64,
     received: u64,
-    /// Frames held back, by the moment they are due; those due at once come first.
+    /// Received frames to deliver, in order of their time.
     held: VecDeque<Received>,
-    /// What the program has been told of the interface.
+    /// The last reported state of the interface.
     is_up: bool,
     is_off: bool,
-    /// Frames that wait in a controller that is off.
+    /// Frames that wait in a controller that is bus-off.
     waiting: VecDeque<Frame>,
 }
 
 impl<B: Bus> Faulty<B> {
-    /// Lets `plan` happen to `bus`.
+    /// Injects the faults of `plan` into `bus`.
     pub fn new(bus: B, plan: FaultPlan) -> Faulty<B> {
         let (held, waiting) = (VecDeque::new(), VecDeque::new());
         Faulty { bus, plan, sends: 0, received: 0, held, is_up: true, is_off: false, waiting }
     }
 
-    /// The bus inside.
+    /// The inner bus.
     pub fn inner(&self) -> &B {
         &self.bus
     }
 
-    /// The bus inside, to be changed.
+    /// The inner bus, mutable.
     pub fn inner_mut(&mut self) -> &mut B {
         &mut self.bus
     }
@@ -80,20 +79,20 @@ impl<B: Bus> Faulty<B> {
         self.plan.bus_off.is_some_and(|from| from <= now) && self.restart().is_none_or(|at| now < at)
     }
 
-    /// When a controller that switches itself off is started again.
+    /// When a bus-off controller restarts.
     fn restart(&self) -> Option<Mono> {
         self.plan.bus_off.zip(self.plan.restart_after).map(|(from, length)| from + length)
     }
 
-    /// The next moment after `now` at which something happens to the interface.
+    /// The next change of the interface after `now`.
     fn next_change(&self, now: Mono) -> Option<Mono> {
         let down =
             self.plan.down.into_iter().flat_map(|(from, length)| [Some(from), length.map(|length| from + length)]);
         down.flatten().chain(self.plan.bus_off).chain(self.restart()).filter(|moment| *moment > now).min()
     }
 
-    /// What has happened to the interface and was not told yet.
-    fn news(&mut self) -> Option<Event> {
+    /// A change of the interface that was not reported yet.
+    fn unreported_change(&mut self) -> Option<Event> {
         let now = self.bus.now();
         if self.is_up_at(now.mono) != self.is_up {
             self.is_up = !self.is_up;
@@ -107,8 +106,8 @@ impl<B: Bus> Faulty<B> {
         None
     }
 
-    /// A controller that was started again sends what waits, as far as the queue takes it.
-    fn send_what_waits(&mut self) -> Result<(), BusError> {
+    /// After a restart, sends the waiting frames until the queue of the inner bus is full.
+    fn send_waiting(&mut self) -> Result<(), BusError> {
         while !self.is_off_at(self.bus.now().mono)
             && let Some(frame) = self.waiting.front()
         {
@@ -126,7 +125,7 @@ impl<B: Bus> Faulty<B> {
         self.held.insert(place, received);
     }
 
-    /// What the plan makes of the bytes of a received frame.
+    /// A received frame after garbling and truncation.
     fn altered(&self, number: u64, frame: Frame) -> Frame {
         let mut data = frame.data().to_vec();
         if let Some(&(place, turned)) = self.plan.garble.get(&number)
@@ -135,11 +134,11 @@ impl<B: Bus> Faulty<B> {
             data[place] ^= turned;
         }
         data.truncate(self.plan.truncate.get(&number).copied().unwrap_or(usize::MAX));
-        // A remote frame has no bytes that could change.
+        // A remote frame has no data bytes.
         if frame.is_remote() { frame } else { Frame::new(frame.id(), &data).unwrap_or(frame) }
     }
 
-    /// Notes a received frame; what the plan leaves of it is held until it is due.
+    /// Applies the plan to a received frame and queues the result for delivery.
     fn take_in(&mut self, mut received: Received) {
         let number = self.received;
         self.received += 1;
@@ -173,9 +172,9 @@ impl<B: Bus> Bus for Faulty<B> {
         if !self.is_up_at(now) {
             return Err(BusError::Down(self.bus.name().to_owned()));
         }
-        self.send_what_waits()?;
+        self.send_waiting()?;
         if self.is_off_at(now) || !self.waiting.is_empty() {
-            if self.waiting.len() >= OFF_QUEUE {
+            if self.waiting.len() >= BUS_OFF_QUEUE_LENGTH {
                 return Err(BusError::QueueFull);
             }
             self.waiting.push_back(*frame);
@@ -193,9 +192,9 @@ impl<B: Bus> Bus for Faulty<B> {
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
         loop {
-            self.send_what_waits()?;
-            if let Some(news) = self.news() {
-                return Ok(news);
+            self.send_waiting()?;
+            if let Some(change) = self.unreported_change() {
+                return Ok(change);
             }
             let due = self.held.front().map(|first| first.at.mono);
             let now = self.bus.now().mono;
@@ -226,7 +225,7 @@ mod tests {
         Mono::at(Duration::from_millis(millis))
     }
 
-    fn heard(bus: &mut dyn Bus, until: Mono) -> Result<Vec<(Mono, String)>, BusError> {
+    fn received(bus: &mut dyn Bus, until: Mono) -> Result<Vec<(Mono, String)>, BusError> {
         let mut frames = Vec::new();
         while let Event::Frame(Received { frame, at }) = bus.receive(until)? {
             assert_eq!(bus.now().mono, at.mono);
@@ -236,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn received_frames_are_lost_doubled_and_late() -> Result<(), BusError> {
+    fn received_frames_are_lost_duplicated_and_delayed() -> Result<(), BusError> {
         let script = (0..5u32)
             .fold(Script::new(), |script, n| script.frame(at(10 * u64::from(n)), &format!("{:03X}#", 0x181 + n)));
         let plan = FaultPlan {
@@ -247,9 +246,9 @@ mod tests {
         };
         let mut bus = Faulty::new(script, plan);
         let expected = [(10, "182#"), (10, "182#"), (30, "184#"), (35, "183#")];
-        assert_eq!(heard(&mut bus, at(100))?, expected.map(|(ms, text)| (at(ms), text.to_owned())));
+        assert_eq!(received(&mut bus, at(100))?, expected.map(|(ms, text)| (at(ms), text.to_owned())));
         assert_eq!(bus.now().mono, at(100));
-        assert_eq!(heard(&mut bus, at(200))?, [(at(140), "185#".to_owned())]);
+        assert_eq!(received(&mut bus, at(200))?, [(at(140), "185#".to_owned())]);
         Ok(())
     }
 
@@ -262,8 +261,8 @@ mod tests {
             ..FaultPlan::default()
         };
         let mut bus = Faulty::new(script, plan);
-        let heard: Vec<String> = heard(&mut bus, at(100))?.into_iter().map(|(_, text)| text).collect();
-        assert_eq!(heard, ["185#01FD030405", "185#0102130405", "185#010203", "185#0102030405"]);
+        let texts: Vec<String> = received(&mut bus, at(100))?.into_iter().map(|(_, text)| text).collect();
+        assert_eq!(texts, ["185#01FD030405", "185#0102130405", "185#010203", "185#0102030405"]);
         Ok(())
     }
 
@@ -288,18 +287,18 @@ mod tests {
     }
 
     #[test]
-    fn a_controller_that_is_off_takes_a_queue_full_and_hears_nothing() -> Result<(), BusError> {
+    fn a_bus_off_controller_queues_frames_and_receives_none() -> Result<(), BusError> {
         let script = Script::new().frame(at(10), "181#");
         let mut bus = Faulty::new(script, FaultPlan { bus_off: Some(at(5)), ..FaultPlan::default() });
         assert!(matches!(bus.receive(at(100))?, Event::Fault(Fault::BusOff, _)));
-        assert!(heard(&mut bus, at(100))?.is_empty());
+        assert!(received(&mut bus, at(100))?.is_empty());
         let taken = (0..20u8).filter(|n| bus.send(&Frame::byte(CanId::NMT, *n)).is_ok()).count();
         assert_eq!((taken, bus.inner().sent.len()), (10, 0));
         Ok(())
     }
 
     #[test]
-    fn a_controller_that_is_started_again_sends_what_waits() -> Result<(), BusError> {
+    fn a_restarted_controller_sends_the_waiting_frames() -> Result<(), BusError> {
         let (bus_off, restart_after) = (Some(at(5)), Some(Duration::from_millis(10)));
         let script = Script::new().frame(at(10), "181#").frame(at(20), "182#");
         let mut bus = Faulty::new(script, FaultPlan { bus_off, restart_after, ..FaultPlan::default() });
@@ -308,7 +307,7 @@ mod tests {
         assert!(bus.inner().sent.is_empty());
         assert!(matches!(bus.receive(at(100))?, Event::Fault(Fault::Restarted, _)));
         assert_eq!(bus.inner().sent, ["000#01"]);
-        assert_eq!(heard(&mut bus, at(100))?, [(at(20), "182#".to_owned())]);
+        assert_eq!(received(&mut bus, at(100))?, [(at(20), "182#".to_owned())]);
         Ok(())
     }
 

@@ -1,4 +1,4 @@
-//! Ctrl-C, SIGTERM and SIGHUP as events of a bus, each reported once.
+//! Ctrl-C, SIGTERM and SIGHUP as events of a bus. Each signal is reported once.
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::{SigId, low_level};
@@ -8,17 +8,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// The longest sleep: an [`Instant`] cannot hold every sum.
+/// The longest sleep. An [`Instant`] cannot hold every sum.
 const A_CENTURY: Duration = Duration::from_secs(100 * 365 * 24 * 3600);
 
-/// The user's wish to stop, as a bus takes it in.
+/// Receives the signals SIGINT and SIGTERM.
 ///
-/// Every instance sees every signal that arrives while it lives, so two buses in one process are
-/// both told. From the first instance on, Ctrl-C no longer ends the program by itself: whoever
-/// holds an instance has to ask it.
+/// Each instance gets each signal that arrives during its life, so two buses in one process both get it. From the first
+/// instance on, Ctrl-C no longer ends the program by itself: the owner of an instance must check it.
 #[derive(Debug)]
 pub struct Interrupts {
-    /// Set behind the byte in the pipe: one load tells a busy reader that there is nothing to read.
+    /// Set after the byte in the pipe. A busy reader sees with one load that there is nothing to read.
     raised: Arc<AtomicBool>,
     pending: usize,
     registered: Vec<SigId>,
@@ -27,11 +26,10 @@ pub struct Interrupts {
 }
 
 impl Interrupts {
-    /// Watches for SIGINT and SIGTERM from now on, and for SIGHUP unless the program was started to ignore it
-    /// (`nohup`).
+    /// Receives SIGINT and SIGTERM from now on, and SIGHUP unless the program was started to ignore it (`nohup`).
     ///
     /// # Errors
-    /// The signals cannot be watched.
+    /// The system has no more descriptors, or rejects the handler.
     pub fn new() -> io::Result<Interrupts> {
         #[cfg(unix)]
         if !ignores_hangup() {
@@ -40,7 +38,7 @@ impl Interrupts {
         Interrupts::on(&[SIGINT, SIGTERM])
     }
 
-    /// The next signal that has not been reported yet. Costs next to nothing when there is none.
+    /// Whether there is a signal that was not reported yet. Cheap if there is none.
     pub fn take(&mut self) -> bool {
         if self.raised.load(Ordering::Acquire) {
             self.collect();
@@ -80,7 +78,7 @@ fn ignores_hangup() -> bool {
 #[cfg(unix)]
 impl Interrupts {
     fn on(signals: &[c_int]) -> io::Result<Interrupts> {
-        // One byte in the pipe is one signal: it counts them and wakes a waiting poll in one.
+        // Each byte in the pipe is one signal. It also wakes a waiting poll.
         let (pipe, write) = std::os::unix::net::UnixStream::pair()?;
         pipe.set_nonblocking(true)?;
         let raised = Arc::new(AtomicBool::new(false));
@@ -105,19 +103,18 @@ impl Interrupts {
             match super::poll::readable([self.fd()], left) {
                 Ok([true]) => self.collect(),
                 Ok([false]) => {}
-                // Waiting for one own descriptor can fail only for lack of memory.
+                // Polling one own descriptor fails only without memory.
                 Err(_) => std::thread::sleep(left),
             }
         }
     }
 
-    /// Readable while there may be a signal to collect.
+    /// The descriptor that becomes readable when a signal arrives.
     pub(super) fn fd(&self) -> std::os::fd::BorrowedFd<'_> {
         std::os::fd::AsFd::as_fd(&self.pipe)
     }
 
-    /// Takes in what the pipe holds, for whoever found [`Interrupts::fd`] readable: the signal's
-    /// byte is there a moment before its flag.
+    /// Reads the pipe. Call it when [`Interrupts::fd`] is readable, because the byte arrives shortly before the flag.
     pub(super) fn collect(&mut self) {
         self.raised.store(false, Ordering::Release);
         let mut bytes = [0; 64];
@@ -127,8 +124,8 @@ impl Interrupts {
     }
 }
 
-/// Elsewhere there is no pipe to wait on: signals that follow each other closely count as one, and a
-/// sleep looks for them now and then.
+/// Other systems have no pipe to wait on. Signals in quick succession count as one, and a sleep checks for them
+/// periodically.
 #[cfg(not(unix))]
 impl Interrupts {
     fn on(signals: &[c_int]) -> io::Result<Interrupts> {

@@ -1,5 +1,7 @@
-//! Buses: what a CAN bus can do for the layers above, and everything that touches the outside world
-//! for it. The only place with sockets, clocks, signals and `unsafe`.
+//! CAN buses: the trait [`Bus`] and its transports.
+//!
+//! This layer promises frames with two receive times, waits with a deadline, and a clock. It is the only place with
+//! sockets, clocks, signals and `unsafe`. It knows frames and no protocol.
 
 pub mod claim;
 mod delegate;
@@ -139,81 +141,81 @@ impl<B: BitRateControl + ?Sized> BitRateControl for Box<B> {
     delegate_bus!(self, (**self) => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
 }
 
-/// Room for what was received and not yet asked for. A frame takes some 800 bytes of it on Linux.
+/// The size of the receive buffer. On Linux a frame takes about 800 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReceiveBuffer {
-    /// What there is, in bytes.
+    /// The actual size in bytes.
     pub bytes: usize,
-    /// What was asked for: the system may allow less (`net.core.rmem_max`).
+    /// The requested size in bytes. The system may allow less (`net.core.rmem_max`).
     pub wanted: usize,
 }
 
 impl ReceiveBuffer {
-    /// Whether the system did not allow what was asked for.
+    /// Whether the system allowed less than requested.
     pub fn is_small(self) -> bool {
         self.bytes < self.wanted
     }
 }
 
-/// How an interface takes part in the traffic.
+/// How an interface takes part in bus traffic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
     /// It sends and acknowledges.
     #[default]
     Normal,
-    /// It only listens: no frame, no acknowledge, no error flag.
+    /// It only receives: it sends no frames, no acknowledge and no error flags.
     ListenOnly,
 }
 
-/// What comes from a bus.
+/// An event on a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// A frame of another participant.
     Frame(Received),
-    /// The controller reports trouble on the wire.
+    /// The controller reports a fault.
     Fault(Fault, Stamp),
-    /// The kernel had to drop this many frames since it last said so: the program read too slowly.
+    /// The kernel dropped this many frames since its last report, because the program read too slowly.
     Dropped(u32),
-    /// The interface went down (`false`) or came back (`true`).
+    /// The interface went down (`false`) or came up (`true`).
     Link(bool),
     /// The deadline was reached.
     Timeout,
-    /// The recording is over. Reported once; from then on time passes and nothing comes.
+    /// The recording has ended. Reported once; after that only time passes.
     Ended,
-    /// The user asked to stop (Ctrl-C, SIGTERM). Reported once a signal: what comes after it is
-    /// tidying up, which may use the bus again.
+    /// The user asked to stop (Ctrl-C, SIGTERM). Reported once per signal, so that the caller can still use the bus to
+    /// clean up.
     Interrupted,
 }
 
-/// A frame and the moment it was received.
+/// A received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Received {
-    /// What was received.
+    /// The frame.
     pub frame: Frame,
-    /// When.
+    /// When it was received.
     pub at: Stamp,
 }
 
-/// Trouble that a CAN controller reports (Linux: an error frame).
+/// A fault that a CAN controller reports (Linux: an error frame).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Fault {
-    /// The controller has switched itself off after too many errors.
+    /// The controller switched itself off after too many errors.
     BusOff,
-    /// The controller may no longer signal errors actively.
+    /// The controller is error-passive: it may no longer send active error flags.
     ErrorPassive,
-    /// An error counter passed the warning level.
+    /// An error counter reached the warning level (96).
     ErrorWarning,
     /// The controller is error-active again.
     ErrorActive,
     /// The controller was restarted after bus-off.
     Restarted,
-    /// Nobody acknowledged a frame.
+    /// No node acknowledged a frame.
     NoAcknowledge,
-    /// A bit, stuff, form or CRC error on the wire: wrong bit rate, bad wiring, two senders.
+    /// A bit, stuff, form or CRC error: wrong bit rate, bad wiring, or two nodes that send the same COB-ID.
     Protocol,
-    /// The controller's own receive or transmit buffer ran over.
+    /// The receive or transmit buffer of the controller overflowed.
     ControllerOverflow,
-    /// The transceiver reports a fault of the wires.
+    /// The transceiver reports a wiring fault.
     Transceiver,
     /// A transmission took too long.
     TransmitTimeout,
@@ -229,8 +231,8 @@ impl fmt::Display for Fault {
             Fault::ErrorWarning => "error warning",
             Fault::ErrorActive => "error active again",
             Fault::Restarted => "restarted after bus-off",
-            Fault::NoAcknowledge => "no acknowledge: nobody else is listening at this bit rate",
-            Fault::Protocol => "protocol error on the wire",
+            Fault::NoAcknowledge => "no acknowledge: no other node at this bit rate",
+            Fault::Protocol => "protocol error on the bus",
             Fault::ControllerOverflow => "controller buffer overflow",
             Fault::Transceiver => "transceiver fault",
             Fault::TransmitTimeout => "transmit time-out",
@@ -242,15 +244,15 @@ impl fmt::Display for Fault {
 /// Where the wall time of a received frame comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimestampSource {
-    /// The interface's own clock, laid upon the computer's.
+    /// The clock of the interface, converted to the host's time.
     Hardware,
-    /// The kernel, when the driver handed the frame over.
+    /// The kernel, when the driver delivered the frame.
     Kernel,
     /// This program, when it read the frame.
     Program,
     /// The clock of the simulated bus.
     Simulated,
-    /// Whatever recorded it.
+    /// The program that recorded the frame.
     Recorded,
 }
 
@@ -266,7 +268,7 @@ impl fmt::Display for TimestampSource {
     }
 }
 
-/// Which frames are wanted.
+/// Which frames a bus delivers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Filters {
     /// Every frame.
@@ -276,7 +278,7 @@ pub enum Filters {
 }
 
 impl Filters {
-    /// Whether `frame` is wanted.
+    /// Whether `frame` passes.
     pub fn wants(&self, frame: &Frame) -> bool {
         match self {
             Filters::All => true,
@@ -285,7 +287,7 @@ impl Filters {
     }
 }
 
-/// Why a bus does not do what was asked.
+/// Why an operation on a bus failed.
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
     /// The transmit queue is full; nothing was sent.
@@ -297,42 +299,42 @@ pub enum BusError {
     /// The interface exists and is down.
     #[error("interface {0} is down")]
     Down(String),
-    /// The interface is there and is no CAN interface.
+    /// The interface is not a CAN interface.
     #[error("{0} is not a CAN interface")]
     NotCan(String),
-    /// The operating system forbids it.
+    /// The operating system denies the operation.
     #[error("no permission to {0}")]
     Permission(String),
-    /// This bus only receives.
-    #[error("{0} is receive only")]
+    /// This bus can only receive.
+    #[error("{0} can only receive")]
     ReceiveOnly(String),
-    /// The interface cannot do that bit rate; it is as it was.
-    #[error("{name} cannot do {bit_rate} bit/s: {why}")]
+    /// The interface does not support the bit rate. Its old settings are restored.
+    #[error("{name} does not support {bit_rate} bit/s: {why}")]
     BitRate {
         /// The interface.
         name: String,
-        /// The bit rate asked for.
+        /// The requested bit rate in bit/s.
         bit_rate: u32,
-        /// What the driver says.
+        /// The reason that the driver gives.
         why: String,
     },
-    /// This system or this build has no such bus.
+    /// This system or this build does not support the operation.
     #[error("{0}")]
     Unsupported(String),
-    /// A local file fails: a trace, a recording.
+    /// A local file failed: a trace or a recording.
     #[error("{what}: {source}")]
     File {
-        /// What was being done.
+        /// The operation that failed.
         what: String,
-        /// What the operating system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// Anything else, with what was being done.
+    /// Another error of the operating system.
     #[error("{what}: {source}")]
     Io {
-        /// What was being done.
+        /// The operation that failed.
         what: String,
-        /// What the operating system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
 }

@@ -1,12 +1,11 @@
-//! Waiting until one of a few file descriptors has something to read, to the nanosecond where the
-//! system can.
+//! Waits until a file descriptor is readable, with nanosecond resolution if the system has it.
 
 use std::io;
 use std::os::fd::{AsRawFd, BorrowedFd};
 use std::time::Duration;
 
-/// Waits until one of `fds` can be read (an error or a hang-up counts, reading tells it) or `limit`
-/// has passed. A signal ends the wait early with nothing ready: the caller knows its deadline.
+/// Waits until one of `fds` is readable or `limit` has passed. An error or hang-up counts as readable. A signal ends the
+/// wait early with no descriptor ready; the caller checks its deadline.
 pub(super) fn readable<const N: usize>(fds: [BorrowedFd<'_>; N], limit: Duration) -> io::Result<[bool; N]> {
     let mut set = fds.map(|fd| libc::pollfd { fd: fd.as_raw_fd(), events: libc::POLLIN, revents: 0 });
     if wait(&mut set, limit) >= 0 {
@@ -41,7 +40,7 @@ fn count(set: &[libc::pollfd]) -> libc::nfds_t {
 fn wait(set: &mut [libc::pollfd], limit: Duration) -> libc::c_int {
     let limit = libc::timespec {
         tv_sec: libc::time_t::try_from(limit.as_secs()).unwrap_or(libc::time_t::MAX),
-        // Below 10^9, so it fits every width of c_long.
+        // Below 10^9, so it fits into each width of c_long.
         tv_nsec: limit.subsec_nanos() as libc::c_long,
     };
     // SAFETY: `set` and `limit` outlive the call, the count is that of `set`, and the descriptors
@@ -52,7 +51,7 @@ fn wait(set: &mut [libc::pollfd], limit: Duration) -> libc::c_int {
 #[cfg(not(any(target_os = "linux", target_os = "android")))]
 #[expect(unsafe_code, reason = "the standard library cannot wait for a descriptor")]
 fn wait(set: &mut [libc::pollfd], limit: Duration) -> libc::c_int {
-    // Rounded up: a wait that ends a little early would turn the caller's loop into a busy one.
+    // Rounded up: a wait that ends too early would make the caller's loop busy.
     let millis = limit.as_nanos().div_ceil(1_000_000);
     let millis = libc::c_int::try_from(millis).unwrap_or(libc::c_int::MAX);
     // SAFETY: `set` outlives the call, the count is its own, and the descriptors are borrowed by the

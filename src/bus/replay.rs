@@ -1,6 +1,6 @@
-//! A recording played again: the frames of a `candump -L` log, at the times that stand there.
+//! Replays a `candump -L` log as a bus.
 //!
-//! Time is that of the log and passes as fast as the program takes it: nothing waits.
+//! The time is that of the log. It passes as fast as the program reads; nothing waits.
 
 use super::{BitRateControl, Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp, TimestampSource, Wall};
 use crate::canopen::frame::Frame;
@@ -8,11 +8,11 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::time::Duration;
 
-/// In an identifier of a log: an error frame of the controller (`CAN_ERR_FLAG`).
+/// The flag of an error frame in an identifier of a log (`CAN_ERR_FLAG`).
 const ERROR_FRAME: u32 = 0x2000_0000;
 
-/// A log line longer than this is none.
-const LONGEST_LINE: u64 = 4096;
+/// The longest valid line in bytes.
+const MAX_LINE: u64 = 4096;
 
 /// A `candump -L` log as a bus that only receives.
 pub struct Replay {
@@ -20,12 +20,12 @@ pub struct Replay {
     lines: Box<dyn BufRead>,
     line: String,
     number: u64,
-    /// The interface that the log is of.
+    /// The interface in the log.
     interface: String,
-    /// The wall time of the first line, which is the opening of this bus.
+    /// The wall time of the first line. It is the start of the monotonic time line.
     begin: Option<Wall>,
     now: Mono,
-    /// What comes next.
+    /// The next event.
     next: Option<(Stamp, Event)>,
     state: State,
     filters: Filters,
@@ -34,25 +34,25 @@ pub struct Replay {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum State {
     Reading,
-    /// The last line has been read.
-    Over,
-    /// And that has been said.
-    Said,
+    /// The last line was read.
+    AtEnd,
+    /// The end was reported.
+    EndReported,
 }
 
 /// One line of a log.
 enum Line<'a> {
     Frame(Wall, &'a str, Frame),
     Fault(Wall, &'a str, Fault),
-    /// Blank, or a frame of CAN FD, which CANopen does not know.
-    Nothing,
+    /// An empty line, or a CAN FD frame, which CANopen does not use.
+    Ignored,
 }
 
 impl Replay {
-    /// The log in `file`; `-` is the standard input.
+    /// Opens the log `file`; `-` is standard input.
     ///
     /// # Errors
-    /// A file that cannot be opened.
+    /// The file cannot be opened.
     pub fn open(file: &str) -> io::Result<Replay> {
         if file == "-" {
             return Ok(Replay::new("standard input", Box::new(BufReader::new(io::stdin()))));
@@ -84,34 +84,34 @@ impl Replay {
         BusError::File { what: format!("replay {}:{}", self.file, self.number), source }
     }
 
-    /// Reads on to the next thing that happened.
+    /// Reads the next event of the log.
     fn fetch(&mut self) -> Result<(), BusError> {
         while self.next.is_none() && self.state == State::Reading {
             self.line.clear();
-            let read = (&mut self.lines).take(LONGEST_LINE).read_line(&mut self.line);
+            let read = (&mut self.lines).take(MAX_LINE).read_line(&mut self.line);
             let length = read.map_err(|source| BusError::File { what: format!("replay {}", self.file), source })?;
             if length == 0 {
-                self.state = State::Over;
+                self.state = State::AtEnd;
                 return Ok(());
             }
             self.number += 1;
             let whole = self.line.ends_with('\n');
             let (wall, interface, event) = match line(self.line.trim()) {
-                Some(Line::Nothing) => continue,
+                Some(Line::Ignored) => continue,
                 Some(Line::Frame(wall, interface, frame)) => (wall, interface, Ok(frame)),
                 Some(Line::Fault(wall, interface, fault)) => (wall, interface, Err(fault)),
-                // Whatever recorded it was stopped in the middle of a line.
+                // The recording was stopped in the middle of a line.
                 None if !whole => continue,
-                None => return Err(self.wrong("no line of a candump log (record with candump -L)")),
+                None => return Err(self.wrong("not a line of a candump log (record with candump -L)")),
             };
             if self.interface.is_empty() {
                 interface.clone_into(&mut self.interface);
             } else if self.interface != interface {
-                let what = format!("frames of {interface} beside those of {}: pick one (grep)", self.interface);
+                let what = format!("frames of {interface} and of {}: select one interface (grep)", self.interface);
                 return Err(self.wrong(&what));
             }
             let begin = self.begin.get_or_insert(wall).since_epoch();
-            // A clock that was set back while it was recorded does not take the order of the frames back.
+            // If the clock was set back during the recording, the order of the frames stays.
             let mono = Mono::at(wall.since_epoch().saturating_sub(begin)).max(self.now);
             let at = Stamp { mono, wall };
             self.next = match event {
@@ -124,10 +124,10 @@ impl Replay {
     }
 }
 
-/// `(1436509053.249713) can0 123#1122`, with or without a direction behind it.
+/// Parses `(1436509053.249713) can0 123#1122`, with or without a direction at the end.
 fn line(text: &str) -> Option<Line<'_>> {
     if text.is_empty() {
-        return Some(Line::Nothing);
+        return Some(Line::Ignored);
     }
     let (seconds, rest) = text.strip_prefix('(')?.split_once(") ")?;
     let (seconds, fraction) = seconds.split_once('.')?;
@@ -137,7 +137,7 @@ fn line(text: &str) -> Option<Line<'_>> {
     let mut words = rest.split_ascii_whitespace();
     let (interface, frame) = (words.next()?, words.next()?);
     if frame.contains("##") {
-        return Some(Line::Nothing);
+        return Some(Line::Ignored);
     }
     if let Ok(frame) = frame.parse() {
         return Some(Line::Frame(wall, interface, frame));
@@ -147,7 +147,7 @@ fn line(text: &str) -> Option<Line<'_>> {
     Some(Line::Fault(wall, interface, fault(id)))
 }
 
-/// Digits and nothing else: `parse` would take a sign.
+/// Parses digits only: `parse` would also accept a sign.
 fn number(text: &str) -> Option<u64> {
     if text.bytes().all(|byte| byte.is_ascii_digit()) { text.parse().ok() } else { None }
 }
@@ -205,8 +205,8 @@ impl Bus for Replay {
             self.now = self.now.max(at.mono);
             return Ok(event);
         }
-        if self.state == State::Over {
-            self.state = State::Said;
+        if self.state == State::AtEnd {
+            self.state = State::EndReported;
             return Ok(Event::Ended);
         }
         self.now = self.now.max(deadline);
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn error_frames_are_faults_and_fd_frames_are_not_ours() {
+    fn error_frames_are_faults_and_fd_frames_are_ignored() {
         assert_eq!(
             all("(1.0) can0 20000040#0000000000000000\n(2.0) can0 123##1AABB\n(3.0) can0 200000A8#00\n"),
             ["0 BusOff", "2000000 NoAcknowledge", "end"]
@@ -267,29 +267,29 @@ mod tests {
     }
 
     #[test]
-    fn a_last_line_that_was_cut_off_is_left_out() {
+    fn a_truncated_last_line_is_ignored() {
         assert_eq!(all("(1.5) can0 181#01\n(2.5) can0 18"), ["0 181#01", "end"]);
     }
 
     #[test]
-    fn what_is_no_log_is_named_with_its_line() {
+    fn a_line_that_is_not_a_log_line_is_named_by_number() {
         assert_eq!(
             all("(1.5) can0 181#01\n  can0  181   [1]  01\n(3.0) can0 181#02\n").last().map(String::as_str),
-            Some("replay x.log:2: no line of a candump log (record with candump -L)")
+            Some("replay x.log:2: not a line of a candump log (record with candump -L)")
         );
         for wrong in ["(1.5 can0 181#01\n", "(+1.5) can0 181#01\n", "(1.5) can0 181\n", "(1.5) can0 999#01\n"] {
-            assert!(all(wrong)[0].contains("no line of a candump log"), "{wrong}");
+            assert!(all(wrong)[0].contains("not a line of a candump log"), "{wrong}");
         }
     }
 
     #[test]
-    fn two_interfaces_are_not_mixed() {
+    fn two_interfaces_are_an_error() {
         let seen = all("(1.5) can0 181#01\n(1.6) can1 181#02\n");
-        assert_eq!(seen[1], "replay x.log:2: frames of can1 beside those of can0: pick one (grep)");
+        assert_eq!(seen[1], "replay x.log:2: frames of can1 and of can0: select one interface (grep)");
     }
 
     #[test]
-    fn a_clock_set_back_keeps_the_order() {
+    fn a_clock_that_is_set_back_keeps_the_order() {
         assert_eq!(
             all("(9.0) c 181#01\n(9.5) c 181#02\n(3.0) c 181#03\n(9.7) c 181#04\n"),
             ["0 181#01", "500000 181#02", "500000 181#03", "700000 181#04", "end"]
@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn time_passes_up_to_the_deadline_and_the_end_is_said_once() -> Result<(), BusError> {
+    fn time_passes_up_to_the_deadline_and_the_end_is_reported_once() -> Result<(), BusError> {
         let mut bus = replay("(1.0) c 181#01\n(3.0) c 181#02\n");
         assert!(matches!(bus.receive(START)?, Event::Frame(_)));
         let (deadline, later) = (START + Duration::from_secs(1), START + Duration::from_secs(9));

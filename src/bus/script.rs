@@ -1,5 +1,4 @@
-//! A bus for the tests of the wrappers: it delivers what it was told, at the time it was told, on a
-//! clock that jumps.
+//! A bus for the tests of the wrappers. It delivers given frames at given times, on a virtual clock.
 
 use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall};
 use crate::canopen::frame::Frame;
@@ -9,7 +8,7 @@ use std::time::Duration;
 /// When the scripted bus was opened.
 const OPENED: Duration = Duration::from_secs(1_436_509_052);
 
-/// Events to come, in order of time, and the frames that were sent.
+/// Events to deliver, in order of time, and the frames that were sent.
 #[derive(Default)]
 pub(super) struct Script {
     now: Mono,

@@ -1,25 +1,24 @@
-//! A wrapper around any bus that writes every frame sent and received, as `candump -L` does.
+//! A wrapper around a bus that writes each sent and received frame, in the format of `candump -L`.
 
 use super::{BitRateControl, Bus, BusError, Event, Mono, Received, Stamp, Wall, delegate_bus};
 use crate::canopen::frame::Frame;
 use std::io::{self, BufWriter, Write};
 use std::time::Duration;
 
-/// How long a line may stay in the buffer: a trace is read while the program runs, and after it was
-/// killed.
-const FLUSH_EVERY: Duration = Duration::from_secs(1);
+/// The longest time that a line stays in the buffer, so that a trace can be read while the program runs or after a kill.
+const FLUSH_INTERVAL: Duration = Duration::from_secs(1);
 
-/// A bus whose traffic is written down, one line a frame: `(1436509052.249713) can0 044#2A366C2BBA`.
+/// A bus that writes a trace, one line per frame: `(1436509052.249713) can0 044#2A366C2BBA`.
 ///
-/// A frame that cannot be written is still delivered: the error comes once, between two frames, and
-/// the trace ends there. A bus keeps working for whoever has to tidy up.
+/// If writing fails, [`Bus::receive`] returns the error once, between two frames, and the trace ends. The bus keeps
+/// working, so that the caller can clean up.
 pub struct Traced<B> {
     bus: B,
     name: String,
     file: String,
     out: Option<BufWriter<Box<dyn Write>>>,
-    /// Since when something is waiting in the buffer.
-    dirty: Option<Mono>,
+    /// The time of the oldest line in the buffer.
+    buffered_since: Option<Mono>,
     failed: Option<BusError>,
 }
 
@@ -27,21 +26,21 @@ impl<B: Bus> Traced<B> {
     /// Writes the traffic of `bus` to `out`, which error messages call `file`.
     pub fn new(bus: B, out: Box<dyn Write>, file: &str) -> Traced<B> {
         let name = bus.name().to_owned();
-        Traced { bus, name, file: file.to_owned(), out: Some(BufWriter::new(out)), dirty: None, failed: None }
+        Traced { bus, name, file: file.to_owned(), out: Some(BufWriter::new(out)), buffered_since: None, failed: None }
     }
 
     fn line(&mut self, at: Stamp, frame: &Frame) {
         let Some(out) = &mut self.out else { return };
         let written = write_line(out, at.wall, &self.name, frame);
-        let since = *self.dirty.get_or_insert(at.mono);
+        let since = *self.buffered_since.get_or_insert(at.mono);
         self.check(written);
-        if at.mono.since(since) >= FLUSH_EVERY {
+        if at.mono.since(since) >= FLUSH_INTERVAL {
             self.flush();
         }
     }
 
     fn flush(&mut self) {
-        self.dirty = None;
+        self.buffered_since = None;
         if let Some(out) = &mut self.out {
             let flushed = out.flush();
             self.check(flushed);
@@ -51,7 +50,7 @@ impl<B: Bus> Traced<B> {
     fn check(&mut self, written: io::Result<()>) {
         if let Err(source) = written {
             self.failed = Some(BusError::File { what: format!("write trace {}", self.file), source });
-            // Dropping the writer would try to write the rest once more.
+            // Dropping the writer would try to write the rest again.
             if let Some(out) = self.out.take() {
                 let _ = out.into_parts();
             }
@@ -59,7 +58,10 @@ impl<B: Bus> Traced<B> {
     }
 }
 
-/// One frame in the format of `candump -L`.
+/// Writes one frame in the format of `candump -L`.
+///
+/// # Errors
+/// The output cannot be written.
 pub fn write_line(out: &mut dyn Write, wall: Wall, bus: &str, frame: &Frame) -> io::Result<()> {
     let at = wall.since_epoch();
     writeln!(out, "({:010}.{:06}) {bus} {frame}", at.as_secs(), at.subsec_micros())
@@ -77,7 +79,7 @@ impl<B: Bus> Bus for Traced<B> {
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        // Before it is handed over: an answer may come before the program comes to look at the clock.
+        // Read before sending: an answer may arrive before the clock is read afterwards.
         let at = self.bus.now();
         self.bus.send(frame)?;
         self.line(at, frame);
@@ -89,8 +91,8 @@ impl<B: Bus> Bus for Traced<B> {
             if let Some(error) = self.failed.take() {
                 return Err(error);
             }
-            // Not longer than the buffer may wait, or a quiet bus would keep the last lines in it.
-            let until = self.dirty.map_or(deadline, |since| deadline.min(since + FLUSH_EVERY));
+            // On a quiet bus, the last lines must not stay in the buffer.
+            let until = self.buffered_since.map_or(deadline, |since| deadline.min(since + FLUSH_INTERVAL));
             match self.bus.receive(until)? {
                 Event::Timeout if until < deadline => self.flush(),
                 event => {
@@ -117,7 +119,7 @@ mod tests {
     use std::cell::RefCell;
     use std::rc::Rc;
 
-    /// A file that can be looked into and can be full.
+    /// A file for tests that may be full.
     #[derive(Clone, Default)]
     struct Disk {
         text: Rc<RefCell<Vec<u8>>>,
@@ -173,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quiet_bus_does_not_keep_lines_in_the_buffer() -> Result<(), BusError> {
+    fn on_a_quiet_bus_the_buffer_is_flushed() -> Result<(), BusError> {
         let disk = Disk::default();
         let mut bus = Traced::new(Script::new().frame(at(5), "080#"), Box::new(disk.clone()), "t.log");
         assert!(matches!(bus.receive(at(9))?, Event::Frame(_)));
@@ -186,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disk_loses_no_frame() -> Result<(), BusError> {
+    fn on_a_full_disk_all_frames_are_still_delivered() -> Result<(), BusError> {
         let disk = Disk { full: true, ..Disk::default() };
         let script = Script::new().frame(at(5), "080#").frame(at(2_000_000), "081#").frame(at(3_000_000), "082#");
         let mut bus = Traced::new(script, Box::new(disk), "t.log");

@@ -302,7 +302,7 @@ fn write_real<T: fmt::Display + fmt::LowerExp>(f: &mut fmt::Formatter<'_>, numbe
 
 /// A value that does not have the width of its type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{found} bytes where the type has {expected}")]
+#[error("{found} bytes, but the type has {expected}")]
 pub struct WidthError {
     /// Bytes of the type.
     pub expected: usize,

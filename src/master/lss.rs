@@ -1,8 +1,8 @@
-//! LSS over a bus: node-ID and bit rate (CiA 305).
+//! LSS over a bus: sets node-ID and bit rate (CiA 305).
 //!
-//! A slave that is left in configuration state takes the next command that is meant for another one. So an
-//! [`Lss`] keeps in mind whether there may be one, and sends everybody back to waiting state at the latest when
-//! it is dropped, after Ctrl-C too.
+//! A slave in configuration state also executes commands that are meant for another slave. So an [`Lss`] remembers
+//! whether a slave may be in that state. When it is dropped, also after Ctrl-C, it switches all slaves to waiting
+//! state.
 
 mod error;
 mod scan;
@@ -18,60 +18,60 @@ use crate::canopen::nmt::Life;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// The shortest wait for the answer to a store: no manual gives a time, and flash memory is slow.
-pub const STORE_TIME: Duration = Duration::from_secs(3);
+/// The shortest wait for the answer to a store. No manual gives a time, and flash memory is slow.
+pub const STORE_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Between two frames of which the first is not answered: some slaves have room for one only.
-const PAUSE: Duration = Duration::from_millis(2);
+/// The pause after a frame without an answer. Some slaves can buffer only one frame.
+const FRAME_PAUSE: Duration = Duration::from_millis(2);
 
-/// The same when an address has had no answer: python-canopen's pause is 200 ms.
-const LONG_PAUSE: Duration = Duration::from_millis(50);
+/// The pause when an address is repeated. python-canopen waits 200 ms.
+const RETRY_PAUSE: Duration = Duration::from_millis(50);
 
-/// How long after the answer of the one slave that is meant another one is waited for.
-const LINGER: Duration = Duration::from_millis(20);
+/// The wait for answers of further slaves after the first answer.
+const FURTHER_ANSWERS_TIMEOUT: Duration = Duration::from_millis(20);
 
-/// More faults than this say nothing more.
-const FAULTS: usize = 64;
+/// The number of faults that are kept.
+const MAX_FAULTS: usize = 64;
 
-/// When an exchange is over.
+/// When an exchange ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Until {
     /// Shortly after the first answer.
     Answer,
-    /// When the time is over: everybody shall have his say.
-    Over,
+    /// At the time-out, so that all slaves can answer.
+    Timeout,
 }
 
-/// What everybody in configuration state answered to one question.
+/// The answers of all slaves in configuration state to one request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Gathered<T> {
-    /// The different answers, in the order in which they came.
+    /// The different answers, in the order of arrival.
     pub answers: Vec<T>,
-    /// Certainly more than one slave answered: answers differ, or more came than were asked for.
+    /// More than one slave answered: the answers differ, or there were more answers than requests.
     pub crowded: bool,
-    /// Trouble on the wire meanwhile: slaves that send different answers at the same time.
+    /// Faults during the exchange. Slaves that send different answers at the same time cause them.
     pub faults: Vec<Fault>,
 }
 
 impl<T> Gathered<T> {
-    /// Whether nothing speaks for a second slave.
+    /// Whether there is one answer and no sign of a second slave.
     pub fn is_one(&self) -> bool {
         self.answers.len() == 1 && !self.crowded && !self.faults.iter().any(|fault| is_collision(*fault))
     }
 }
 
-/// Whether there are others of a kind.
+/// Whether there are further slaves with the same vendor and product.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Others {
-    /// The slave knows the question, and no other one answers it.
+    /// The slave supports the service, and no other slave answers.
     None,
-    /// Somebody within this range answers.
+    /// Another slave in this range answers.
     Within(LssRange),
-    /// The slave itself does not answer the question, so silence proves nothing.
+    /// Unknown: the slave itself does not answer the service.
     Unproven,
 }
 
-/// LSS services of a master.
+/// The LSS services of a master.
 pub struct Lss<'master, 'bus> {
     master: &'master mut Master<'bus>,
     /// A slave may be in configuration state.
@@ -97,16 +97,16 @@ impl Drop for Lss<'_, '_> {
 }
 
 impl<'bus> Lss<'_, 'bus> {
-    /// The master, for what is done in between: SDO, NMT.
+    /// The master, for SDO and NMT between LSS services.
     pub fn master(&mut self) -> &mut Master<'bus> {
         self.master
     }
 
-    /// Wants nothing but LSS and signs of life: on a bus full of other traffic all of that would have to be read
-    /// and thrown away, and a fastscan waits for little else than the clock. SDO answers are wanted no longer.
+    /// Receives only LSS frames and heartbeats, because other frames on a busy bus slow down a fastscan. SDO answers
+    /// are no longer received.
     ///
     /// # Errors
-    /// The bus's own.
+    /// The bus rejects the filters.
     pub fn listen(&mut self) -> Result<(), LssError> {
         let lives = NodeId::all().map(CanId::heartbeat);
         let ids = [CanId::LSS_SLAVE, CanId::LSS_MASTER].into_iter().chain(lives).collect();
@@ -118,51 +118,49 @@ impl<'bus> Lss<'_, 'bus> {
         self.is_configuring
     }
 
-    /// The boot-up messages seen while waiting for answers: a slave that had no node-ID boots when it is sent
-    /// back to waiting state.
+    /// The boot-up messages received during LSS services. A slave that had no node-ID boots when it is switched to
+    /// waiting state.
     pub fn boot_ups(&self) -> &BTreeMap<NodeId, Stamp> {
         &self.boot_ups
     }
 
-    /// 04h: everybody to the state. Nobody answers.
+    /// Switches all slaves to this state (CiA 305, 04h). Slaves do not answer.
     ///
     /// # Errors
-    /// Only what stops everything.
+    /// The bus failed or the user interrupted.
     pub fn switch_global(&mut self, mode: Mode) -> Result<(), LssError> {
         if mode == Mode::Configuration {
             self.is_configuring = true;
         }
-        self.put_out(Request::SwitchGlobal(mode).frame())?;
+        self.send_now(Request::SwitchGlobal(mode).frame())?;
         if mode == Mode::Waiting {
             self.is_configuring = false;
         }
-        self.pause(PAUSE)
+        self.pause(FRAME_PAUSE)
     }
 
-    /// Sends everybody back to waiting state, if there may be somebody who is not. The work may have been
-    /// interrupted before.
+    /// Switches all slaves to waiting state if one may be in configuration state. Also allowed after an interrupt.
     ///
     /// # Errors
-    /// Only what stops everything: the slave may then still be in configuration state.
+    /// The bus failed. A slave may then still be in configuration state.
     pub fn leave(&mut self) -> Result<(), LssError> {
         if self.is_configuring { self.switch_global(Mode::Waiting) } else { Ok(()) }
     }
 
-    /// 40h to 43h: the slave with this address to configuration state. Whoever is in that state already stays
-    /// there and says nothing: see [`Lss::switch_global`]. So everybody is sent to waiting state before the
-    /// address is repeated.
+    /// Switches the slave with this address to configuration state (40h to 43h). A slave that is already in that state
+    /// does not answer. So all slaves are switched to waiting state before the address is repeated.
     ///
     /// # Errors
-    /// No slave has the address, or more than one.
+    /// No slave answers, or several do.
     pub fn switch_selective(&mut self, address: &LssAddress) -> Result<(), LssError> {
         self.is_configuring = true;
         self.one(Exchange::select(address), self.master.timing.retries).map(|_| ())
     }
 
-    /// 5Ah to 5Dh: a number of everybody's address.
+    /// Reads one number of the LSS address of all slaves in configuration state (5Ah to 5Dh).
     ///
     /// # Errors
-    /// No answer, or one against the protocol.
+    /// No slave answers, or an answer violates the protocol.
     pub fn inquire(&mut self, part: Part) -> Result<Gathered<u32>, LssError> {
         self.gather(Request::Inquire(part), |answer| match answer {
             Answer::Number(number) => Some(number),
@@ -170,10 +168,10 @@ impl<'bus> Lss<'_, 'bus> {
         })
     }
 
-    /// 5Eh: everybody's node-ID; `None` of a slave that has none.
+    /// Reads the node-ID of all slaves in configuration state (5Eh); `None` for a slave without node-ID.
     ///
     /// # Errors
-    /// No answer, or one against the protocol.
+    /// No slave answers, or an answer violates the protocol.
     pub fn inquire_node_id(&mut self) -> Result<Gathered<Option<NodeId>>, LssError> {
         self.gather(Request::InquireNodeId, |answer| match answer {
             Answer::NodeId(node) => Some(node),
@@ -181,80 +179,83 @@ impl<'bus> Lss<'_, 'bus> {
         })
     }
 
-    /// 5Ah to 5Dh: the address of the one slave in configuration state.
+    /// Reads the LSS address of the only slave in configuration state (5Ah to 5Dh).
     ///
     /// # Errors
-    /// No answer, several, or one against the protocol.
+    /// No slave answers, several answer, or an answer violates the protocol.
     pub fn inquire_address(&mut self) -> Result<LssAddress, LssError> {
         let mut numbers = [0; 4];
         for (number, part) in numbers.iter_mut().zip(Part::ALL) {
-            if let Answer::Number(told) = self.one(Exchange::new(Request::Inquire(part)), self.master.timing.retries)? {
-                *number = told;
+            if let Answer::Number(answer) =
+                self.one(Exchange::new(Request::Inquire(part)), self.master.timing.retries)?
+            {
+                *number = answer;
             }
         }
         Ok(LssAddress::new(numbers))
     }
 
-    /// 11h: the node-ID of the slave in configuration state; `None` takes it away. It is in force after a reset,
-    /// and of a slave that had none when it is sent back to waiting state.
+    /// Sets the node-ID of the slave in configuration state (11h); `None` removes it. It takes effect after a reset, or
+    /// for a slave without node-ID when it is switched to waiting state.
     ///
     /// # Errors
-    /// The slave says no, or nothing; several answer.
+    /// The slave rejects it or does not answer, or several answer.
     pub fn configure_node_id(&mut self, node: Option<NodeId>) -> Result<(), LssError> {
         self.one(Exchange::new(Request::ConfigureNodeId(node)), self.master.timing.retries).map(|_| ())
     }
 
-    /// 13h: the bit rate of the slave in configuration state, by an entry of a table, 0 for that of CiA 305. It
-    /// is in force after [`Lss::activate`] or a reset.
+    /// Sets the bit rate of the slave in configuration state by a table index (13h). Table 0 is that of CiA 305. It
+    /// takes effect after [`Lss::activate`] or a reset.
     ///
     /// # Errors
-    /// The slave says no, or nothing; several answer.
+    /// The slave rejects it or does not answer, or several answer.
     pub fn configure_bit_timing(&mut self, table: u8, index: u8) -> Result<(), LssError> {
         let request = Request::ConfigureBitTiming { table, index };
         self.one(Exchange::new(request), self.master.timing.retries).map(|_| ())
     }
 
-    /// 15h: the slaves in configuration state are silent for this many milliseconds, then change the bit rate,
-    /// and are silent as long again. Nobody answers. The way back to waiting state is then at the new rate.
+    /// Activates the new bit rate (15h). The slaves in configuration state stop sending for this many milliseconds,
+    /// change the bit rate, and wait the same time again. Slaves do not answer. The command back to waiting state must
+    /// be sent at the new bit rate.
     ///
     /// # Errors
-    /// Only what stops everything.
+    /// The bus failed or the user interrupted.
     pub fn activate(&mut self, delay_ms: u16) -> Result<(), LssError> {
-        self.put_out(Request::ActivateBitTiming { delay_ms }.frame()).map(|_| ())
+        self.send_now(Request::ActivateBitTiming { delay_ms }.frame()).map(|_| ())
     }
 
-    /// 17h: node-ID and bit rate of the slave in configuration state for ever. Asked for once, and waited for
-    /// for [`STORE_TIME`] at least.
+    /// Stores node-ID and bit rate of the slave in configuration state in non-volatile memory (17h). The request is
+    /// sent once. The time-out is at least [`STORE_TIMEOUT`].
     ///
     /// # Errors
-    /// The slave says no, or nothing; several answer.
+    /// The slave rejects it or does not answer, or several answer.
     pub fn store(&mut self) -> Result<(), LssError> {
         self.one(Exchange::new(Request::Store), 0).map(|_| ())
     }
 
-    /// 46h to 4Bh: whether there are slaves within a range.
+    /// Whether slaves with an address in this range answer (46h to 4Bh).
     ///
     /// # Errors
-    /// Only what stops everything, and an answer against the protocol.
+    /// The bus failed, the user interrupted, or an answer violates the protocol.
     pub fn identify(&mut self, range: &LssRange) -> Result<bool, LssError> {
-        self.ask_around(Exchange::identify(range)).map(|exchange| exchange.has_answer())
+        self.ask_all(Exchange::identify(range)).map(|exchange| exchange.has_answer())
     }
 
-    /// 4Ch: whether there are slaves without a node-ID.
+    /// Whether slaves without a node-ID answer (4Ch).
     ///
     /// # Errors
-    /// Only what stops everything, and an answer against the protocol.
+    /// The bus failed, the user interrupted, or an answer violates the protocol.
     pub fn identify_unconfigured(&mut self) -> Result<bool, LssError> {
-        self.ask_around(Exchange::new(Request::IdentifyUnconfigured)).map(|exchange| exchange.has_answer())
+        self.ask_all(Exchange::new(Request::IdentifyUnconfigured)).map(|exchange| exchange.has_answer())
     }
 
-    /// 46h to 4Bh: whether there are slaves of the same vendor and product as this one.
+    /// Whether there are further slaves with the vendor and product of this one (46h to 4Bh).
     ///
     /// # Errors
-    /// Only what stops everything, and an answer against the protocol.
+    /// The bus failed, the user interrupted, or an answer violates the protocol.
     pub fn others(&mut self, address: &LssAddress) -> Result<Others, LssError> {
         let same = LssRange::from(*address);
-        let exchange = self.ask_around(Exchange::identify(&same))?;
+        let exchange = self.ask_all(Exchange::identify(&same))?;
         if !exchange.has_answer() {
             return Ok(Others::Unproven);
         }
@@ -269,22 +270,22 @@ impl<'bus> Lss<'_, 'bus> {
         Ok(Others::None)
     }
 
-    /// A question that everybody who is meant answers alike. Silence is an answer.
-    fn ask_around(&mut self, mut exchange: Exchange) -> Result<Exchange, LssError> {
+    /// Carries out a service that all matching slaves answer in the same way. No answer is a result too.
+    fn ask_all(&mut self, mut exchange: Exchange) -> Result<Exchange, LssError> {
         self.carry_out(&mut exchange, Until::Answer, self.master.timing.retries)?;
         Ok(exchange)
     }
 
-    /// A service that one slave shall carry out.
+    /// Carries out a service with one slave.
     fn one(&mut self, mut exchange: Exchange, retries: u32) -> Result<Answer, LssError> {
         self.carry_out(&mut exchange, Until::Answer, retries)?;
         exchange.one().map_err(|error| self.error(&exchange, error))
     }
 
-    /// A question to everybody in configuration state.
+    /// Carries out a service with all slaves in configuration state.
     fn gather<T>(&mut self, request: Request, read: impl Fn(Answer) -> Option<T>) -> Result<Gathered<T>, LssError> {
         let mut exchange = Exchange::new(request);
-        self.carry_out(&mut exchange, Until::Over, self.master.timing.retries)?;
+        self.carry_out(&mut exchange, Until::Timeout, self.master.timing.retries)?;
         let mut answers = Vec::new();
         for &(frame, answer) in exchange.answers() {
             let violation = |violation| self.error(&exchange, ExchangeError::Violation(violation, frame));
@@ -299,43 +300,43 @@ impl<'bus> Lss<'_, 'bus> {
     fn error(&self, exchange: &Exchange, error: ExchangeError) -> LssError {
         let service = exchange.service();
         match error {
-            ExchangeError::NoAnswer => LssError::NoAnswer { service, waited: self.patience(exchange) },
+            ExchangeError::NoAnswer => LssError::NoAnswer { service, waited: self.timeout_of(exchange) },
             ExchangeError::Several(frames) => LssError::Several { service, frames },
             ExchangeError::Refused(code) => LssError::Refused { service, code },
             ExchangeError::Violation(violation, frame) => LssError::Violation { service, violation, frame },
         }
     }
 
-    /// The longest wait for one answer.
-    fn patience(&self, exchange: &Exchange) -> Duration {
+    /// The time-out of a service.
+    fn timeout_of(&self, exchange: &Exchange) -> Duration {
         let timeout = self.master.timing.timeout;
-        if exchange.service() == Service::Store { timeout.max(STORE_TIME) } else { timeout }
+        if exchange.service() == Service::Store { timeout.max(STORE_TIMEOUT) } else { timeout }
     }
 
-    /// Asks, and again where nobody answers.
+    /// Sends a request and waits for answers; repeats it if there is none.
     fn carry_out(&mut self, exchange: &mut Exchange, until: Until, retries: u32) -> Result<(), LssError> {
-        // What came before the question is no answer to it.
-        self.pass_by()?;
+        // Frames received before the request do not answer it.
+        self.discard_received()?;
         self.faults.clear();
-        let patience = self.patience(exchange);
+        let timeout = self.timeout_of(exchange);
         for attempt in 0..=retries {
-            // A slave whose answer was lost is in configuration state, where an address says nothing to it.
+            // If only the answer was lost, the slave is in configuration state and ignores the address.
             if attempt > 0 && exchange.service() == Service::SwitchSelective {
-                self.put_out(Request::SwitchGlobal(Mode::Waiting).frame())?;
-                self.pause(LONG_PAUSE)?;
+                self.send_now(Request::SwitchGlobal(Mode::Waiting).frame())?;
+                self.pause(RETRY_PAUSE)?;
             }
             let mut sent = Mono::START;
             for (index, frame) in exchange.ask().into_iter().enumerate() {
                 if index > 0 {
-                    self.pause(if attempt == 0 { PAUSE } else { LONG_PAUSE })?;
+                    self.pause(if attempt == 0 { FRAME_PAUSE } else { RETRY_PAUSE })?;
                 }
-                sent = self.put_out(frame)?;
+                sent = self.send_now(frame)?;
             }
-            let mut deadline = sent + patience;
+            let mut deadline = sent + timeout;
             while let Some(received) = self.next(deadline)? {
                 let is_first = !exchange.has_answer();
                 if exchange.on_frame(&received.frame) && is_first && until == Until::Answer {
-                    deadline = deadline.min(received.at.mono + LINGER);
+                    deadline = deadline.min(received.at.mono + FURTHER_ANSWERS_TIMEOUT);
                 }
             }
             if exchange.has_answer() {
@@ -346,36 +347,36 @@ impl<'bus> Lss<'_, 'bus> {
     }
 
     /// Sends a frame. Returns the moment just before.
-    fn put_out(&mut self, frame: Frame) -> Result<Mono, LssError> {
+    fn send_now(&mut self, frame: Frame) -> Result<Mono, LssError> {
         self.master.send(frame);
         loop {
-            let step = match self.master.send_what_waits() {
+            let step = match self.master.send_waiting() {
                 Ok(None) => return Ok(self.master.seen),
                 Ok(Some(retry_at)) => self.next(retry_at),
                 Err(error) => Err(error.into()),
             };
             match step {
-                // It has gone out while waiting, and this may be the answer.
-                Ok(Some(received)) if !self.master.is_sending() => self.master.put_back = Some(received),
+                // The frame was sent while waiting, and this may be the answer.
+                Ok(Some(received)) if !self.master.is_sending() => self.master.pending = Some(received),
                 Ok(_) => {}
                 Err(error) => {
-                    // Given up, it must not go out later.
-                    self.master.outgoing.take_back(&frame);
+                    // The frame must not be sent later.
+                    self.master.outgoing.remove(&frame);
                     return Err(error);
                 }
             }
         }
     }
 
-    /// Lets time pass.
+    /// Waits for this time.
     fn pause(&mut self, length: Duration) -> Result<(), LssError> {
         let until = self.master.now() + length;
         while self.next(until)?.is_some() {}
         Ok(())
     }
 
-    /// Takes in what is there already.
-    fn pass_by(&mut self) -> Result<(), LssError> {
+    /// Discards the frames that were already received.
+    fn discard_received(&mut self) -> Result<(), LssError> {
         let now = self.master.now();
         loop {
             match self.next(now) {
@@ -386,7 +387,7 @@ impl<'bus> Lss<'_, 'bus> {
         }
     }
 
-    /// The next frame of a slave, `None` when the moment is there.
+    /// The next frame of a slave; `None` when `until` is reached.
     fn next(&mut self, until: Mono) -> Result<Option<Received>, LssError> {
         loop {
             match self.master.next(until)? {
@@ -403,7 +404,7 @@ impl<'bus> Lss<'_, 'bus> {
                     }
                 }
                 Happening::Deadline => return Ok(None),
-                Happening::Fault(fault, _) if self.faults.len() < FAULTS => self.faults.push(fault),
+                Happening::Fault(fault, _) if self.faults.len() < MAX_FAULTS => self.faults.push(fault),
                 Happening::Interrupted => return Err(Error::Interrupted.into()),
                 Happening::Link(false) => return Err(BusError::Down(self.master.bus.name().to_owned()).into()),
                 Happening::Sdo(..)
@@ -416,7 +417,7 @@ impl<'bus> Lss<'_, 'bus> {
     }
 }
 
-/// Whether it can come from two slaves that send at the same time.
+/// Whether two slaves that send at the same time can cause this fault.
 fn is_collision(fault: Fault) -> bool {
     matches!(fault, Fault::Protocol | Fault::ErrorWarning | Fault::ErrorPassive | Fault::BusOff | Fault::Other)
 }

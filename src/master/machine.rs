@@ -1,4 +1,4 @@
-//! One transfer's protocol machine, whichever way it goes.
+//! The protocol state machine of one transfer: read or write, with or without blocks.
 
 use super::transfer::{Blocks, LARGE};
 use crate::canopen::frame::Frame;
@@ -8,7 +8,7 @@ use crate::canopen::sdo::{
     AbortCode, BlockDownload, BlockUpload, Download, DownloadSize, Progress, TransferError, Upload, Uploaded,
 };
 
-/// The machines of CiA 301, 7.2.4.3.
+/// The state machines of CiA 301, 7.2.4.3.
 #[derive(Clone, Debug)]
 pub(super) enum Machine {
     Read(Upload),
@@ -52,7 +52,7 @@ impl Machine {
         }
     }
 
-    /// Whether data goes, or went, in blocks.
+    /// Whether the data is transferred in blocks.
     pub(super) fn is_in_blocks(&self) -> bool {
         match self {
             Machine::Read(_) | Machine::Write(_) => false,
@@ -61,13 +61,13 @@ impl Machine {
         }
     }
 
-    /// Whether this is a segmented read that has just begun, of an object that is large by its own account.
+    /// Whether this is a segmented upload at its start, and the device announced a large object.
     pub(super) fn is_worth_blocks(&self) -> bool {
         let Machine::Read(upload) = self else { return false };
         matches!(upload.received(), (0, Some(size)) if size >= LARGE)
     }
 
-    /// Bytes transferred so far and bytes in all, where known.
+    /// Bytes transferred so far and in total, if known.
     pub(super) fn moved(&self) -> (usize, Option<usize>) {
         let announced = |size: Option<u32>| size.and_then(|size| usize::try_from(size).ok());
         match self {
@@ -87,14 +87,14 @@ impl Machine {
         }
     }
 
-    /// A frame of the transfer is on its way.
+    /// The bus has taken a frame of the transfer.
     pub(super) fn on_sent(&mut self) {
         if let Machine::WriteBlocks(download) = self {
             download.on_sent();
         }
     }
 
-    /// `None` if the transfer goes on all the same.
+    /// Handles a time-out. `None` if the transfer continues.
     pub(super) fn on_timeout(&mut self, out: &mut Vec<Frame>) -> Option<TransferError> {
         match self {
             Machine::Read(upload) => Some(upload.on_timeout(out)),

@@ -1,10 +1,10 @@
-//! Drives the protocol machines over a [`Bus`]: one deadline an exchange, retries, matching, many
-//! exchanges side by side.
+//! Drives the protocol state machines over a [`Bus`]: one deadline per exchange, retries, matching of answers, many
+//! exchanges in parallel.
 //!
-//! [`Master::next`] is the one loop: it sends what waits, receives one thing, lets the SDO client see it
-//! and says what happened. Everything that blocks is built on it.
+//! [`Master::next`] is the only loop. It sends waiting frames, receives one event, passes it to the SDO client and
+//! returns what happened. All blocking functions are built on it.
 
-mod company;
+mod foreign_traffic;
 pub mod lss;
 mod machine;
 mod request;
@@ -14,7 +14,7 @@ pub mod transfer;
 
 pub use lss::{Lss, LssError};
 pub use request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
-pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, Way, read_object, write_object};
+pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, TransferKind, read_object, write_object};
 
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};
 use crate::canopen::frame::Frame;
@@ -27,15 +27,15 @@ use sdo::SdoClient;
 use send::Outgoing;
 use std::time::Duration;
 
-/// How much later than the end of a recording a frame may be said to have come that was there already.
-const DRAIN: Duration = Duration::from_secs(1);
+/// The longest time that [`Master::drain`] accepts frames after its moment.
+const DRAIN_LIMIT: Duration = Duration::from_secs(1);
 
-/// How long to wait and how often to ask.
+/// Time-out and retries of requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
     /// The longest wait for one answer.
     pub timeout: Duration,
-    /// How often a request that got no answer is repeated.
+    /// How often a request without an answer is repeated.
     pub retries: u32,
 }
 
@@ -45,13 +45,13 @@ impl Default for Timing {
     }
 }
 
-/// Why something could not be done.
+/// Why an operation of the master failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The bus fails.
+    /// The bus failed.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// One device stands in the way.
+    /// A transfer with one device failed.
     #[error("node {}: {}", .0.node, .0)]
     Sdo(SdoError),
     /// The user asked to stop.
@@ -65,24 +65,24 @@ impl From<SdoError> for Error {
     }
 }
 
-/// Something that happened while waiting.
+/// An event that [`Master::next`] returns.
 #[derive(Debug)]
 pub enum Happening {
-    /// A frame that is no part of our SDO transfers.
+    /// A frame that does not belong to our SDO transfers.
     Frame(Received),
     /// An SDO transfer has ended.
     Sdo(Ticket, Result<Answer, SdoError>),
-    /// The controller reports trouble.
+    /// The controller reports a fault.
     Fault(Fault, Stamp),
     /// The kernel dropped frames.
     Dropped(u32),
-    /// The interface went down or came back.
+    /// The interface went down (`false`) or came up (`true`).
     Link(bool),
-    /// The moment waited for is there.
+    /// The deadline was reached.
     Deadline,
-    /// The recording that is played again is over.
+    /// The replayed recording has ended.
     Ended,
-    /// The user asked to stop.
+    /// The user asked to stop (Ctrl-C, SIGTERM).
     Interrupted,
 }
 
@@ -92,9 +92,9 @@ pub struct Master<'bus> {
     timing: Timing,
     sdo: SdoClient,
     outgoing: Outgoing,
-    /// A frame that came after the moment waited for.
-    put_back: Option<Received>,
-    /// The latest moment known without looking at the clock again.
+    /// A frame that was received after the deadline. It is handled next.
+    pending: Option<Received>,
+    /// The latest known moment. It saves readings of the clock.
     seen: Mono,
 }
 
@@ -102,18 +102,17 @@ impl<'bus> Master<'bus> {
     /// A master on `bus`.
     pub fn new(bus: &'bus mut dyn Bus, timing: Timing) -> Master<'bus> {
         let outgoing = Outgoing::new();
-        Master { bus, timing, sdo: SdoClient::default(), outgoing, put_back: None, seen: Mono::START }
+        Master { bus, timing, sdo: SdoClient::default(), outgoing, pending: None, seen: Mono::START }
     }
 
-    /// Takes this side of the bus to another bit rate in bit/s. Transfers under way end, and what waits to be sent is
-    /// lost.
+    /// Sets the host's interface to another bit rate in bit/s. Transfers in progress end, and waiting frames are lost.
     ///
     /// # Errors
-    /// What the interface says; it may then be down.
+    /// The interface rejects the bit rate. It may then be down.
     pub fn set_bit_rate(&mut self, bit_rate: u32) -> Result<(), BusError> {
         self.sdo.cancel(&mut Vec::new());
-        self.outgoing.begin_anew();
-        self.put_back = None;
+        self.outgoing.reset();
+        self.pending = None;
         self.bus.set_bit_rate(bit_rate, crate::bus::Mode::Normal)
     }
 
@@ -122,7 +121,7 @@ impl<'bus> Master<'bus> {
         &*self.bus
     }
 
-    /// The time-outs in force.
+    /// The time-out and retries of this master.
     pub fn timing(&self) -> Timing {
         self.timing
     }
@@ -132,73 +131,78 @@ impl<'bus> Master<'bus> {
         self.bus.mono()
     }
 
-    /// Tells the bus which frames are wanted.
+    /// Sets which frames the bus delivers.
+    ///
+    /// # Errors
+    /// The bus rejects the filters.
     pub fn listen(&mut self, filters: &Filters) -> Result<(), Error> {
         Ok(self.bus.listen(filters)?)
     }
 
-    /// Wants nothing but the SDO channels and the signs of life of these nodes. On a bus full of other traffic
-    /// all of that would have to be read and thrown away, and an answer might find no room among it.
+    /// Receives only the SDO channels and the heartbeats of these nodes. On a busy bus, other frames cost time and may
+    /// fill the receive buffer.
+    ///
+    /// # Errors
+    /// The bus rejects the filters.
     pub fn listen_to(&mut self, nodes: &[NodeId]) -> Result<(), Error> {
         let ids = |&node| [CanId::sdo_response(node), CanId::sdo_request(node), CanId::heartbeat(node)];
         self.listen(&Filters::Only(nodes.iter().flat_map(ids).collect()))
     }
 
-    /// Puts a frame behind those already waiting to be sent.
+    /// Queues a frame for sending, after all waiting frames.
     pub fn send(&mut self, frame: Frame) {
         self.outgoing.push(frame, None);
     }
 
-    /// Puts a frame before all that wait: a SYNC must not stand behind SDO requests. `false` where the one
-    /// before has not even been sent: two of them in a row are one too many.
+    /// Queues a frame before all waiting frames, so that a SYNC does not wait for SDO requests. `false` if the
+    /// previous one still waits; then the frame is not queued again.
     pub fn send_first(&mut self, frame: Frame) -> bool {
         self.outgoing.push_first(frame)
     }
 
-    /// When the bus took the frame that was last put before all others, told once; nothing while it waits, and
-    /// where it was lost.
+    /// When the bus took the frame of [`Master::send_first`], returned once. `None` if it still waits or was dropped.
     pub fn take_first_at(&mut self) -> Option<Mono> {
         self.outgoing.take_first_at()
     }
 
-    /// Takes back the frame that was last put before all others; `true` if it had not been sent.
-    pub fn take_back_first(&mut self) -> bool {
-        self.outgoing.take_back_first()
+    /// Removes the frame of [`Master::send_first`] from the queue; `true` if it was not sent yet.
+    pub fn remove_first(&mut self) -> bool {
+        self.outgoing.remove_first()
     }
 
-    /// How many frames the kernel dropped that nothing has told of yet.
+    /// The number of frames that the kernel dropped and that no event reported. See [`Bus::late_drops`].
     pub fn late_drops(&mut self) -> u32 {
         self.bus.late_drops()
     }
 
-    /// From now on an interface that is down, and a bus on which nobody acknowledges, are ridden out: what
-    /// cannot be sent is lost, as any frame may be, and the work goes on. Otherwise they are errors.
-    pub fn ride_out(&mut self, rides_out: bool) {
-        self.outgoing.ride_out(rides_out);
+    /// Sets whether an interface that is down and a bus without acknowledge are tolerated. If so, frames that cannot be
+    /// sent are dropped. If not, both are errors, which is the default.
+    pub fn set_tolerates_outages(&mut self, tolerates_outages: bool) {
+        self.outgoing.set_tolerates_outages(tolerates_outages);
     }
 
-    /// Starts an SDO transfer; its end comes as [`Happening::Sdo`] with the ticket returned. One transfer a
-    /// node at a time; others of the same node wait their turn.
+    /// Starts an SDO transfer. Its result comes as [`Happening::Sdo`] with the returned ticket. Each node has one
+    /// transfer at a time; further ones wait.
     pub fn start(&mut self, request: Request) -> Ticket {
         self.sdo.submit(request)
     }
 
-    /// Tells how a node's SDO server deviates from the standard.
+    /// Sets how a node's SDO server deviates from the standard.
     pub fn set_quirks(&mut self, node: NodeId, quirks: &[Quirk]) {
         self.sdo.accept_60(node, quirks.contains(&Quirk::UploadAnswered60));
     }
 
-    /// Whether an SDO transfer is under way or waiting.
+    /// Whether an SDO transfer is in progress or waiting.
     pub fn is_busy(&self) -> bool {
         self.sdo.is_busy()
     }
 
-    /// Whether frames still wait to be sent.
+    /// Whether frames wait to be sent.
     pub fn is_sending(&self) -> bool {
         !self.outgoing.is_empty()
     }
 
-    /// Drops transfers whose end no longer matters: a scan's. Nobody is told; their answers are ignored.
+    /// Drops transfers without an abort, for example those of a scan. Their answers are ignored.
     pub fn forget(&mut self, tickets: impl Iterator<Item = Ticket>) {
         for ticket in tickets {
             self.sdo.forget(ticket);
@@ -206,7 +210,7 @@ impl<'bus> Master<'bus> {
         }
     }
 
-    /// Ends every SDO transfer; servers that had begun are told.
+    /// Ends all SDO transfers. Servers that had answered get an abort.
     pub fn cancel(&mut self) {
         let mut out = Vec::new();
         self.sdo.cancel(&mut out);
@@ -215,11 +219,11 @@ impl<'bus> Master<'bus> {
             self.outgoing.push(frame, None);
         }
         let now = self.now();
-        // The bus may be gone; then there is nobody to tell.
+        // If the bus is gone, the aborts are lost.
         let _ = self.outgoing.flush(self.bus, now, self.timing.timeout, &mut |_, _| {});
     }
 
-    /// Sends what still waits, within a second at most: an abort, a state put back.
+    /// Sends the waiting frames, for example an abort or an NMT command that restores a state. Takes at most 1 s.
     pub fn settle(&mut self) {
         if !self.is_sending() {
             return;
@@ -233,34 +237,41 @@ impl<'bus> Master<'bus> {
         }
     }
 
-    /// The next thing that happens, at the latest [`Happening::Deadline`] once `until` is reached.
+    /// Waits for the next event. Returns [`Happening::Deadline`] when `until` is reached.
     ///
-    /// Time is told by what is received, so that traffic never extends a deadline and a slow program never
-    /// shortens one: a frame that came after a deadline is looked at after the deadline.
+    /// The receive time of frames counts. So traffic never extends a deadline, and a slow program never shortens one:
+    /// a frame received after the deadline is handled after it.
+    ///
+    /// # Errors
+    /// The bus failed.
     pub fn next(&mut self, until: Mono) -> Result<Happening, Error> {
         self.next_or(until, until)
     }
 
-    /// The next thing that had been received by the moment `stop`, without waiting for more; at the end
-    /// [`Happening::Deadline`]. A frame counts as received by then as long as nothing says how long it lay
-    /// there: on a busy machine the times of frames are off by what the clocks were read apart. On a bus that
-    /// is never silent `DRAIN` ends it.
+    /// Returns the next event that was received by the moment `stop`, without waiting. Returns
+    /// [`Happening::Deadline`] if there is none.
+    ///
+    /// Frames that are already there count up to one second (`DRAIN_LIMIT`) after `stop`, because receive times are
+    /// inaccurate on a busy machine.
+    ///
+    /// # Errors
+    /// The bus failed.
     pub fn drain(&mut self, stop: Mono) -> Result<Happening, Error> {
-        self.next_or(stop, stop + DRAIN)
+        self.next_or(stop, stop + DRAIN_LIMIT)
     }
 
-    /// Waits until `until`, and takes frames for earlier than that up to `last`.
+    /// Waits until `until`. Frames received up to `last` count as received before it.
     fn next_or(&mut self, until: Mono, last: Mono) -> Result<Happening, Error> {
         loop {
             if let Some((ticket, result)) = self.sdo.pop_finished() {
                 return Ok(Happening::Sdo(ticket, result));
             }
-            let retry_at = self.send_what_waits()?;
+            let retry_at = self.send_waiting()?;
             let mut deadline = until;
             for other in [retry_at, self.sdo.next_deadline()].into_iter().flatten() {
                 deadline = deadline.min(other);
             }
-            let event = match self.put_back.take() {
+            let event = match self.pending.take() {
                 Some(received) => Event::Frame(received),
                 None => self.bus.receive(deadline)?,
             };
@@ -269,7 +280,7 @@ impl<'bus> Master<'bus> {
                     let at = received.at.mono;
                     self.seen = self.seen.max(at);
                     if at > last {
-                        self.put_back = Some(received);
+                        self.pending = Some(received);
                         return Ok(Happening::Deadline);
                     }
                     self.sdo.on_time(at, &self.timing, &mut self.outgoing);
@@ -292,8 +303,9 @@ impl<'bus> Master<'bus> {
         }
     }
 
-    /// Reads the clock only when there is something to send: on some machines that is a system call.
-    fn send_what_waits(&mut self) -> Result<Option<Mono>, Error> {
+    /// Sends the frames that can be sent now; returns when to try again. It reads the clock only if there is something
+    /// to send, because on some machines that is a system call.
+    fn send_waiting(&mut self) -> Result<Option<Mono>, Error> {
         if !self.sdo.can_start() && self.outgoing.is_empty() {
             return Ok(None);
         }
@@ -307,12 +319,11 @@ impl<'bus> Master<'bus> {
         Ok(retry_at)
     }
 
-    /// Carries out transfers side by side and returns their results in the order of the requests. Frames
-    /// that are no part of them go to `watch`. A node that was silent to one request is not asked the rest:
-    /// those end as cancelled.
+    /// Carries out transfers in parallel. The results have the order of the requests. Frames that do not belong to
+    /// them go to `watch`. If a node does not answer a request, its other requests end as cancelled.
     ///
     /// # Errors
-    /// Only what stops everything; what one device does is in its result.
+    /// The bus failed or the user interrupted. Failures of one device are in its result.
     pub fn transfer(
         &mut self,
         requests: Vec<Request>,
@@ -358,7 +369,10 @@ impl<'bus> Master<'bus> {
         Ok(results.into_iter().flatten().collect())
     }
 
-    /// One transfer.
+    /// Carries out one transfer.
+    ///
+    /// # Errors
+    /// Outer: the bus failed or the user interrupted. Inner: the transfer failed.
     pub fn transfer_one(&mut self, request: Request) -> Result<Result<Answer, SdoError>, Error> {
         let (node, object, operation) = (request.node, request.object, request.operation());
         let result = self.transfer(vec![request], &mut |_| {})?.pop();
@@ -366,6 +380,9 @@ impl<'bus> Master<'bus> {
     }
 
     /// Reads a value of a known type.
+    ///
+    /// # Errors
+    /// Outer: the bus failed or the user interrupted. Inner: the transfer failed or the bytes do not fit the type.
     pub fn read(
         &mut self,
         node: NodeId,
@@ -378,10 +395,10 @@ impl<'bus> Master<'bus> {
 }
 
 impl Answer {
-    /// The value read, and what was odd about how it came.
+    /// The value read, and a note if the device deviated from the protocol.
     ///
     /// # Errors
-    /// Bytes that make no value of the type.
+    /// The bytes do not fit the type.
     pub fn value(
         &self,
         node: NodeId,

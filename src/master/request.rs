@@ -1,7 +1,7 @@
-//! What is asked of an SDO server, and what comes of it.
+//! SDO requests, answers and errors.
 
 use super::machine::Machine;
-use super::transfer::{Blocks, Way};
+use super::transfer::{Blocks, TransferKind};
 use crate::bus::Stamp;
 use crate::bus::time::spoken;
 use crate::canopen::frame::Frame;
@@ -11,25 +11,25 @@ use crate::canopen::sdo::{AbortCode, DownloadSize, FitError, Uploaded, Violation
 use std::fmt;
 use std::time::Duration;
 
-/// Names a transfer from its start to its end.
+/// Identifies a transfer from its start to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Ticket {
     pub(super) number: u64,
     pub(super) node: NodeId,
 }
 
-/// What is to be transferred.
+/// A transfer to carry out.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// With which node.
+    /// The node.
     pub node: NodeId,
-    /// Which object.
+    /// The object.
     pub object: ObjectId,
     kind: Kind,
     pub(super) timeout: Option<Duration>,
     pub(super) repeatable: bool,
     pub(super) blocks: Blocks,
-    /// The device does no block transfer of this object: that was found out in this very transfer.
+    /// The device rejected block transfer during this request.
     pub(super) refused_blocks: bool,
 }
 
@@ -40,12 +40,12 @@ enum Kind {
 }
 
 impl Request {
-    /// A read.
+    /// An SDO upload.
     pub fn read(node: NodeId, object: ObjectId) -> Request {
         Request::new(node, object, Kind::Read)
     }
 
-    /// A write of a plain value.
+    /// An SDO download of a plain value, which may be repeated.
     pub fn write(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> Request {
         Request::new(node, object, Kind::Write { data, size })
     }
@@ -55,32 +55,32 @@ impl Request {
         Request { node, object, kind, timeout: None, repeatable: true, blocks, refused_blocks }
     }
 
-    /// In blocks, or not: see [`super::BlockMode`] for the choice.
+    /// Sets whether blocks are used; [`super::BlockMode`] chooses.
     pub fn blocks(mut self, blocks: Blocks) -> Request {
         self.blocks = blocks;
         self
     }
 
-    /// Sent once only, whatever the time-outs say: signatures, and scans that do their own asking.
+    /// Never repeats the request: for signatures, and for scans that repeat it themselves.
     pub fn once(mut self) -> Request {
         self.repeatable = false;
         self
     }
 
-    /// With a longer wait than others: storing.
+    /// Sets another time-out than that of the master, for example for storing.
     pub fn within(mut self, timeout: Duration) -> Request {
         self.timeout = Some(timeout);
         self
     }
 
-    /// A read that is waited for as long as another request, and repeated even where that may not be. Asking for
-    /// blocks in vain was asking once.
-    pub(super) fn patient_as(mut self, other: &Request) -> Request {
+    /// The same request with the time-out of another one. It is repeated even if the other one must not be, but not
+    /// after a rejected block request, which counts as the first attempt.
+    pub(super) fn with_patience_of(mut self, other: &Request) -> Request {
         (self.timeout, self.repeatable) = (other.timeout, !other.refused_blocks);
         self
     }
 
-    /// Whether a request for blocks is only the first try.
+    /// Whether the transfer continues without blocks if the device rejects them.
     pub(super) fn falls_back(&self) -> bool {
         matches!(self.blocks, Blocks::First { .. })
     }
@@ -97,7 +97,7 @@ impl Request {
         }
     }
 
-    /// Whether it reads or writes.
+    /// Upload or download.
     pub fn operation(&self) -> Operation {
         match self.kind {
             Kind::Read => Operation::Read,
@@ -106,7 +106,7 @@ impl Request {
     }
 }
 
-/// Whether a transfer reads or writes.
+/// The direction of a transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operation {
     /// SDO upload.
@@ -124,38 +124,38 @@ impl fmt::Display for Operation {
     }
 }
 
-/// The end of a transfer that succeeded.
+/// The result of a successful transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Answer {
-    /// What was read; `None` of a write.
+    /// The bytes read; `None` for a write.
     pub uploaded: Option<Uploaded>,
     /// When the last frame of the answer was received.
     pub at: Stamp,
-    /// How the data went.
-    pub way: Way,
+    /// The kind of transfer that carried the data.
+    pub way: TransferKind,
 }
 
-/// Why a transfer has no result.
+/// A failed transfer.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{operation} {object}: {failure}")]
 pub struct SdoError {
-    /// With which node.
+    /// The node.
     pub node: NodeId,
-    /// Which object.
+    /// The object.
     pub object: ObjectId,
-    /// Whether it was read or written.
+    /// Upload or download.
     pub operation: Operation,
-    /// What went wrong.
+    /// The reason.
     pub failure: SdoFailure,
 }
 
-/// What went wrong with a transfer.
+/// Why a transfer failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SdoFailure {
-    /// The device refused.
+    /// The device sent an abort code.
     #[error("refused by the device ({0})")]
     Refused(AbortCode),
-    /// Nothing came.
+    /// The device did not answer in time.
     #[error("no answer within {}{}", spoken(*.waited), if *.begun { " in the middle of the transfer" } else { "" })]
     NoAnswer {
         /// The longest wait for one answer.
@@ -163,22 +163,22 @@ pub enum SdoFailure {
         /// Whether the device had begun to answer.
         begun: bool,
     },
-    /// The device answered against the protocol.
+    /// The answer violates the protocol.
     #[error("{0}: {1}")]
     Violation(Violation, Frame),
-    /// The device delivered bytes that make no value of the type.
+    /// The bytes do not fit the data type.
     #[error("{0}")]
     Fit(FitError),
-    /// The object holds text or bytes where a measured value was asked for.
-    #[error("it is no number")]
+    /// A number was needed, and the object holds text or bytes.
+    #[error("the value is not a number")]
     NotANumber,
-    /// Another client wrote the same object at the same time.
-    #[error("acknowledged, and whose write that was is not known: another master wrote the same object")]
+    /// Another master wrote the same object at the same time, so the acknowledge may be for its write.
+    #[error("acknowledged, but another master wrote the same object at the same time")]
     Ambiguous,
-    /// Others use the channel, time and again.
+    /// Another master used the channel again and again.
     #[error("another master uses the node's SDO channel at the same time")]
     Disturbed,
-    /// We gave up.
+    /// The caller cancelled the transfer, or the node was silent to an earlier one.
     #[error("not finished")]
     Cancelled,
 }

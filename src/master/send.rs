@@ -1,4 +1,4 @@
-//! What waits to be sent: paced to the bit rate, patient with a full transmit queue.
+//! The queue of frames to send. It is paced to the bit rate and copes with a full transmit queue.
 
 use super::Ticket;
 use crate::bus::{Bus, BusError, Mono};
@@ -7,28 +7,28 @@ use crate::canopen::wire_length::{bit_time, frame_time};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// How long to wait before trying a full transmit queue again. Linux gives no wake-up for it.
-const RETRY: Duration = Duration::from_millis(1);
+/// The wait before a full transmit queue is tried again. Linux does not report when it has room.
+const QUEUE_RETRY_INTERVAL: Duration = Duration::from_millis(1);
 
-/// How many frames may be ahead of the wire. The default transmit queue of a Linux interface holds 10.
-const AHEAD: u32 = 4;
+/// How many frames may wait in the interface. The default transmit queue of a Linux interface holds 10.
+const MAX_QUEUED_FRAMES: u32 = 4;
 
-/// The longest classic frame with an 11-bit identifier: 8 bytes, every stuff bit, and the gap.
+/// The longest classic frame with an 11-bit identifier, in bits: 8 data bytes, all stuff bits, intermission.
 const LONGEST_FRAME_BITS: u32 = 135;
 
 /// The queue between the protocol machines and the bus.
 pub(super) struct Outgoing {
     queue: VecDeque<(Frame, Option<Ticket>)>,
-    /// Asked for when there is first something to be paced: on some buses the question takes its time.
+    /// The bit rate in bit/s, read at the first need: on some buses that takes time.
     bit_rate: Option<Option<u32>>,
-    /// When the wire will have carried everything sent so far, if nobody else sends.
+    /// When the bus has carried all frames sent so far, if no other node sends.
     wire_free_at: Mono,
     full_since: Option<Mono>,
-    /// What cannot be sent is lost, as on the wire, and no error.
-    rides_out: bool,
-    /// What was put before all others, while it waits.
+    /// A frame that cannot be sent is dropped without an error.
+    tolerates_outages: bool,
+    /// The frame that was queued before all others, while it waits.
     first: Option<Frame>,
-    /// When it was handed to the bus.
+    /// When the bus took it.
     first_at: Option<Mono>,
 }
 
@@ -40,7 +40,7 @@ impl Outgoing {
             bit_rate: None,
             wire_free_at,
             full_since: None,
-            rides_out: false,
+            tolerates_outages: false,
             first: None,
             first_at: None,
         }
@@ -54,7 +54,7 @@ impl Outgoing {
         self.queue.push_back((frame, ticket));
     }
 
-    /// Puts a frame before all others, unless the very same is there already.
+    /// Queues a frame before all others; `false` if the same frame is already there.
     pub(super) fn push_first(&mut self, frame: Frame) -> bool {
         let is_new = self.queue.front() != Some(&(frame, None));
         if is_new {
@@ -64,66 +64,66 @@ impl Outgoing {
         is_new
     }
 
-    /// Forgets everything, and what it knew of the bus: that is at another bit rate now.
-    pub(super) fn begin_anew(&mut self) {
-        *self = Outgoing { rides_out: self.rides_out, ..Outgoing::new() };
+    /// Drops all frames and reads the bit rate again when it is needed.
+    pub(super) fn reset(&mut self) {
+        *self = Outgoing { tolerates_outages: self.tolerates_outages, ..Outgoing::new() };
     }
 
-    /// When the bus took the frame that was last put before all others; told once. Nothing where it still waits or
-    /// was lost.
+    /// When the bus took the frame that was last queued before all others, returned once. `None` if it still waits
+    /// or was dropped.
     pub(super) fn take_first_at(&mut self) -> Option<Mono> {
         self.first_at.take()
     }
 
-    /// Takes back what was put before all others, if it still waits.
-    pub(super) fn take_back_first(&mut self) -> bool {
+    /// Removes the frame that was last queued before all others, if it still waits.
+    pub(super) fn remove_first(&mut self) -> bool {
         self.first.take().is_some_and(|frame| {
             let before = self.queue.len();
-            self.take_back(&frame);
+            self.remove(&frame);
             self.queue.len() < before
         })
     }
 
-    pub(super) fn ride_out(&mut self, rides_out: bool) {
-        self.rides_out = rides_out;
+    pub(super) fn set_tolerates_outages(&mut self, tolerates_outages: bool) {
+        self.tolerates_outages = tolerates_outages;
     }
 
-    /// Forgets a frame that is no part of an SDO transfer, if it still waits.
-    pub(super) fn take_back(&mut self, gone: &Frame) {
+    /// Removes a waiting frame that does not belong to an SDO transfer.
+    pub(super) fn remove(&mut self, gone: &Frame) {
         self.queue.retain(|(frame, ticket)| ticket.is_some() || frame != gone);
     }
 
-    /// Forgets the frames of SDO transfers.
+    /// Removes the frames of all SDO transfers.
     pub(super) fn drop_requests(&mut self) {
         self.queue.retain(|(_, ticket)| ticket.is_none());
     }
 
-    /// Forgets the frames of one SDO transfer.
+    /// Removes the frames of one SDO transfer.
     pub(super) fn drop_ticket(&mut self, gone: Ticket) {
         self.queue.retain(|(_, ticket)| *ticket != Some(gone));
     }
 
-    /// Sends what can be sent now and tells `sent` of each frame of a transfer. Returns when to try again,
-    /// if something is left.
+    /// Sends all frames that can be sent now, and calls `sent` for each frame of a transfer. Returns when to try again
+    /// if frames are left.
     ///
     /// # Errors
-    /// The bus's own, and a transmit queue that stays full for `patience` (at least a second). Neither a full
-    /// queue nor an interface that is down while [`Outgoing::ride_out`] holds.
+    /// An error of the bus, or a transmit queue that stays full for `queue_timeout` (at least one second). With
+    /// [`Outgoing::set_tolerates_outages`], a full queue and an interface that is down are not errors.
     pub(super) fn flush(
         &mut self,
         bus: &mut dyn Bus,
         now: Mono,
-        patience: Duration,
+        queue_timeout: Duration,
         sent: &mut dyn FnMut(Ticket, Mono),
     ) -> Result<Option<Mono>, BusError> {
-        if self.queue.len() > AHEAD as usize && self.bit_rate.is_none() {
+        if self.queue.len() > MAX_QUEUED_FRAMES as usize && self.bit_rate.is_none() {
             self.bit_rate = Some(bus.bit_rate().filter(|&rate| rate > 0));
         }
         let bit_rate = self.bit_rate.flatten();
         while let Some((frame, ticket)) = self.queue.front() {
             if let Some(bit_rate) = bit_rate {
                 let longest = bit_time(LONGEST_FRAME_BITS, bit_rate);
-                if self.wire_free_at.since(now) > longest * AHEAD {
+                if self.wire_free_at.since(now) > longest * MAX_QUEUED_FRAMES {
                     return Ok(Some(now + longest));
                 }
             }
@@ -132,19 +132,19 @@ impl Outgoing {
                 Ok(()) => {}
                 Err(BusError::QueueFull) => {
                     let since = *self.full_since.get_or_insert(now);
-                    if now.since(since) <= patience.max(Duration::from_secs(1)) {
-                        return Ok(Some(now + RETRY));
+                    if now.since(since) <= queue_timeout.max(Duration::from_secs(1)) {
+                        return Ok(Some(now + QUEUE_RETRY_INTERVAL));
                     }
-                    if !self.rides_out {
+                    if !self.tolerates_outages {
                         return Err(BusError::QueueFull);
                     }
-                    // Nobody takes anything. What waits would be too late when somebody does again.
+                    // No node acknowledges. The waiting frames would be too late when one does again.
                     self.first = None;
                     self.queue.drain(..).filter_map(|(_, ticket)| ticket).for_each(|ticket| sent(ticket, now));
                     self.full_since = None;
                     return Ok(None);
                 }
-                Err(BusError::Down(_) | BusError::NoInterface(_)) if self.rides_out => is_taken = false,
+                Err(BusError::Down(_) | BusError::NoInterface(_)) if self.tolerates_outages => is_taken = false,
                 Err(error) => return Err(error),
             }
             if ticket.is_none() && self.first == Some(*frame) {
@@ -154,7 +154,7 @@ impl Outgoing {
             if let Some(ticket) = ticket {
                 sent(*ticket, now);
             }
-            // What this very frame takes: at the longest for each, a long burst would fall behind the wire.
+            // The time of this frame, not of the longest one: a long burst would otherwise be slower than the bus.
             if let Some(bit_rate) = bit_rate {
                 self.wire_free_at = self.wire_free_at.max(now) + frame_time(frame, bit_rate);
             }

@@ -1,17 +1,17 @@
-//! One object, whole, in the way that suits it: expedited, in segments or in blocks.
+//! Reads and writes one object with the best kind of transfer: expedited, segmented or block.
 //!
-//! What a transfer of `n` bytes costs, with `s = n/7` segments, rounded up:
+//! Cost of a transfer of `n` bytes, with `s = n/7` segments, rounded up:
 //!
 //! | | frames | waits for the other side |
 //! |---|---|---|
-//! | in segments, both ways | `2 + 2s` | `1 + s` |
-//! | block download | `4 + s`, and one for every 127 segments | 2, and one for every 127 segments |
-//! | block upload | `5 + s`, and one for every 127 segments | 3, and one for every 127 segments |
+//! | segmented, read or write | `2 + 2s` | `1 + s` |
+//! | block download | `4 + s`, plus 1 for every 127 segments | 2, plus 1 for every 127 segments |
+//! | block upload | `5 + s`, plus 1 for every 127 segments | 3, plus 1 for every 127 segments |
 //!
-//! So blocks are the shorter way for more than 3 segments written and more than 4 read; in between it makes no
-//! difference, and with 28 bytes as the limit for both the worst case is level. A refusal costs two frames more.
-//! Most sensors know no block transfer (none of the four described does), so a device is bothered with it only
-//! where it pays: see [`BlockMode::Auto`].
+//! Block transfer needs fewer frames for more than 3 written segments or more than 4 read ones. With 28 bytes as the
+//! limit for both, it never needs more frames. A rejected block request costs two extra frames. Most sensors, and all
+//! four with a built-in description, do not support block transfer. So it is used only if it saves frames: see
+//! [`BlockMode::Auto`].
 
 use super::{Answer, Error, Happening, Master, Request, SdoError, Ticket};
 use crate::bus::{BusError, Received};
@@ -21,76 +21,76 @@ use crate::canopen::sdo::{AbortCode, DownloadSize};
 use crate::canopen::value::DataType;
 use std::time::Duration;
 
-/// Up to so many bytes segments are as good as blocks.
+/// Up to this size in bytes, a segmented transfer needs no more frames than a block transfer.
 pub const SMALL: u8 = 28;
 
-/// From so many bytes on (one full sub-block) it pays to break off a read in segments and begin anew in blocks:
-/// at worst 6 frames in vain beside 256.
+/// From this size in bytes (one full block), a segmented upload is aborted and restarted as a block upload. If the
+/// device rejects blocks, that costs 6 extra frames in at least 256.
 pub const LARGE: u32 = 889;
 
-/// How often a transfer under way is reported.
-const REPORT_EVERY: Duration = Duration::from_millis(100);
+/// The interval between two progress reports of a transfer.
+const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 
 /// When block transfer is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BlockMode {
-    /// Where it pays: writes of more than [`SMALL`] bytes, reads of type DOMAIN (the server may answer in the
-    /// usual way up to [`SMALL`] bytes), and reads that turn out to be [`LARGE`]. A device that does not do
-    /// it, be it that it refuses or that it is silent, gets the transfer in segments.
+    /// If it saves frames: writes of more than [`SMALL`] bytes, reads of type DOMAIN, and reads of at least [`LARGE`]
+    /// bytes. For DOMAIN, the server may answer segmented up to [`SMALL`] bytes. If the device rejects the block
+    /// request or does not answer it, the transfer is segmented.
     ///
-    /// Strings and unknown types are not asked for in blocks: they are mostly short, and how a server takes
-    /// a request that it does not know is its secret.
+    /// Strings and unknown types are first read segmented, because most are short and some servers react badly to an
+    /// unknown request.
     #[default]
     Auto,
-    /// For everything; what the device says to it is the result.
+    /// Always. If the device rejects it, the transfer fails.
     Always,
-    /// For nothing.
+    /// Never.
     Never,
 }
 
-/// How one transfer goes about blocks.
+/// How one transfer uses blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Blocks {
-    /// Expedited or in segments.
+    /// Expedited or segmented.
     #[default]
     Never,
-    /// A read that begins in the usual way, and begins anew as [`Blocks::First`] when the device announces
-    /// [`LARGE`] bytes or more. A write never.
+    /// An upload starts segmented. It restarts as [`Blocks::First`] if the device announces [`LARGE`] bytes or more. A
+    /// download is never in blocks.
     WhenLarge,
-    /// In blocks; as [`Blocks::Never`] if the device does not do it.
+    /// In blocks; segmented if the device does not support it.
     First {
-        /// Of a read: up to so many bytes the server may answer in the usual way.
+        /// For an upload: up to this size in bytes the server may answer segmented.
         threshold: u8,
     },
-    /// In blocks and in no other way.
+    /// Only in blocks.
     Only,
 }
 
-/// How the data of a transfer went.
+/// The kind of transfer that carried the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
-    /// Expedited or in segments.
+pub enum TransferKind {
+    /// Expedited or segmented.
     Plain,
     /// In blocks.
     Blocks,
-    /// Expedited or in segments, after the device was asked for blocks in vain.
-    PlainAfterAll,
+    /// Expedited or segmented, after the device rejected blocks or did not answer the request for them.
+    PlainFallback,
 }
 
 impl BlockMode {
-    /// For a read of an object of this type; `None` if the type is not known.
+    /// The choice for an upload of this type; `None` if the type is unknown.
     pub fn for_read(self, data_type: Option<DataType>) -> Blocks {
         match self {
             BlockMode::Never => Blocks::Never,
             BlockMode::Always => Blocks::Only,
             BlockMode::Auto if data_type == Some(DataType::Domain) => Blocks::First { threshold: SMALL },
-            // Nothing of a known and fixed width is ever large.
+            // An object of a known, fixed width is never large.
             BlockMode::Auto if data_type.is_some_and(|data_type| data_type.width().is_some()) => Blocks::Never,
             BlockMode::Auto => Blocks::WhenLarge,
         }
     }
 
-    /// For a write of so many bytes.
+    /// The choice for a download of `length` bytes.
     pub fn for_write(self, length: usize) -> Blocks {
         match self {
             BlockMode::Never => Blocks::Never,
@@ -101,19 +101,18 @@ impl BlockMode {
     }
 }
 
-/// Whether an abort code speaks of the object and not of the way it was asked for: asked for in another way,
-/// the device would say the same.
-pub(super) fn names_the_object(code: AbortCode) -> bool {
+/// Whether an abort code is about the object. Another kind of transfer would then fail with the same code.
+pub(super) fn is_about_object(code: AbortCode) -> bool {
     matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUB_INDEX | AbortCode::WRITE_ONLY | AbortCode::READ_ONLY)
 }
 
-/// Bytes transferred so far and bytes in all, where known.
+/// Bytes transferred so far, and in total if known.
 pub type Moved = (usize, Option<usize>);
 
-/// Reads an object. `progress` hears of it every 100 ms.
+/// Reads an object. `progress` is called every 100 ms.
 ///
 /// # Errors
-/// Outside: what stops everything. Inside: what the device does.
+/// Outer: the bus failed or the user interrupted. Inner: the transfer failed.
 pub fn read_object(
     master: &mut Master<'_>,
     (node, object): (NodeId, ObjectId),
@@ -125,10 +124,10 @@ pub fn read_object(
     master.carry_out(request, progress)
 }
 
-/// Writes an object. `progress` hears of it every 100 ms.
+/// Writes an object. `progress` is called every 100 ms.
 ///
 /// # Errors
-/// Outside: what stops everything. Inside: what the device does.
+/// Outer: the bus failed or the user interrupted. Inner: the transfer failed.
 pub fn write_object(
     master: &mut Master<'_>,
     (node, object): (NodeId, ObjectId),
@@ -142,15 +141,15 @@ pub fn write_object(
 }
 
 impl Master<'_> {
-    /// Bytes of a transfer so far and in all, where known; `None` while it has not begun or when it is over.
+    /// Bytes of a transfer so far, and in total if known; `None` if it is not in progress.
     pub fn moved(&self, ticket: Ticket) -> Option<Moved> {
         self.sdo.moved(ticket)
     }
 
-    /// One transfer, with reports on how far it has come.
+    /// Carries out one transfer, with progress reports.
     ///
     /// # Errors
-    /// Outside: what stops everything. Inside: what the device does.
+    /// Outer: the bus failed or the user interrupted. Inner: the transfer failed.
     pub fn carry_out(
         &mut self,
         request: Request,
@@ -159,10 +158,10 @@ impl Master<'_> {
         self.carry_out_watching(request, progress, &mut |_| {})
     }
 
-    /// Like [`Master::carry_out`]; frames that belong to no SDO transfer are given to `watch`.
+    /// Like [`Master::carry_out`]; frames that do not belong to the transfer go to `watch`.
     ///
     /// # Errors
-    /// Outside: bus errors and Ctrl-C. Inside: what the device does.
+    /// Outer: the bus failed or the user interrupted. Inner: the transfer failed.
     pub fn carry_out_watching(
         &mut self,
         request: Request,
@@ -170,20 +169,20 @@ impl Master<'_> {
         watch: &mut dyn FnMut(&Received),
     ) -> Result<Result<Answer, SdoError>, Error> {
         let ticket = self.start(request);
-        // From the latest moment known: a transfer that is over at once costs no look at the clock.
-        let mut report_at = self.seen + REPORT_EVERY;
+        // From the latest known moment: a short transfer needs no reading of the clock.
+        let mut report_at = self.seen + REPORT_INTERVAL;
         let mut timed = false;
         loop {
             match self.next(report_at)? {
                 Happening::Sdo(ended, result) if ended == ticket => return Ok(result),
                 Happening::Frame(received) => watch(&received),
                 Happening::Deadline => {
-                    // The first time only tells the time.
+                    // The first deadline only updates the clock.
                     if let Some(moved) = self.moved(ticket).filter(|_| timed) {
                         progress(moved);
                     }
                     timed = true;
-                    report_at = self.now() + REPORT_EVERY;
+                    report_at = self.now() + REPORT_INTERVAL;
                 }
                 Happening::Interrupted => {
                     self.cancel();
@@ -204,7 +203,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blocks_only_where_they_pay() {
+    fn blocks_are_used_only_if_they_save_frames() {
         let auto = BlockMode::Auto;
         assert_eq!(auto.for_read(Some(DataType::Unsigned(4))), Blocks::Never);
         assert_eq!(auto.for_read(Some(DataType::VisibleString)), Blocks::WhenLarge);

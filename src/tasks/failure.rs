@@ -185,7 +185,7 @@ fn lss_kind(error: &LssError) -> Kind {
         | LssError::Violation { .. }
         | LssError::Disturbed(_)
         | LssError::Fastscan(_)
-        | LssError::Mistaken { .. } => Kind::Unexpected,
+        | LssError::AddressMismatch { .. } => Kind::Unexpected,
     }
 }
 

@@ -238,11 +238,11 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     }
     let started = recording.states.start(master, &recording.instruments, plan, &mut restarted);
     let result = started.and_then(|()| {
-        master.ride_out(true);
+        master.set_tolerates_outages(true);
         recording.restarted_before_start(&restarted, master, observer);
         recording.run(master, observer)
     });
-    master.ride_out(false);
+    master.set_tolerates_outages(false);
     let restored = recording.states.restore(master);
     recording.remarks.extend(recording.states.remark());
     if let Err(error) = restored {

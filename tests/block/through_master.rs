@@ -12,7 +12,8 @@ use cangauge::canopen::value::DataType;
 use cangauge::canopen::wire_length::frame_time;
 use cangauge::device::catalog::Model;
 use cangauge::master::{
-    Answer, BlockMode, Blocks, Error, Master, Request, SdoError, SdoFailure, Timing, Way, read_object, write_object,
+    Answer, BlockMode, Blocks, Error, Master, Request, SdoError, SdoFailure, Timing, TransferKind, read_object,
+    write_object,
 };
 use cangauge::sim::{Device, Setup};
 use std::sync::Arc;
@@ -128,7 +129,7 @@ fn read(bus: &mut dyn Bus, object: ObjectId, data_type: Option<DataType>, mode: 
     outcome
 }
 
-fn way(outcome: &Outcome) -> Way {
+fn way(outcome: &Outcome) -> TransferKind {
     outcome.as_ref().unwrap().way
 }
 
@@ -159,14 +160,14 @@ fn every_size_in_every_mode() {
                 }
                 let in_blocks = mode == BlockMode::Always || mode == BlockMode::Auto && length > 28;
                 let way_in = match (in_blocks, block) {
-                    (true, true) => Way::Blocks,
-                    (true, false) => Way::PlainAfterAll,
-                    (false, _) => Way::Plain,
+                    (true, true) => TransferKind::Blocks,
+                    (true, false) => TransferKind::PlainFallback,
+                    (false, _) => TransferKind::Plain,
                 };
                 assert_eq!(way(&written), way_in, "write {length} {mode:?} {block}");
                 let found = read(&mut bus, DOMAIN, Some(DataType::Domain), mode);
                 // A device that refuses does so before it looks at the length.
-                let way_out = if mode == BlockMode::Auto && !block { Way::PlainAfterAll } else { way_in };
+                let way_out = if mode == BlockMode::Auto && !block { TransferKind::PlainFallback } else { way_in };
                 assert_eq!(way(&found), way_out, "read {length} {mode:?} {block}");
                 assert_eq!(bytes(found), data);
             }
@@ -174,9 +175,9 @@ fn every_size_in_every_mode() {
             for data_type in [None, Some(DataType::VisibleString)] {
                 let found = read(&mut bus, DOMAIN, data_type, BlockMode::Auto);
                 let expected = match length {
-                    ..889 => Way::Plain,
-                    _ if block => Way::Blocks,
-                    _ => Way::PlainAfterAll,
+                    ..889 => TransferKind::Plain,
+                    _ if block => TransferKind::Blocks,
+                    _ => TransferKind::PlainFallback,
                 };
                 assert_eq!(way(&found), expected, "read {length} {data_type:?} {block}");
                 assert_eq!(bytes(found), data);
@@ -188,7 +189,7 @@ fn every_size_in_every_mode() {
 #[test]
 fn a_refusal_costs_two_frames_and_no_noise() {
     let mut bus = bus(250_000, [device(5, false)]);
-    assert_eq!(way(&write(&mut bus, TEXT, &[b'x'; 29], BlockMode::Auto)), Way::PlainAfterAll);
+    assert_eq!(way(&write(&mut bus, TEXT, &[b'x'; 29], BlockMode::Auto)), TransferKind::PlainFallback);
     assert_eq!(bytes(read(&mut bus, TEXT, Some(DataType::Domain), BlockMode::Auto)), [b'x'; 29]);
     let frames = wire(&bus);
     assert_eq!(
@@ -236,9 +237,9 @@ fn what_the_device_says_of_the_object_is_asked_once() {
 fn a_device_that_does_not_even_refuse_is_asked_in_the_usual_way() {
     let mut bus = bus(250_000, [Deaf(device(5, true))]);
     let start = bus.now().mono;
-    assert_eq!(way(&write(&mut bus, TEXT, &[b'x'; 40], BlockMode::Auto)), Way::PlainAfterAll);
+    assert_eq!(way(&write(&mut bus, TEXT, &[b'x'; 40], BlockMode::Auto)), TransferKind::PlainFallback);
     let found = read(&mut bus, TEXT, Some(DataType::Domain), BlockMode::Auto);
-    assert_eq!(way(&found), Way::PlainAfterAll);
+    assert_eq!(way(&found), TransferKind::PlainFallback);
     assert_eq!(bytes(found), [b'x'; 40]);
     let waited = bus.now().mono.since(start);
     assert!(waited < Duration::from_millis(1_100), "one time-out each, not {waited:?}");
@@ -397,8 +398,8 @@ fn two_devices_side_by_side() {
 fn a_megabyte_both_ways() {
     let data = content(1 << 20);
     let mut bus = bus(1_000_000, [device(5, true)]);
-    assert_eq!(way(&write(&mut bus, DOMAIN, &data, BlockMode::Auto)), Way::Blocks);
+    assert_eq!(way(&write(&mut bus, DOMAIN, &data, BlockMode::Auto)), TransferKind::Blocks);
     let found = read(&mut bus, DOMAIN, None, BlockMode::Auto);
-    assert_eq!(way(&found), Way::Blocks);
+    assert_eq!(way(&found), TransferKind::Blocks);
     assert!(bytes(found) == data);
 }

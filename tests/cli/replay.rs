@@ -92,7 +92,7 @@ fn nothing_can_be_sent_into_it() {
     let done = replay(&bench, "t.log", "read 1").exit(5);
     assert_eq!(
         done.stderr,
-        "cangauge: the recording t.log is receive only\n\
+        "cangauge: the recording t.log can only receive\n\
          hint: commands that only listen work on it: log, scan --passive, nmt watch\n"
     );
     replay(&bench, "t.log", "log 1 --sync 10ms")
@@ -106,7 +106,7 @@ fn what_is_no_log_is_named_with_its_line() {
     let bench = Bench::of("mh4@1");
     fs::write(bench.path("t.log"), "(1.0) can0 701#00\nnonsense\n").expect("written");
     let done = replay(&bench, "t.log", "log 1").exit(8);
-    assert!(done.stderr.starts_with("cangauge: replay t.log:2: no line of a candump log"), "{}", done.stderr);
+    assert!(done.stderr.starts_with("cangauge: replay t.log:2: not a line of a candump log"), "{}", done.stderr);
     replay(&bench, "nowhere.log", "log 1").exit(8);
     replay(&bench, "", "log 1").exit(2);
 }

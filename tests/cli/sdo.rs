@@ -50,7 +50,7 @@ fn the_type_can_be_said() {
     // A value that is wider than the type, the rest not zero: both widths are named.
     bench.run("sdo read 1 0x1008 --type u8").fails(
         6,
-        "cangauge: node 1: read 0x1008:0: the device delivered 8 bytes where u8 has 1\n\
+        "cangauge: node 1: read 0x1008:0: the device delivered 8 bytes, but u8 has 1\n\
          hint: show its bytes: cangauge sdo read 1 0x1008:0 --type hex\n",
     );
     let done = bench.run("sdo read 1 0x1017 --type u32").prints("0\n");

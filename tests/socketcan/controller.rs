@@ -151,7 +151,7 @@ fn a_rate_that_the_controller_cannot_do_leaves_it_as_it_was() {
     assert_eq!(next_frame(&mut bus), "181#01");
     let done = cangauge("bus up can0 1k");
     assert_eq!((done.code, done.stdout.as_str()), (Some(5), ""));
-    assert!(done.stderr.starts_with("cangauge: can0 cannot do 1000 bit/s: "), "{}", done.stderr);
+    assert!(done.stderr.starts_with("cangauge: can0 does not support 1000 bit/s: "), "{}", done.stderr);
     assert_eq!(setting("can0"), before);
 }
 

@@ -1,26 +1,26 @@
-//! The two clocks of the bus inside the process, and the wait that a person can interrupt.
+//! The real and the virtual clock of the simulated bus, and waits that the user can interrupt.
 
 use crate::bus::interrupt::Interrupts;
 use crate::bus::time::{Mono, Wall};
 use std::time::{Duration, Instant};
 
-/// Which clock a bus inside the process goes by.
+/// The clock of a simulated bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Clock {
-    /// The host's: for people.
+    /// The clock of the host, for interactive use.
     #[default]
     Real,
-    /// Its own, which jumps to the next happening and stands still while nobody receives: for tests.
+    /// A virtual clock, for tests. It jumps to the next event, and advances only in `receive`.
     Virtual,
 }
 
-/// Where the virtual clock starts: 2026-01-01 00:00 UTC.
+/// The start of the virtual clock: 2026-01-01 00:00 UTC.
 pub const VIRTUAL_EPOCH: Wall = Wall::at(Duration::from_secs(1_767_225_600));
 
-/// Waits on the host's clock, and tells when the user wants to stop.
+/// Waits on the clock of the host, and reports an interrupt by the user.
 pub trait Sleeper: Send {
-    /// Waits for `length`. Returns `true` at once, and once, when the user has asked to stop; with a length
-    /// of zero it only looks.
+    /// Waits for `length`. Returns `true` immediately, and only once, if the user asked to stop. With a length of zero
+    /// it only checks.
     fn sleep(&mut self, length: Duration) -> bool;
 }
 
@@ -31,7 +31,7 @@ impl Sleeper for Interrupts {
     }
 }
 
-/// Waits that nobody interrupts.
+/// Waits that are never interrupted.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Uninterrupted;
 
@@ -44,8 +44,8 @@ impl Sleeper for Uninterrupted {
     }
 }
 
-/// The host's clock as the bus sees it: both time lines begin when the bus is opened, and run together
-/// from there, so that a frame has the same distance on both.
+/// The time lines of a bus. Both start when the bus is opened and run in parallel, so that intervals are equal on
+/// both.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TimeLine {
     Real { opened: Instant, epoch: Wall },
@@ -60,7 +60,7 @@ impl TimeLine {
         }
     }
 
-    /// What the host's clock says; `None` on the virtual one, which says nothing by itself.
+    /// The time of the host; `None` for a virtual clock.
     pub(super) fn host_now(&self) -> Option<Mono> {
         match self {
             TimeLine::Real { opened, .. } => Some(Mono::at(opened.elapsed())),

@@ -1,42 +1,42 @@
-//! What a CAN controller counts and concludes (ISO 11898-1, fault confinement), in the simplest form that
-//! shows people and programs what a wrong bit rate does.
+//! The error counters and states of a CAN controller (ISO 11898-1, fault confinement), simplified. They show the effect
+//! of a wrong bit rate.
 
 use crate::bus::Fault;
 use crate::bus::time::Mono;
 use crate::canopen::wire_length::bit_time;
 use std::time::Duration;
 
-/// How long an error-passive controller waits before it tries again. A real one waits a few bit times;
-/// this keeps a frame that nobody takes from filling hours of virtual time with errors.
+/// The wait of an error-passive controller before a retry. A real one waits a few bit times. The longer wait keeps an
+/// unacknowledged frame from filling hours of virtual time with errors.
 pub(super) const PASSIVE_PAUSE: Duration = Duration::from_millis(10);
 
 const WARNING: u16 = 96;
 const PASSIVE: u16 = 128;
 const OFF: u16 = 256;
-/// 128 times 11 bits without traffic end bus-off.
+/// The end of bus-off: 128 times 11 recessive bits.
 const RECOVERY_BITS: u32 = 128 * 11;
 
-/// What a transmission came to.
+/// The outcome of a transmission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// Everybody who should has it.
+    /// All receivers got it.
     Delivered,
-    /// Nobody acknowledged it.
+    /// No station acknowledged it.
     Unacknowledged,
-    /// Somebody destroyed it: another bit rate, or two senders with one identifier.
+    /// It was destroyed: a station at another bit rate, or two senders with one identifier.
     Disturbed,
 }
 
-/// The error counters of one participant.
+/// The error counters of one controller.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Controller {
     transmit_errors: u16,
     receive_errors: u16,
-    /// Off, or not trying again, until then.
+    /// Until when it is bus-off or waits for a retry.
     pub(super) waits_until: Option<Mono>,
 }
 
-/// How sure a controller is of itself.
+/// The error state of a controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Level {
     Active,
@@ -46,7 +46,7 @@ pub(super) enum Level {
 }
 
 impl Level {
-    /// As it is reported.
+    /// The fault that reports this state.
     pub(super) fn fault(self) -> Fault {
         match self {
             Level::Active => Fault::ErrorActive,
@@ -67,13 +67,12 @@ impl Controller {
         }
     }
 
-    /// Whether its error flags destroy frames.
+    /// Whether its error flags destroy frames of others.
     pub(super) fn disturbs(&self) -> bool {
         self.level() < Level::Passive
     }
 
-    /// What a transmission of its own came to, complete at `now`. One that nobody acknowledges takes a
-    /// controller no further than error-passive.
+    /// Counts a transmission of this controller. A missing acknowledge leads to error-passive at most.
     pub(super) fn transmitted(&mut self, outcome: Outcome) {
         match outcome {
             Outcome::Delivered => self.transmit_errors = self.transmit_errors.saturating_sub(1),
@@ -82,17 +81,17 @@ impl Controller {
         }
     }
 
-    /// It received a frame, or an error.
+    /// Counts a received frame or a receive error.
     pub(super) fn received(&mut self, valid: bool) {
         if valid {
-            // From far beyond, one frame is enough to come back (CiA's and ISO's "between 119 and 127").
+            // One valid frame ends error-passive (ISO 11898-1: "between 119 and 127").
             self.receive_errors = self.receive_errors.min(PASSIVE).saturating_sub(1);
         } else {
             self.receive_errors = (self.receive_errors + 1).min(OFF - 1);
         }
     }
 
-    /// Bus-off from `now` on, and error-active again after the recovery that the standard wants.
+    /// Goes bus-off at `now`, until the recovery time of the standard is over.
     pub(super) fn switch_off(&mut self, now: Mono, bit_rate: u32) {
         *self = Controller { waits_until: Some(now + bit_time(RECOVERY_BITS, bit_rate)), ..Controller::default() };
     }
@@ -103,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_is_alone_gets_passive_and_who_is_disturbed_switches_off() {
+    fn without_acknowledge_error_passive_with_disturbance_bus_off() {
         let mut alone = Controller::default();
         (0..1000).for_each(|_| alone.transmitted(Outcome::Unacknowledged));
         assert_eq!(alone.level(), Level::Passive);

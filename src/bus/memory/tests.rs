@@ -3,7 +3,7 @@ use crate::bus::time::Wall;
 use crate::canopen::wire_length::frame_bits;
 use std::time::Duration;
 
-/// Sends given frames at given moments, keeps what it receives and when its own were out.
+/// Sends given frames at given times. It records the frames received and the times when its own were sent.
 #[derive(Default)]
 struct Script {
     planned: VecDeque<(Mono, Frame)>,
@@ -47,14 +47,14 @@ fn script(frames: &[(u64, &str)]) -> Script {
     Script { planned: frames.iter().map(|(at, text)| (us(*at), frame(text))).collect(), ..Script::default() }
 }
 
-/// Time on the wire at 250 kbit/s, without the pause.
+/// The duration of a frame at 250 kbit/s, without intermission.
 fn length(text: &str) -> Duration {
     Duration::from_micros(u64::from(frame_bits(&frame(text))) * 4)
 }
 
 const PAUSE: Duration = Duration::from_micros(12);
 
-/// Everything up to `until`, as text with the microsecond.
+/// All frames up to `until`, each with its time in microseconds.
 fn drain(bus: &mut MemoryBus, until: Mono) -> Vec<(u128, String)> {
     let mut seen = Vec::new();
     loop {
@@ -69,7 +69,7 @@ fn drain(bus: &mut MemoryBus, until: Mono) -> Vec<(u128, String)> {
 }
 
 #[test]
-fn a_frame_takes_its_time_and_reaches_everybody_but_its_sender() {
+fn a_frame_takes_its_duration_and_reaches_all_but_its_sender() {
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(script(&[(1000, "701#00")]));
     bus.attach(script(&[]));
@@ -83,7 +83,7 @@ fn a_frame_takes_its_time_and_reaches_everybody_but_its_sender() {
 }
 
 #[test]
-fn the_program_does_not_hear_itself() {
+fn the_program_does_not_receive_its_own_frames() {
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(script(&[]));
     bus.send(&frame("080#")).expect("room");
@@ -93,16 +93,16 @@ fn the_program_does_not_hear_itself() {
 }
 
 #[test]
-fn the_lowest_identifier_wins_and_nobody_interrupts_a_frame() {
+fn the_lowest_identifier_wins_and_no_frame_is_interrupted() {
     let mut bus = MemoryBus::new(Clock::Virtual);
-    // 7FFh is alone at first and is not interrupted; then 081h beats 182h beats the 29-bit frame, although
-    // they were queued the other way round. Within one station the order stays.
+    // 7FFh starts alone and is not interrupted. Then 081h wins, then 182h, then the 29-bit frame, although they were
+    // queued in the reverse order. The order within one station stays.
     bus.attach(script(&[(0, "7FF#"), (10, "081#01")]));
     bus.attach(script(&[(5, "06080000#"), (5, "000#0100")]));
     bus.attach(script(&[(6, "182#02")]));
     let order: Vec<String> = drain(&mut bus, us(100_000)).into_iter().map(|(_, text)| text).collect();
     assert_eq!(order, ["7FF#", "081#01", "182#02", "06080000#", "000#0100"]);
-    // Each begins when the pause after the one before is over.
+    // Each frame starts when the intermission after the previous one is over.
     let sent: Vec<Mono> = bus.stations::<Script>().flat_map(|station| station.sent.iter().map(|(at, _)| *at)).collect();
     let first = Mono::START + length("7FF#");
     let second = first + PAUSE + length("081#01");
@@ -135,14 +135,14 @@ fn the_bit_rate_decides_how_long_a_frame_takes() {
 }
 
 #[test]
-fn the_transmit_queue_is_bounded_and_empties_with_time() {
+fn the_transmit_queue_is_limited_and_empties_over_time() {
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(script(&[]));
     for _ in 0..QUEUE_LENGTH {
         bus.send(&frame("080#")).expect("room for ten");
     }
     assert!(matches!(bus.send(&frame("080#")), Err(BusError::QueueFull)));
-    // As soon as the first is on the wire there is room for one, and for one only.
+    // When the first frame is on the bus there is room for exactly one more.
     drain(&mut bus, us(1));
     bus.send(&frame("080#")).expect("room for one");
     assert!(matches!(bus.send(&frame("080#")), Err(BusError::QueueFull)));
@@ -162,18 +162,18 @@ fn virtual_time_passes_only_while_receiving() {
     assert_eq!(bus.now(), Stamp { mono: Mono::START, wall: VIRTUAL_EPOCH });
     bus.send(&frame("080#")).expect("room");
     assert_eq!(bus.now().mono, Mono::START);
-    // A year in no time, and the wall clock goes along.
+    // A year passes at once, and the wall clock advances too.
     let year = Mono::at(Duration::from_secs(365 * 86_400));
     assert_eq!(drain(&mut bus, year).len(), 1);
     assert_eq!(bus.now().mono, year);
     assert_eq!(bus.now().wall.since_epoch().as_secs(), 1_767_225_600 + 365 * 86_400);
-    // A deadline in the past neither waits nor turns time back.
+    // A deadline in the past neither waits nor sets the time back.
     assert_eq!(bus.receive(Mono::START).expect("no error"), Event::Timeout);
     assert_eq!(bus.now().mono, year);
 }
 
 #[test]
-fn what_arrives_at_the_deadline_is_still_received() {
+fn a_frame_that_arrives_at_the_deadline_is_received() {
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(script(&[(0, "701#00")]));
     let complete = Mono::START + length("701#00");
@@ -182,7 +182,7 @@ fn what_arrives_at_the_deadline_is_still_received() {
 }
 
 #[test]
-fn filters_hold_for_what_is_complete_afterwards() {
+fn filters_apply_to_frames_that_are_complete_afterwards() {
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(script(&[(0, "181#01"), (0, "281#02"), (0, "281#R"), (0, "00000281#03"), (5000, "181#04")]));
     bus.listen(&Filters::Only(vec![frame("281#").id()])).expect("no error");
@@ -193,14 +193,14 @@ fn filters_hold_for_what_is_complete_afterwards() {
 }
 
 #[test]
-fn an_interrupt_comes_once_at_its_moment() {
+fn an_interrupt_comes_once_at_its_time() {
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(script(&[(0, "701#00"), (3000, "701#05")]));
     bus.interrupt_at(us(2000));
     assert!(matches!(bus.receive(us(9000)), Ok(Event::Frame(_))));
     assert_eq!(bus.receive(us(9000)).expect("no error"), Event::Interrupted);
     assert_eq!(bus.now().mono, us(2000));
-    // The bus goes on: what comes after an interrupt is tidying up.
+    // The bus still works after an interrupt, for cleaning up.
     assert!(matches!(bus.receive(us(9000)), Ok(Event::Frame(_))));
     assert_eq!(bus.receive(us(9000)).expect("no error"), Event::Timeout);
 }
@@ -216,7 +216,7 @@ impl Sleeper for StopsAt {
 }
 
 #[test]
-fn a_person_can_interrupt_the_real_clock_in_a_wait_and_the_virtual_one_between() {
+fn the_user_can_interrupt_the_real_clock_in_a_wait_and_the_virtual_one_between_waits() {
     let mut bus = MemoryBus::new(Clock::Real).with_sleeper(Box::new(StopsAt(2)));
     let started = std::time::Instant::now();
     assert_eq!(bus.receive(Mono::at(Duration::from_secs(3600))).expect("no error"), Event::Interrupted);
@@ -228,11 +228,11 @@ fn a_person_can_interrupt_the_real_clock_in_a_wait_and_the_virtual_one_between()
 }
 
 #[test]
-fn the_real_clock_waits_and_keeps_the_moments_of_what_it_missed() {
+fn the_real_clock_waits_and_missed_frames_keep_their_times() {
     let mut bus = MemoryBus::new(Clock::Real);
     bus.attach(script(&[(0, "701#00"), (2000, "701#05"), (30_000, "701#7F")]));
     let before = Wall::now();
-    // While the program does something else two frames go by; they are received with their own times.
+    // Two frames arrive while the program does something else. They are received with their own times.
     std::thread::sleep(Duration::from_millis(5));
     let first = (Mono::START + length("701#00")).since_start().as_micros();
     let second = (us(2000) + length("701#05")).since_start().as_micros();

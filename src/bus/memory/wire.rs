@@ -1,4 +1,4 @@
-//! The wire: arbitration, acknowledge, errors, and who understands whom.
+//! The bus line: arbitration, acknowledge, errors, bit rates.
 
 use super::controller::{Controller, Level, Outcome, PASSIVE_PAUSE};
 use super::station::Tuning;
@@ -8,30 +8,30 @@ use crate::bus::{Event, Fault, Mode, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::wire_length::{bit_time, frame_bits, priority};
 
-/// Who is sending.
+/// The sender of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sender {
     Program,
     Station(usize),
 }
 
-/// What the wire is doing.
+/// The state of the bus line.
 pub(super) enum Wire {
-    /// Nothing until then (the pause after a frame); afterwards whoever wants may begin.
+    /// Idle. From this moment on (end of intermission) a station may start to send.
     Free(Mono),
     Busy(Transmission),
 }
 
-/// A frame on the wire, or several that collide.
+/// A frame on the bus, or several that collide.
 pub(super) struct Transmission {
-    /// Each with its frame; the frames are the same unless they collide.
+    /// The senders and their frames. The frames are equal unless they collide.
     pub(super) senders: Vec<(Sender, Frame)>,
     pub(super) bit_rate: u32,
     pub(super) complete: Mono,
 }
 
 impl Transmission {
-    /// Whether two senders send something different at the same time.
+    /// Whether two senders send different frames.
     fn collides(&self) -> bool {
         self.senders.windows(2).any(|pair| pair[0].1 != pair[1].1)
     }
@@ -42,7 +42,7 @@ impl Transmission {
 }
 
 impl MemoryBus {
-    /// Everybody who wants to send, from when on, and what.
+    /// All stations with a frame to send: from when on, sender, frame.
     pub(super) fn contenders(&self) -> impl Iterator<Item = (Mono, Sender, Frame)> {
         let ready = |controller: &Controller| controller.waits_until.unwrap_or(Mono::START);
         let is_out = self.mode == Mode::ListenOnly || self.controller.level() == Level::Off;
@@ -56,7 +56,7 @@ impl MemoryBus {
         program.into_iter().chain(stations)
     }
 
-    /// The bit rate at which somebody sends.
+    /// The bit rate of a sender in bit/s.
     fn rate_of(&self, sender: Sender) -> u32 {
         match sender {
             Sender::Program => self.bit_rate,
@@ -67,8 +67,8 @@ impl MemoryBus {
         }
     }
 
-    /// The winners of the arbitration begin to send: the lowest identifier among the heads of all queues, and
-    /// whoever begins with the same one at the same bit rate.
+    /// Starts the frame that wins the arbitration: the lowest identifier of all queues. Stations with the same
+    /// identifier and bit rate start together.
     pub(super) fn begin(&mut self) {
         let now = self.now;
         let ready: Vec<(Sender, Frame)> =
@@ -87,7 +87,7 @@ impl MemoryBus {
         self.wire = Wire::Busy(Transmission { senders, bit_rate, complete: now + bit_time(bits, bit_rate) });
     }
 
-    /// A frame is complete, or what was to be one.
+    /// Ends a transmission and decides its outcome.
     pub(super) fn conclude(&mut self, transmission: &Transmission) {
         let bit_rate = transmission.bit_rate;
         let is_listening = |place: &Place| match place.station.tuning() {
@@ -95,7 +95,7 @@ impl MemoryBus {
             Tuning::At(rate) => Some(rate == bit_rate),
             Tuning::Off => None,
         };
-        // Of everybody who does not send: whether he listens at this bit rate, and who would destroy it.
+        // For each station that does not send: whether it receives at this bit rate or disturbs the frame.
         let hearing: Vec<Option<bool>> = self
             .places
             .iter()
@@ -143,17 +143,17 @@ impl MemoryBus {
             self.heard_rate = bit_rate;
             self.deliver(transmission, &hearing);
         } else {
-            self.take_back(transmission, outcome);
+            self.requeue(transmission, outcome);
         }
     }
 
-    /// The program's controller reports an error and counts it.
+    /// Reports an error of the program's controller and counts it.
     fn program_error(&mut self, fault: Fault, count: impl FnOnce(&mut Controller)) {
         self.inbox.push_back(Event::Fault(fault, self.stamp(self.now)));
         count(&mut self.controller);
     }
 
-    /// Everybody who listens gets the frame, and who sent it learns that it is out.
+    /// Delivers the frame to all receivers and reports it as sent to its senders.
     fn deliver(&mut self, transmission: &Transmission, hearing: &[Option<bool>]) {
         let Some((_, frame)) = transmission.senders.first() else { return };
         let is_heard = transmission.bit_rate == self.bit_rate && !transmission.has(Sender::Program);
@@ -179,9 +179,9 @@ impl MemoryBus {
         }
     }
 
-    /// A frame that failed is sent again, by an error-passive sender after a pause. Not all pauses are alike, or
-    /// two that collide would collide for ever. A station that is bus-off forgets what it had to send.
-    fn take_back(&mut self, transmission: &Transmission, outcome: Outcome) {
+    /// Queues a failed frame again. An error-passive sender waits first. The waits differ, so that two colliding
+    /// stations do not collide again and again. A bus-off station drops its frames.
+    fn requeue(&mut self, transmission: &Transmission, outcome: Outcome) {
         for (sender, frame) in &transmission.senders {
             match *sender {
                 Sender::Program => {

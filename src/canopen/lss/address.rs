@@ -1,11 +1,11 @@
-//! Who is meant: the four numbers of a slave, and ranges of them.
+//! LSS addresses and ranges of them.
 
 use super::{Limit, Part, Request};
 use crate::canopen::id::parse_u32;
 use std::fmt;
 use std::str::FromStr;
 
-/// The identity of a slave, that of 1018h: no two devices of the world have the same.
+/// The identity of a slave (1018h). It is unique worldwide.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LssAddress {
     /// 1018h.1.
@@ -18,7 +18,7 @@ pub struct LssAddress {
     pub serial: u32,
 }
 
-/// Slaves of one kind with revision and serial numbers within limits, both included.
+/// Slaves of one vendor and product, with revision and serial numbers in these ranges (limits included).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct LssRange {
     /// 1018h.1.
@@ -31,22 +31,22 @@ pub struct LssRange {
     pub serial: (u32, u32),
 }
 
-/// Text that is no address or range.
+/// Text that is not an address or a range.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LssAddressError {
-    /// No address.
+    /// The text is not an address.
     #[error("\"{0}\" is not an LSS address (VENDOR:PRODUCT:REVISION:SERIAL)")]
     Address(String),
-    /// No range.
+    /// The text is not a range.
     #[error("\"{0}\" is not a range of LSS addresses (VENDOR:PRODUCT:REVMIN-REVMAX:SERMIN-SERMAX)")]
     Range(String),
-    /// The limits of a range the wrong way round.
-    #[error("{0}-{1} is the wrong way round")]
+    /// The lower limit of a range is above the upper one.
+    #[error("{0}-{1}: the lower limit is above the upper one")]
     Reversed(String, String),
 }
 
 impl LssAddress {
-    /// The address of these four numbers, in the order of [`Part::ALL`].
+    /// The address with these four numbers, in the order of [`Part::ALL`].
     pub fn new([vendor, product, revision, serial]: [u32; 4]) -> LssAddress {
         LssAddress { vendor, product, revision, serial }
     }
@@ -56,18 +56,18 @@ impl LssAddress {
         [self.vendor, self.product, self.revision, self.serial]
     }
 
-    /// One of the four.
+    /// One of the four numbers.
     pub fn part(&self, part: Part) -> u32 {
         self.parts()[usize::from(part.number())]
     }
 
-    /// The frames that address it, in their order.
+    /// The frames that select it, in order.
     pub fn selection(&self) -> [Request; 4] {
         Part::ALL.map(|part| Request::Select(part, self.part(part)))
     }
 
-    /// Whoever is of its vendor and product with a lower serial number, and with a higher one, whatever the
-    /// revision; of the lowest and the highest serial number there is none on that side.
+    /// The ranges with its vendor and product and a lower, or a higher, serial number, for all revisions. `None` if there
+    /// is no lower or higher number.
     pub fn neighbours(&self) -> [Option<LssRange>; 2] {
         let range = |serial| LssRange { vendor: self.vendor, product: self.product, revision: (0, u32::MAX), serial };
         [
@@ -76,7 +76,7 @@ impl LssAddress {
         ]
     }
 
-    /// Whoever has its serial number, vendor and product and another revision.
+    /// The ranges with its serial number, vendor and product and another revision.
     pub fn revisions(&self) -> [Option<LssRange>; 2] {
         let range = |revision| LssRange { revision, ..LssRange::from(*self) };
         [
@@ -87,7 +87,7 @@ impl LssAddress {
 }
 
 impl LssRange {
-    /// The frames that ask for it, in their order.
+    /// The frames that ask for it, in order.
     pub fn identification(&self) -> [Request; 6] {
         Limit::ALL.map(|limit| {
             let number = match limit {
@@ -102,7 +102,7 @@ impl LssRange {
         })
     }
 
-    /// Whether a slave of this address is meant.
+    /// Whether the range contains this address.
     pub fn contains(&self, address: &LssAddress) -> bool {
         let within = |number: u32, (low, high): (u32, u32)| (low..=high).contains(&number);
         self.vendor == address.vendor
@@ -120,7 +120,7 @@ impl From<LssAddress> for LssRange {
 }
 
 impl fmt::Display for LssAddress {
-    /// `0x362:0x443150:0x10000:20002`: the serial number as people know it, in decimal.
+    /// `0x362:0x443150:0x10000:20002`. The serial number is decimal, as on labels.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "0x{:X}:0x{:X}:0x{:X}:{}", self.vendor, self.product, self.revision, self.serial)
     }
@@ -137,7 +137,7 @@ impl fmt::Display for LssRange {
 impl FromStr for LssAddress {
     type Err = LssAddressError;
 
-    /// Reads four numbers, decimal or `0x…`.
+    /// Parses four numbers, decimal or `0x…`.
     fn from_str(text: &str) -> Result<LssAddress, LssAddressError> {
         let numbers: Option<Vec<u32>> = text.split(':').map(parse_u32).collect();
         numbers
@@ -149,7 +149,7 @@ impl FromStr for LssAddress {
 impl FromStr for LssRange {
     type Err = LssAddressError;
 
-    /// Reads two numbers and two ranges; a number alone is the range of itself.
+    /// Parses two numbers and two ranges. A single number is a range with one element.
     fn from_str(text: &str) -> Result<LssRange, LssAddressError> {
         let wrong = || LssAddressError::Range(text.to_owned());
         let range = |text: &str| -> Result<(u32, u32), LssAddressError> {

@@ -1,41 +1,41 @@
-//! What slaves answer on 7E4h (CiA 305).
+//! The answers of slaves on 7E4h (CiA 305).
 
 use super::{ErrorCode, Service, UNCONFIGURED};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 
-/// What a slave answers.
+/// An answer of a slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// 44h: it is in configuration state. Some manuals print a mode behind it, others 0.
+    /// 44h: the slave is in configuration state. Some manuals show a mode in the next byte, others 0.
     Selected,
-    /// 11h, 13h, 17h: done or not.
+    /// 11h, 13h, 17h: accepted or rejected.
     Acknowledge(ErrorCode),
-    /// 5Ah to 5Dh: the number asked for.
+    /// 5Ah to 5Dh: the requested number.
     Number(u32),
-    /// 5Eh: its node-ID, or `None` of a slave that has none.
+    /// 5Eh: the node-ID; `None` if the slave has none.
     NodeId(Option<NodeId>),
-    /// 4Fh or 50h: there is one.
+    /// 4Fh or 50h: a matching slave exists.
     Here,
 }
 
-/// What is wrong with an answer.
+/// How an answer violates the protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Violation {
-    /// Too few bytes to say what it must say.
+    /// The frame has too few bytes.
     #[error("frame too short")]
     Short,
-    /// A node-ID that is none.
-    #[error("{0} is no node-ID")]
+    /// The node-ID is not valid.
+    #[error("{0} is not a valid node-ID")]
     NodeId(u8),
 }
 
 impl Answer {
-    /// Reads an answer to `service`; `None` of a frame that is something else.
+    /// Parses an answer to `service`; `None` if the frame is something else.
     ///
     /// # Errors
-    /// An answer to this very service that does not say what it must. What a device leaves out of the bytes that
-    /// mean nothing is its own affair (some send two bytes and not eight); what means something must be there.
+    /// The frame answers this service, but required bytes are missing or invalid. Unused bytes may be missing: some devices
+    /// send two bytes instead of eight.
     pub fn parse(frame: &Frame, service: Service) -> Option<Result<Answer, Violation>> {
         let (&specifier, rest) = frame.data().split_first()?;
         if frame.id() != CanId::LSS_SLAVE || service.answer_specifier() != Some(specifier) {

@@ -1,19 +1,19 @@
-//! What a slave says to a configuration service (CiA 305, 7.4).
+//! The result of a configuration service (CiA 305, 7.4).
 
 use super::Service;
 use std::fmt;
 
-/// The two bytes of an acknowledge: 0 is success, FFh leaves it to the specific code.
+/// The two bytes of an acknowledge. 0 is success; FFh means that the manufacturer-specific code counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ErrorCode {
     /// The error code, whose meaning depends on the service.
     pub code: u8,
-    /// The manufacturer's own code; it counts where `code` is FFh.
+    /// The manufacturer-specific code. It counts if `code` is FFh.
     pub specific: u8,
 }
 
 impl ErrorCode {
-    /// The manufacturer's own code counts.
+    /// Manufacturer-specific error.
     pub const SPECIFIC: u8 = 0xff;
 
     /// Whether the service was carried out.
@@ -21,7 +21,7 @@ impl ErrorCode {
         self.code == 0
     }
 
-    /// What CiA 305 says the code of this service means.
+    /// The meaning of the code for this service in CiA 305.
     pub fn meaning(self, service: Service) -> Option<&'static str> {
         Some(match (service, self.code) {
             (_, 0) => "done",

@@ -1,35 +1,35 @@
-//! One service: what is sent, and everything that is answered to it.
+//! One LSS service: its request frames and all answers.
 
 use super::{Answer, ErrorCode, LssAddress, LssRange, Request, Service, Violation};
 use crate::canopen::frame::Frame;
 
-/// More different answers than there can be slaves say nothing more.
+/// The number of different answers that are kept.
 const KEPT: usize = 128;
 
-/// A service in progress. It collects the answers until whoever drives it says that the time is over: several
-/// slaves that are in configuration state at once all answer.
+/// A service in progress. It collects answers until the caller ends it, because all slaves in configuration state
+/// answer.
 #[derive(Clone, Debug)]
 pub struct Exchange {
     requests: Vec<Request>,
     service: Service,
-    /// Different answers in the order in which they came.
+    /// The different answers in the order of arrival.
     heard: Vec<(Frame, Result<Answer, Violation>)>,
-    /// How many answers came, the same ones too.
+    /// The number of answers, repeated ones included.
     count: usize,
-    /// How often it was asked.
+    /// The number of requests.
     asked: usize,
 }
 
-/// Why a service that one slave shall carry out has no result.
+/// Why a service with one slave failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ExchangeError {
-    /// Nobody answered.
+    /// No slave answered.
     NoAnswer,
-    /// More than one slave answered; the different answers.
+    /// More than one slave answered: the different answers.
     Several(Vec<Frame>),
-    /// The slave said no.
+    /// The slave rejected the request.
     Refused(ErrorCode),
-    /// The slave answered against the protocol.
+    /// The answer violates the protocol.
     Violation(Violation, Frame),
 }
 
@@ -39,34 +39,34 @@ impl Exchange {
         Exchange { requests: vec![request], service: request.service(), heard: Vec::new(), count: 0, asked: 0 }
     }
 
-    /// The switch to configuration state of the slave with this address.
+    /// Switches the slave with this address to configuration state.
     pub fn select(address: &LssAddress) -> Exchange {
         Exchange { requests: address.selection().to_vec(), ..Exchange::new(Request::Select(super::Part::Vendor, 0)) }
     }
 
-    /// The question whether there are slaves within a range.
+    /// Asks whether there are slaves in a range.
     pub fn identify(range: &LssRange) -> Exchange {
         let requests = range.identification().to_vec();
         Exchange { requests, ..Exchange::new(Request::Identify(super::Limit::Vendor, 0)) }
     }
 
-    /// Which service it is.
+    /// The service.
     pub fn service(&self) -> Service {
         self.service
     }
 
-    /// Whether there is an answer at all: not to 04h and 15h.
+    /// Whether slaves answer this service (not 04h and 15h).
     pub fn is_answered(&self) -> bool {
         self.service.answer_specifier().is_some()
     }
 
-    /// The frames to send, from the first one on, however often it is asked: half an address says nothing.
+    /// Starts a request and returns all its frames. A retry also sends the whole address.
     pub fn ask(&mut self) -> Vec<Frame> {
         self.asked += 1;
         self.requests.iter().map(|request| request.frame()).collect()
     }
 
-    /// Takes a frame of the bus; whether it was an answer to this service.
+    /// Handles a received frame; `true` if it answers this service.
     pub fn on_frame(&mut self, frame: &Frame) -> bool {
         let Some(answer) = Answer::parse(frame, self.service) else { return false };
         self.count += 1;
@@ -76,13 +76,13 @@ impl Exchange {
         true
     }
 
-    /// Whether anybody has answered.
+    /// Whether a slave has answered.
     pub fn has_answer(&self) -> bool {
         self.count > 0
     }
 
-    /// Whether certainly more than one slave answered: answers differ, or more came than were asked for. Of a
-    /// service that is answered in chorus the number says so too.
+    /// Whether more than one slave answered: the answers differ, or there were more answers than requests. The number does
+    /// not count for a service that all slaves answer with the same frame.
     pub fn is_crowded(&self) -> bool {
         self.heard.len() > 1 || self.count > self.asked
     }
@@ -92,10 +92,11 @@ impl Exchange {
         &self.heard
     }
 
-    /// The result, where one slave is meant. In chorus ([`Service::is_chorus`]) several are as good as one.
+    /// The result if one slave is addressed. If all slaves send the same frame ([`Service::is_chorus`]), several count as
+    /// one.
     ///
     /// # Errors
-    /// Silence, several slaves, a refusal, a violation.
+    /// No answer, several slaves, a rejection, or a protocol violation.
     pub fn one(&self) -> Result<Answer, ExchangeError> {
         let Some(&(frame, answer)) = self.heard.first() else { return Err(ExchangeError::NoAnswer) };
         if self.is_crowded() && !self.service.is_chorus() {
@@ -113,7 +114,7 @@ mod tests {
     use super::*;
     use crate::canopen::lss::Part;
 
-    /// The outcome after being asked `asked` times and hearing these frames.
+    /// The result after `asked` requests and these frames.
     fn outcome(request: Request, asked: usize, heard: &[&str]) -> Result<Answer, ExchangeError> {
         let mut exchange = Exchange::new(request);
         for _ in 0..asked {
@@ -135,7 +136,7 @@ mod tests {
         assert_eq!(outcome(serial, 1, &[a]), Ok(Answer::Number(1)));
         assert_eq!(outcome(serial, 1, &[a, b]), several(&[a, b]));
         assert_eq!(outcome(serial, 1, &[a, a]), several(&[a]));
-        // Asked twice, one slave may answer twice.
+        // After two requests, one slave may answer twice.
         assert_eq!(outcome(serial, 2, &[a, a]), Ok(Answer::Number(1)));
         assert_eq!(outcome(serial, 2, &[a, a, a]), several(&[a]));
         assert_eq!(outcome(serial, 1, &["7E4#1100000000000000", "701#00", a]), Ok(Answer::Number(1)));

@@ -1,58 +1,58 @@
 //! Fastscan: the address of a slave without a node-ID, bit by bit (CiA 305, 7.5.3.5).
 //!
-//! A step asks whether there is a slave whose number has these upper bits; it is answered, or it is not. So an
-//! answer that comes too late says the wrong thing twice. Therefore what was found is asked for again after every
-//! eight bits, and once more to go on with the next number; so a late answer is not taken for a yes. Where such a
-//! check fails the eight bits are looked for again, with more patience, and then the whole number.
+//! Each step asks whether a slave has a number with these upper bits. An answer means yes, no answer means no. So a
+//! late answer gives two wrong results. Therefore the found bits are checked after every eight bits, and again before
+//! the next number. If a check fails, the eight bits are searched again with a longer time-out, and after that the
+//! whole number.
 //!
-//! Slaves are no choir: where two answer one after the other, the second answer must not be taken for one to
-//! the next step. Once more than one answer came to a step, every step waits for its time to be over.
+//! Several slaves may answer one step one after the other. The second answer must not count for the next step. As soon
+//! as a step got more than one answer, each step waits until its time-out.
 
 use super::{LssAddress, Part, Request};
 use crate::canopen::frame::Frame;
 
-/// How many checks of one number may fail.
+/// The number of failed checks that are allowed for one number.
 const TRIES: u8 = 6;
 
-/// How often somebody has to answer what nobody can answer: once may be a late answer to something else.
+/// How many answers to the impossible probe are needed for an error. A single one may be a late answer.
 const PROBES: u8 = 3;
 
-/// After how many bits is checked.
+/// The number of bits between two checks.
 const CHECK_EVERY: u8 = 8;
 
-/// How often everything begins anew because a slave that had been there did not go on.
+/// How often the scan restarts because a slave stopped answering.
 const RESTARTS: u8 = 3;
 
-/// A number that no step asks for: nobody who follows the protocol answers it.
+/// A number that no step asks for. No slave that follows the protocol answers it.
 const NOBODY: u32 = u32::MAX;
 
-/// What is being waited for after a step.
+/// What a step waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wait {
-    /// Whether anybody is there: the longest wait for an answer, and the measure of how fast they are.
+    /// Any slave: the longest time-out. It measures how fast the slaves answer.
     Everybody,
-    /// Silence, or an answer in the time it usually takes.
+    /// An answer within the usual time, or none.
     Bit,
-    /// An answer, in some more time than that.
+    /// An expected answer, with a somewhat longer time-out.
     Check,
-    /// An answer, which may take the longest wait: without it everything begins anew.
+    /// An expected answer, with the longest time-out. Without it the scan restarts.
     Advance,
 }
 
-/// The next thing to do.
+/// The next step of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
-    /// What is sent.
+    /// The request to send.
     pub request: Request,
-    /// What is waited for.
+    /// What to wait for.
     pub wait: Wait,
-    /// Whether to wait for the time to be over even if an answer is there.
+    /// Whether to wait until the time-out even after an answer.
     pub to_the_end: bool,
-    /// How often the usual time was found too short: 0, 1, 2 …
-    pub impatience: u8,
+    /// How often the usual time-out was too short: 0, 1, 2 …
+    pub extensions: u8,
 }
 
-/// The end of a step.
+/// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
     /// The next step.
@@ -61,17 +61,17 @@ pub enum Progress {
     Found(LssAddress),
     /// There is no slave without a node-ID.
     Nobody,
-    /// It does not work.
+    /// The scan failed.
     Failed(FastscanError),
 }
 
-/// Why no address was found although somebody answers.
+/// Why a scan with answers found no address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FastscanError {
-    /// Answers come to what nobody can answer.
+    /// A slave answers a request that no slave may answer.
     #[error("a device answers every fastscan frame, whatever is asked")]
     Babbler,
-    /// The number does not come together.
+    /// The answers contradict each other.
     #[error("the answers about the {} contradict each other", name(*.0))]
     Unsettled(Part),
 }
@@ -87,15 +87,16 @@ fn name(part: Part) -> &'static str {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// Everybody is asked, and everybody's scan begins anew.
+    /// All slaves are asked. Their scans restart.
     Everybody,
-    /// Something is asked that nobody can answer: those who begin compare the vendor-ID.
+    /// An impossible request. Slaves that start a scan compare the vendor-ID.
     Probe,
     /// The bit, 31 to 0.
     Bit(u8),
-    /// The number found down to this bit, without consequences.
+    /// Checks the number found down to this bit. Slaves do not change their state.
     Check(u8),
-    /// The number found; whoever fits compares the next part, after the last one it is in configuration state.
+    /// Checks the complete number. A matching slave compares the next part; after the last part it is in configuration
+    /// state.
     Advance,
 }
 
@@ -103,7 +104,7 @@ enum Phase {
 #[derive(Clone, Debug)]
 pub struct Fastscan {
     phase: Phase,
-    /// How often everybody may still be asked.
+    /// How often all slaves may still be asked.
     retries: u32,
     /// The numbers found.
     known: [Option<u32>; 4],
@@ -111,18 +112,18 @@ pub struct Fastscan {
     number: u32,
     tries: u8,
     restarts: u8,
-    /// Several answers came to one step.
+    /// A step got several answers.
     crowded: bool,
-    /// How often the usual time was too short.
-    impatience: u8,
-    /// Whether the probe has been silent.
+    /// How often the usual time-out was too short.
+    extensions: u8,
+    /// Whether the impossible request got no answer.
     probed: bool,
-    /// How often it has not.
+    /// How often it got an answer.
     babbled: u8,
 }
 
 impl Fastscan {
-    /// A scan in which everybody is asked again `retries` times.
+    /// A new scan. The first request to all slaves is repeated `retries` times.
     pub fn new(retries: u32) -> Fastscan {
         Fastscan {
             phase: Phase::Everybody,
@@ -133,18 +134,18 @@ impl Fastscan {
             tries: 0,
             restarts: 0,
             crowded: false,
-            impatience: 0,
+            extensions: 0,
             probed: false,
             babbled: 0,
         }
     }
 
-    /// Whether a frame is an answer to a step.
+    /// Whether a frame answers a step.
     pub fn is_answer(frame: &Frame) -> bool {
         super::Answer::parse(frame, super::Service::Fastscan).is_some()
     }
 
-    /// What to send and what to wait for.
+    /// The present step: what to send and what to wait for.
     pub fn step(&self) -> Step {
         let ask = |number, bit_check, sub, next| Request::Fastscan { number, bit_check, sub, next };
         let (request, wait) = match self.phase {
@@ -157,10 +158,10 @@ impl Fastscan {
                 (ask(self.number, 0, self.part, next), Wait::Advance)
             }
         };
-        Step { request, wait, to_the_end: self.crowded, impatience: self.impatience }
+        Step { request, wait, to_the_end: self.crowded, extensions: self.extensions }
     }
 
-    /// The time of a step is over, or its answer is there: so many answers came.
+    /// Ends a step that got this number of answers.
     pub fn on_end(&mut self, answers: usize) -> Progress {
         self.crowded |= answers > 1;
         let answered = answers > 0;
@@ -197,19 +198,19 @@ impl Fastscan {
                 if self.tries >= TRIES {
                     return self.unsettled();
                 }
-                self.impatience += 1;
+                self.extensions += 1;
                 if self.tries % 2 == 1 {
                     let (above, top) = (bit + CHECK_EVERY, bit + CHECK_EVERY - 1);
                     self.number &= u32::MAX.checked_shl(above.into()).unwrap_or(0);
                     self.phase = Phase::Bit(top);
                 } else {
-                    // The check before may have been passed by a late answer, or slaves answer at their leisure.
+                    // The previous check may have been passed by a late answer, or slaves answer slowly.
                     self.crowded = true;
                     self.search();
                 }
             }
             Phase::Advance if answered => {
-                self.impatience = 0;
+                self.extensions = 0;
                 self.known[usize::from(self.part.number())] = Some(self.number);
                 let Some(next) = Part::from_number(self.part.number() + 1) else {
                     return Progress::Found(LssAddress::new(self.known.map(Option::unwrap_or_default)));
@@ -217,7 +218,7 @@ impl Fastscan {
                 self.look_at(next);
             }
             Phase::Advance => {
-                // Whether it has gone on is not known: everything from the start, the numbers found at one go.
+                // It is unknown whether the slave continued: restart, and check the numbers found so far in one step each.
                 self.restarts += 1;
                 if self.restarts > RESTARTS {
                     return self.unsettled();
@@ -225,7 +226,7 @@ impl Fastscan {
                 if self.known[usize::from(self.part.number())].take().is_some() {
                     self.known = [None; 4];
                 }
-                self.impatience = self.restarts;
+                self.extensions = self.restarts;
                 self.crowded = true;
                 self.phase = Phase::Everybody;
             }
@@ -260,7 +261,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A slave as CiA 305 describes it: which part it compares next, and whether it has been found.
+    /// A slave according to CiA 305: the part that it compares next, and whether it was found.
     struct Slave {
         address: LssAddress,
         compares: Part,
@@ -290,7 +291,7 @@ mod tests {
         }
     }
 
-    /// Plays a scan; `late` says of each step whether its answers come in the next one.
+    /// Simulates a scan. `late` decides for each step whether its answers arrive in the next one.
     fn scan(slaves: &mut [Slave], late: &mut dyn FnMut(Step) -> bool) -> (Progress, usize) {
         let (mut scan, mut steps, mut left_over) = (Fastscan::new(1), 0, 0);
         loop {
@@ -350,17 +351,17 @@ mod tests {
             prop_assert_eq!(Some(end), found.first().map(|&address| Progress::Found(address)));
         }
 
-        /// Answers that come a step too late make the scan longer or end it; they never make up an address.
+        /// Answers that arrive one step late make the scan longer or end it. They never produce a wrong address.
         #[test]
         fn late_answers_make_up_nothing(parts: [u32; 4], late in proptest::collection::vec(0u8..40, 1..600)) {
             let address = LssAddress::new(parts);
             let mut slaves = [Slave::new(address)];
             let mut late = late.into_iter().map(|one_in| one_in == 0);
-            // A check is waited for long enough.
+            // A check has a time-out that is long enough.
             let (end, _) = scan(&mut slaves, &mut |step| step.wait == Wait::Bit && late.next().unwrap_or(false));
             match end {
                 Progress::Found(found) => prop_assert!(found == address && slaves[0].found),
-                // The answer to the probe's predecessor, or too many late ones.
+                // A late answer to the step before the impossible request, or too many late answers.
                 end => prop_assert!(matches!(end, Progress::Failed(_)), "{end:?}"),
             }
         }

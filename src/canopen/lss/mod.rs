@@ -1,6 +1,6 @@
-//! LSS: node-ID and bit rate over the bus (CiA 305), the master's side as pure machines.
+//! LSS: node-ID and bit rate over the bus (CiA 305). The master side, as pure state machines.
 //!
-//! A machine says what to send, is fed the frames of the bus and told when a time is over. It never waits.
+//! A state machine returns what to send. The caller passes received frames and time-outs. It never waits.
 
 mod address;
 mod answer;

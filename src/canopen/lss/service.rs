@@ -1,4 +1,4 @@
-//! The services of CiA 305, and what a master sends for them on 7E5h.
+//! The services of CiA 305 and their request frames on 7E5h.
 
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
@@ -10,9 +10,9 @@ pub const UNCONFIGURED: u8 = 0xff;
 /// The two states of a slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// 0: the slave works as usual.
+    /// 0: normal operation.
     Waiting,
-    /// 1: the slave takes configuration services.
+    /// 1: the slave accepts configuration services.
     Configuration,
 }
 
@@ -30,21 +30,21 @@ pub enum Part {
 }
 
 impl Part {
-    /// Every part in its order.
+    /// All parts in order.
     pub const ALL: [Part; 4] = [Part::Vendor, Part::Product, Part::Revision, Part::Serial];
 
-    /// Its number, 0 to 3.
+    /// The number of the part, 0 to 3.
     pub fn number(self) -> u8 {
         self as u8
     }
 
-    /// The part of a number from 0 to 3.
+    /// The part with a number from 0 to 3.
     pub fn from_number(number: u8) -> Option<Part> {
         Part::ALL.into_iter().find(|part| part.number() == number)
     }
 }
 
-/// What a request asks for, and an answer belongs to.
+/// An LSS service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Service {
     /// 04h, no answer.
@@ -72,7 +72,7 @@ pub enum Service {
 }
 
 impl Service {
-    /// The command specifier of the answer; `None` where there is none.
+    /// The command specifier of the answer; `None` if slaves do not answer.
     pub fn answer_specifier(self) -> Option<u8> {
         Some(match self {
             Service::SwitchGlobal | Service::ActivateBitTiming => return None,
@@ -87,8 +87,8 @@ impl Service {
         })
     }
 
-    /// Whether every slave that is meant answers with one and the same frame, so that two frames say no
-    /// more than one.
+    /// Whether all addressed slaves answer with the same frame. Then two frames do not prove two
+    /// slaves, and one frame does not prove a single one.
     pub fn is_chorus(self) -> bool {
         matches!(self, Service::Identify | Service::IdentifyUnconfigured | Service::Fastscan)
     }
@@ -115,47 +115,47 @@ impl fmt::Display for Service {
     }
 }
 
-/// One frame of a master.
+/// One request frame of a master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// 04h: every slave at once.
+    /// 04h: switches all slaves to a state.
     SwitchGlobal(Mode),
-    /// 40h to 43h: the slave whose four numbers these are; the last one makes it answer.
+    /// 40h to 43h: selects the slave with these four numbers. It answers the last one.
     Select(Part, u32),
-    /// 11h; without a node-ID the slave shall have none.
+    /// 11h: sets the node-ID; `None` removes it.
     ConfigureNodeId(Option<NodeId>),
-    /// 13h: an entry of a table, 0 for that of CiA 305.
+    /// 13h: sets the bit rate by table and index. Table 0 is that of CiA 305.
     ConfigureBitTiming {
         /// The table.
         table: u8,
-        /// The entry.
+        /// The index.
         index: u8,
     },
-    /// 15h: after this many milliseconds of silence the new bit rate, and as many again until something is sent.
+    /// 15h: changes to the new bit rate after this many milliseconds, and sends again after the same time.
     ActivateBitTiming {
         /// The time in milliseconds.
         delay_ms: u16,
     },
-    /// 17h: node-ID and bit rate for ever.
+    /// 17h: stores node-ID and bit rate.
     Store,
     /// 5Ah to 5Dh.
     Inquire(Part),
     /// 5Eh.
     InquireNodeId,
-    /// 46h to 4Bh: slaves with this vendor-ID and product code and numbers within limits; the last one makes
-    /// them answer.
+    /// 46h to 4Bh: asks for slaves with this vendor-ID, this product code, and numbers in this range. Slaves answer the last
+    /// one.
     Identify(Limit, u32),
-    /// 4Ch: slaves without a node-ID.
+    /// 4Ch: asks for slaves without a node-ID.
     IdentifyUnconfigured,
-    /// 51h: slaves without a node-ID whose number has these upper bits.
+    /// 51h: asks for slaves without a node-ID whose number has these upper bits.
     Fastscan {
         /// The number to compare with.
         number: u32,
-        /// The lowest bit compared, 0 to 31; 80h ([`Request::EVERYBODY`]) is for everybody and begins anew.
+        /// The lowest bit compared, 0 to 31. 80h ([`Request::EVERYBODY`]) asks all slaves and restarts their scans.
         bit_check: u8,
-        /// Which part is compared.
+        /// The part that is compared.
         sub: Part,
-        /// Which part those that fit shall compare next.
+        /// The part that matching slaves compare next.
         next: Part,
     },
 }
@@ -178,16 +178,16 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// Every limit in its order.
+    /// All limits in order.
     pub const ALL: [Limit; 6] =
         [Limit::Vendor, Limit::Product, Limit::RevisionLow, Limit::RevisionHigh, Limit::SerialLow, Limit::SerialHigh];
 }
 
 impl Request {
-    /// The bit check that every slave without a node-ID answers to.
+    /// The bit check that all slaves without a node-ID answer.
     pub const EVERYBODY: u8 = 0x80;
 
-    /// The service that it is a part of.
+    /// The service that the frame belongs to.
     pub fn service(self) -> Service {
         match self {
             Request::SwitchGlobal(_) => Service::SwitchGlobal,
@@ -204,7 +204,7 @@ impl Request {
         }
     }
 
-    /// The frame: always eight bytes, those not used 0.
+    /// The frame: always eight bytes, unused ones are 0.
     pub fn frame(self) -> Frame {
         let with_number = |specifier: u8, number: u32| {
             let [a, b, c, d] = number.to_le_bytes();
@@ -230,8 +230,8 @@ impl Request {
         Frame::full(CanId::LSS_MASTER, data)
     }
 
-    /// Reads a master's frame; `None` if it is none, is too short for what it says, or holds a number that the
-    /// standard does not know.
+    /// Parses a frame of a master; `None` if it is not one, is too short, or contains a number that the standard does
+    /// not define.
     pub fn parse(frame: &Frame) -> Option<Request> {
         if frame.id() != CanId::LSS_MASTER {
             return None;
@@ -343,7 +343,7 @@ mod tests {
         fn whatever_comes_is_read(bytes in proptest::collection::vec(any::<u8>(), 0..=8)) {
             let frame = Frame::new(CanId::LSS_MASTER, &bytes).expect("a frame");
             if let Some(request) = Request::parse(&frame) {
-                // What is understood is what was sent, but for bytes that mean nothing.
+                // The parsed request is the one sent, apart from unused bytes.
                 prop_assert_eq!(Request::parse(&request.frame()), Some(request));
             }
         }

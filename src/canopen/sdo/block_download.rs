@@ -1,13 +1,13 @@
 //! SDO block download: the client writes an object in sub-blocks of up to 127 segments, each acknowledged as
 //! a whole (CiA 301, 7.2.4.3.9 to 7.2.4.3.11).
 //!
-//! A sub-block goes to `out` in one go; whoever sends the frames paces them and tells of each one that is on
-//! its way ([`BlockDownload::on_sent`]). What the server does not acknowledge is sent again, because it asked
-//! for it; nothing is sent again because of silence.
+//! All segments of a block go to `out` at once. The caller paces them and reports each frame that was sent
+//! ([`BlockDownload::on_sent`]). Segments that the server does not acknowledge are sent again. Nothing is repeated after
+//! a time-out.
 
 use super::crc::crc16;
 use super::{
-    AbortCode, BlockSize, DownloadSize, PATIENCE, Progress, TransferError, Violation, abort_frame, abort_of,
+    AbortCode, BlockSize, DownloadSize, MAX_STALLED_BLOCKS, Progress, TransferError, Violation, abort_frame, abort_of,
     multiplexer,
 };
 use crate::canopen::frame::Frame;
@@ -24,9 +24,9 @@ pub struct BlockDownload {
     state: State,
     /// Whether the server checks a CRC.
     crc: bool,
-    /// Sub-blocks in a row of which the server took nothing.
+    /// Blocks in a row of which the server accepted nothing.
     setbacks: u8,
-    /// The acknowledge of the sub-block before.
+    /// The acknowledge of the previous block.
     acknowledge: Option<Frame>,
 }
 
@@ -34,14 +34,14 @@ pub struct BlockDownload {
 enum State {
     Initiated,
     SubBlock {
-        /// Bytes acknowledged, where this sub-block begins.
+        /// Acknowledged bytes before this block.
         start: usize,
-        /// Segments in it.
+        /// Segments in the block.
         count: u8,
-        /// Segments on their way.
+        /// Segments already sent.
         sent: u8,
     },
-    /// Everything is acknowledged and the end frame is out.
+    /// All is acknowledged and the end frame was sent.
     Ended,
 }
 
@@ -52,7 +52,7 @@ impl BlockDownload {
         BlockDownload { node, object, data, size, state, crc: false, setbacks: 0, acknowledge: None }
     }
 
-    /// The request that starts the transfer: a CRC is always offered.
+    /// The initiate request. It always offers a CRC.
     pub fn request(&self) -> Frame {
         let [a, b, c] = self.object.multiplexer();
         let mut frame = [0xc4, a, b, c, 0, 0, 0, 0];
@@ -63,13 +63,13 @@ impl BlockDownload {
         Frame::full(CanId::sdo_request(self.node), frame)
     }
 
-    /// Whether the server has begun to take the data. A refusal while this is `false` was one of the request:
-    /// nothing has been transferred, another way may be tried.
+    /// Whether the server has accepted data. An abort before that rejects the request, so another kind of transfer may be
+    /// tried.
     pub fn has_begun(&self) -> bool {
         self.state != State::Initiated
     }
 
-    /// Bytes sent so far and bytes in all, for a progress bar.
+    /// Bytes sent so far and in total, for a progress bar.
     pub fn sent(&self) -> (usize, usize) {
         let all = self.data.len();
         match self.state {
@@ -79,16 +79,16 @@ impl BlockDownload {
         }
     }
 
-    /// One of the frames given out is on its way. No server acknowledges what has not been sent: that is how
-    /// an acknowledge that comes twice is told from the next one.
+    /// One of the frames was sent. A server never acknowledges unsent segments, so a repeated acknowledge of the previous
+    /// block can be recognised.
     pub fn on_sent(&mut self) {
         if let State::SubBlock { count, sent, .. } = &mut self.state {
             *sent = (*count).min(*sent + 1);
         }
     }
 
-    /// Takes a frame of the bus; what is to be sent next goes to `out`, and whatever was given out before and
-    /// has not been sent by then need not be sent any more.
+    /// Handles a received frame. Frames to send go to `out`; earlier frames that were not sent yet must then be
+    /// dropped.
     pub fn on_frame(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<()> {
         if let Some(code) = abort_of(frame, self.node, self.object) {
             return Progress::Failed(TransferError::Aborted(code));
@@ -113,14 +113,14 @@ impl BlockDownload {
         }
     }
 
-    /// Gives up: the server is told.
+    /// Handles a time-out: aborts the transfer.
     pub fn on_timeout(&mut self, out: &mut Vec<Frame>) -> TransferError {
         self.abort(AbortCode::TIMEOUT, out);
         TransferError::NoAnswer
     }
 
-    /// Tells the server that the transfer is over. Of a request that was not answered, too: perhaps only the
-    /// answer was lost, and a server in a block transfer takes everything that follows for a part of it.
+    /// Aborts the transfer, even if the request was not answered: the answer may be lost, and a server in a block transfer
+    /// treats all further frames as part of it.
     pub fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
         out.push(abort_frame(self.node, self.object, code));
     }
@@ -141,13 +141,13 @@ impl BlockDownload {
             return Progress::Continue;
         }
         self.setbacks = if taken > 0 { 0 } else { self.setbacks + 1 };
-        if self.setbacks > PATIENCE {
+        if self.setbacks > MAX_STALLED_BLOCKS {
             return self.fail(Violation::Stuck, frame, out);
         }
         self.send_sub_block(next, data.get(2).copied(), frame, out)
     }
 
-    /// Sends the segments from byte `start` on, as many as `frame` allows.
+    /// Sends the segments from byte `start` on, up to the block size.
     fn send_sub_block(
         &mut self,
         start: usize,
@@ -160,7 +160,7 @@ impl BlockDownload {
             return self.fail(Violation::BlockSize, frame, out);
         };
         let rest = &self.data[start..];
-        // An object without bytes is one segment, of which none counts.
+        // An empty object is one segment without valid bytes.
         let last = rest.len().div_ceil(7).max(1);
         let mut count = 0;
         for sequence in 1..=block_size.get() {

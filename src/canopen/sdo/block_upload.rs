@@ -1,15 +1,15 @@
 //! SDO block upload: the client reads an object in sub-blocks of up to 127 segments, each acknowledged as a
 //! whole (CiA 301, 7.2.4.3.12 to 7.2.4.3.15).
 //!
-//! Segments are taken in order only. When one was lost, the acknowledge names the last one before it, and the
-//! server sends the rest again. After a time-out it is not certain where the server stands: what comes then
-//! must be proved right by the CRC or the announced size, and where a server offers neither, nothing is tried.
+//! Segments are accepted only in order. After a lost segment, the acknowledge names the last one before it, and the
+//! server repeats the rest. After a time-out the position of the server is uncertain. Then the result must be proved by
+//! the CRC or the announced size; without either, the transfer fails.
 
 use super::crc::crc16;
 use super::upload::LONGEST;
 use super::{
-    AbortCode, BlockSize, PATIENCE, Progress, TransferError, Upload, Uploaded, Violation, abort_frame, abort_of,
-    multiplexer, number,
+    AbortCode, BlockSize, MAX_STALLED_BLOCKS, Progress, TransferError, Upload, Uploaded, Violation, abort_frame,
+    abort_of, multiplexer, number,
 };
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
@@ -27,13 +27,13 @@ pub struct BlockUpload {
     announced: Option<u32>,
     /// Whether the server computes a CRC.
     crc: bool,
-    /// How many bytes the frame of the last segment fell short of eight.
+    /// The number of bytes missing in the frame of the last segment.
     missing: usize,
-    /// Sub-blocks in a row that brought nothing or did not come to their end.
+    /// Blocks in a row without progress or without an end.
     setbacks: u8,
-    /// Whether anything had to be sent again.
+    /// Whether segments were repeated.
     disturbed: bool,
-    /// Takes over when the server answers as to a normal read.
+    /// Used if the server answers as to a segmented upload.
     plain: Upload,
 }
 
@@ -43,25 +43,25 @@ enum State {
     /// The server chose an expedited or segmented answer.
     Plain,
     SubBlock {
-        /// Segments taken, all in order.
+        /// Accepted segments, in order.
         taken: u8,
         /// The highest sequence number seen.
         highest: u8,
-        /// What the acknowledge before this sub-block said; 0 before the first.
+        /// The previous acknowledge; 0 before the first block.
         acknowledged: u8,
-        /// The frame that ended the sub-block before: when it comes twice it ends nothing.
+        /// The frame that ended the previous block. Repeated, it ends nothing.
         closing: Option<Frame>,
     },
-    /// Everything is acknowledged; the end frame is awaited. `closing` is the frame of the last segment.
+    /// All is acknowledged; the end frame is expected. `closing` is the frame of the last segment.
     Acknowledged {
         closing: Frame,
     },
 }
 
 impl BlockUpload {
-    /// A read of `object` from `node`. With a `threshold` (the standard's "protocol switch threshold", 0 for
-    /// none) the server may answer as to a normal read when the object has no more bytes than that;
-    /// `accept_60` counts there, see [`Upload::new`].
+    /// An upload of `object` from `node`. With a `threshold` ("protocol switch threshold" of the standard, 0 for none) the
+    /// server may answer expedited or segmented if the object is not larger, in bytes. For `accept_60` see
+    /// [`Upload::new`].
     pub fn new(node: NodeId, object: ObjectId, threshold: u8, accept_60: bool) -> BlockUpload {
         BlockUpload {
             node,
@@ -79,21 +79,21 @@ impl BlockUpload {
         }
     }
 
-    /// The same read with other sub-blocks than the largest.
+    /// The same upload with another block size.
     pub fn with_block_size(mut self, block_size: BlockSize) -> BlockUpload {
         self.block_size = block_size;
         self
     }
 
-    /// The request that starts the transfer: a CRC is always asked for.
+    /// The initiate request. It always asks for a CRC.
     pub fn request(&self) -> Frame {
         let [a, b, c] = self.object.multiplexer();
         let request = [0xa4, a, b, c, self.block_size.get(), self.threshold, 0, 0];
         Frame::full(CanId::sdo_request(self.node), request)
     }
 
-    /// Whether the server has begun to answer. A refusal while this is `false` was one of the request: nothing
-    /// has been transferred, another way may be tried.
+    /// Whether the server has answered. An abort before that rejects the request, so another kind of transfer may be
+    /// tried.
     pub fn has_begun(&self) -> bool {
         match self.state {
             State::Initiated => false,
@@ -102,7 +102,7 @@ impl BlockUpload {
         }
     }
 
-    /// Whether the server answers in blocks. It has not, if it answered as to a normal read.
+    /// Whether the server answers in blocks.
     pub fn is_in_blocks(&self) -> bool {
         matches!(self.state, State::SubBlock { .. } | State::Acknowledged { .. })
     }
@@ -112,8 +112,8 @@ impl BlockUpload {
         if self.state == State::Plain { self.plain.received() } else { (self.bytes.len(), self.announced) }
     }
 
-    /// Takes a frame of the bus; what is to be sent next goes to `out`. A segment that moves the transfer on
-    /// is [`Progress::Continue`] with nothing to send: the wait for the next one starts anew.
+    /// Handles a received frame. Frames to send go to `out`. An accepted segment returns [`Progress::Continue`] with nothing
+    /// to send; the time-out restarts.
     pub fn on_frame(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
         if self.state == State::Plain {
             return self.plain.on_frame(frame, out);
@@ -132,16 +132,15 @@ impl BlockUpload {
         }
     }
 
-    /// Nothing came in time. Within a sub-block, what came of it is acknowledged, so that the server sends
-    /// the rest again, and `None` says that the transfer goes on. Otherwise it is given up, and the
-    /// server is told.
+    /// Handles a time-out. Within a block, the received segments are acknowledged, so that the server repeats the rest;
+    /// `None` means that the transfer continues. Otherwise it is aborted.
     pub fn on_timeout(&mut self, out: &mut Vec<Frame>) -> Option<TransferError> {
         if let State::SubBlock { taken, acknowledged, .. } = self.state {
-            // With nothing taken, either the sub-block was lost or the acknowledge before it, and the
-            // server's place is known only if both come to the same: after an acknowledge of nothing.
+            // Without any segment, the block or the previous acknowledge was lost. The position of the server is known
+            // only if both cases are equal: after an acknowledge of nothing.
             let unambiguous = taken > 0 || acknowledged == 0;
             let provable = self.crc || self.announced.is_some();
-            if unambiguous && provable && self.setbacks < PATIENCE {
+            if unambiguous && provable && self.setbacks < MAX_STALLED_BLOCKS {
                 self.setbacks += 1;
                 self.disturbed = true;
                 self.acknowledge(taken, None, out);
@@ -152,8 +151,8 @@ impl BlockUpload {
         Some(TransferError::NoAnswer)
     }
 
-    /// Tells the server that the transfer is over. Of a request that was not answered, too: perhaps only the
-    /// answer was lost, and a server in a block transfer takes everything that follows for a part of it.
+    /// Aborts the transfer, even if the request was not answered: the answer may be lost, and a server in a block transfer
+    /// treats all further frames as part of it.
     pub fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
         out.push(abort_frame(self.node, self.object, code));
     }
@@ -164,7 +163,7 @@ impl BlockUpload {
             return Progress::NotOurs;
         }
         if head & 0xe1 != 0xc0 {
-            // As to a normal read, or against the protocol: both are known there.
+            // A segmented or expedited answer, or a violation: `Upload` handles both.
             let progress = self.plain.on_frame(frame, out);
             if progress == Progress::Continue {
                 self.state = State::Plain;
@@ -188,7 +187,7 @@ impl BlockUpload {
         }
         let taken = if in_order {
             let part = frame.data().get(1..).unwrap_or_default();
-            // Only of the last segment the end frame tells which bytes count.
+            // The end frame gives the number of valid bytes in the last segment only.
             if part.len() < 7 && !is_last {
                 return self.fail(Violation::Short, frame, out);
             }
@@ -208,7 +207,7 @@ impl BlockUpload {
         } else if is_last || sequence == self.block_size.get() {
             self.disturbed |= !in_order;
             self.setbacks = if taken > 0 { 0 } else { self.setbacks + 1 };
-            if self.setbacks > PATIENCE {
+            if self.setbacks > MAX_STALLED_BLOCKS {
                 return self.fail(Violation::Stuck, frame, out);
             }
             self.acknowledge(taken, Some(*frame), out);
@@ -220,7 +219,7 @@ impl BlockUpload {
         Progress::Continue
     }
 
-    /// Acknowledges the first `taken` segments of the sub-block; the next one begins.
+    /// Acknowledges the first `taken` segments of the block and starts the next one.
     fn acknowledge(&mut self, taken: u8, closing: Option<Frame>, out: &mut Vec<Frame>) {
         self.state = State::SubBlock { taken: 0, highest: 0, acknowledged: taken, closing };
         self.send(0xa2, taken, self.block_size.get(), out);
@@ -233,8 +232,8 @@ impl BlockUpload {
         let length = if misnamed { self.bytes.len() } else { self.bytes.len().saturating_sub(unused) };
         let expected = if self.crc { crc16(&self.bytes[..length]) } else { 0 };
         let [low, high] = expected.to_le_bytes();
-        // Segment 65, when it is the last, begins as an end frame does. Come twice, it is none, unless it
-        // says what the end frame must say.
+        // Segment 65, if it is the last, starts like an end frame. A repeated one is not an end frame, unless it
+        // has the expected contents.
         if *frame == closing && data != [head, low, high, 0, 0, 0, 0, 0] {
             return Progress::NotOurs;
         }
@@ -248,7 +247,7 @@ impl BlockUpload {
                 _ => return self.fail(Violation::Short, frame, out),
             }
         }
-        // The CRC does not see how many zeros come first.
+        // The CRC does not depend on the number of leading zeros.
         if self.disturbed && self.announced.is_some_and(|size| usize::try_from(size) != Ok(length)) {
             return self.fail(Violation::Size, frame, out);
         }
@@ -258,8 +257,8 @@ impl BlockUpload {
         Progress::Done(Uploaded { bytes, indicated: true, announced: self.announced, misnamed_end: misnamed })
     }
 
-    /// Whether an end frame that takes back the whole last segment is wrong: the announced size and the CRC
-    /// both say that all of it counts. durand 0.5.0 ends every object of a multiple of seven bytes so.
+    /// Whether an end frame wrongly declares the whole last segment invalid: the announced size and the CRC
+    /// both include it. durand 0.5.0 does that for objects of a multiple of seven bytes.
     fn is_full_by_proof(&self, unused: usize, end: &[u8]) -> bool {
         let announced = self.announced.is_some_and(|size| usize::try_from(size) == Ok(self.bytes.len()));
         let given = matches!(end, [_, low, high, ..] if u16::from_le_bytes([*low, *high]) == crc16(&self.bytes));

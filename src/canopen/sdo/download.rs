@@ -5,13 +5,13 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 
-/// Whether a write says how many bytes it carries.
+/// Whether a download indicates its size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DownloadSize {
     /// 2Fh, 2Bh, 27h, 23h, 21h.
     #[default]
     Indicated,
-    /// 22h, 20h: what the D-20-9 and the DPS print.
+    /// 22h, 20h: the form in the manuals of D-20-9 and DPS.
     Omitted,
 }
 
@@ -28,7 +28,7 @@ pub struct Download {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Initiated,
-    /// A segment is out: the bytes before `end` have been sent, the acknowledge with `toggle` is awaited.
+    /// A segment was sent: the bytes before `end` are sent, and the acknowledge with `toggle` is expected.
     Segment {
         end: usize,
         toggle: bool,
@@ -36,8 +36,8 @@ enum State {
 }
 
 impl Download {
-    /// A write of `data` to `object` of `node`. One to four bytes go expedited, others in segments (no
-    /// bytes too: an expedited transfer cannot say 0).
+    /// A download of `data` to `object` of `node`. One to four bytes are expedited, other sizes segmented (also 0, which
+    /// an expedited transfer cannot indicate).
     pub fn new(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> Download {
         Download { node, object, data, size, state: State::Initiated }
     }
@@ -46,7 +46,7 @@ impl Download {
         (1..=4).contains(&self.data.len())
     }
 
-    /// The request that starts the transfer.
+    /// The initiate request.
     pub fn request(&self) -> Frame {
         let [a, b, c] = self.object.multiplexer();
         let mut frame = [0, a, b, c, 0, 0, 0, 0];
@@ -69,12 +69,12 @@ impl Download {
         Frame::full(CanId::sdo_request(self.node), frame)
     }
 
-    /// Whether the server has begun to take the data, so that it must be told when we give up.
+    /// Whether the server has answered, so that it needs an abort.
     pub fn has_begun(&self) -> bool {
         self.state != State::Initiated
     }
 
-    /// Bytes sent so far and bytes in all, for a progress bar.
+    /// Bytes sent so far and in total, for a progress bar.
     pub fn sent(&self) -> (usize, usize) {
         match self.state {
             State::Initiated => (0, self.data.len()),
@@ -82,7 +82,7 @@ impl Download {
         }
     }
 
-    /// Takes a frame of the bus; what is to be sent next goes to `out`.
+    /// Handles a received frame. Frames to send go to `out`.
     pub fn on_frame(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<()> {
         if let Some(code) = abort_of(frame, self.node, self.object) {
             return Progress::Failed(TransferError::Aborted(code));
@@ -117,13 +117,13 @@ impl Download {
         }
     }
 
-    /// Gives up: the server is told, if it had begun to answer.
+    /// Handles a time-out: sends an abort if the server had answered.
     pub fn on_timeout(&mut self, out: &mut Vec<Frame>) -> TransferError {
         self.abort(AbortCode::TIMEOUT, out);
         TransferError::NoAnswer
     }
 
-    /// Tells the server that the transfer is over, if it had begun to answer.
+    /// Ends the transfer: sends an abort if the server had answered.
     pub fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
         if self.has_begun() {
             out.push(abort_frame(self.node, self.object, code));

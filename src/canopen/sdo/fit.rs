@@ -1,26 +1,26 @@
-//! From the bytes that a device delivered to a value of the type that was asked for: the size rule.
+//! The size rule: from the delivered bytes to a value of the expected type.
 //!
-//! Never stricter than the sensors in the field, never silent about it.
+//! It is never stricter than sensors in the field, and always reports a deviation.
 
 use super::Uploaded;
 use crate::canopen::value::{DataType, Value, WidthError};
 use std::fmt;
 
-/// A value, and what was odd about how it came.
+/// A value, and a note about deviations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fitted {
     /// The value.
     pub value: Value,
-    /// What the user should hear of.
+    /// The deviation to report.
     pub note: Option<Note>,
 }
 
-/// Something odd that does not make the value doubtful.
+/// A deviation that does not affect the value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Note {
-    /// The type is unknown and the device did not say how many of the four bytes count.
+    /// The type is unknown and the device did not indicate the size.
     SizeNotIndicated,
-    /// More bytes than the type has; the excess says nothing.
+    /// More bytes than the type has; the excess is zero or the sign.
     Wider {
         /// Bytes of the type.
         expected: usize,
@@ -34,14 +34,14 @@ pub enum Note {
         /// Bytes delivered.
         found: usize,
     },
-    /// A segmented transfer announced another size than it delivered.
+    /// A segmented transfer delivered another size than it announced.
     Announced {
         /// Bytes announced.
         announced: u32,
         /// Bytes delivered.
         found: usize,
     },
-    /// The end of a block transfer says that nothing of the last segment counts; size and CRC say that all does.
+    /// The end frame of a block transfer declares the last segment invalid; size and CRC include it.
     MisnamedEnd,
 }
 
@@ -61,26 +61,26 @@ impl fmt::Display for Note {
     }
 }
 
-/// Bytes that make no value of the type.
+/// Bytes that do not fit the type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the device delivered {found} bytes where {data_type} has {expected}")]
+#[error("the device delivered {found} bytes, but {data_type} has {expected}")]
 pub struct FitError {
-    /// The type asked for.
+    /// The expected type.
     pub data_type: DataType,
-    /// Its bytes.
+    /// The size of the type in bytes.
     pub expected: usize,
     /// Bytes delivered.
     pub found: usize,
 }
 
-/// Fits what was delivered to `data_type`; with `None` the bytes stay as they are.
+/// Converts delivered bytes to `data_type`; with `None` the bytes stay as they are.
 ///
-/// Without a size the type's width decides and the rest is ignored. With a size, more bytes than the
-/// type has are accepted if the excess says nothing (zeros, or the sign of a negative integer), and an
-/// integer in fewer bytes is the same number.
+/// If no size is indicated, the width of the type decides and further bytes are ignored. If a size is indicated, more
+/// bytes than the type has are accepted if the excess is zero or the sign of a negative integer. An integer in fewer
+/// bytes has the same value.
 ///
 /// # Errors
-/// Bytes that make no value of the type.
+/// The bytes do not fit the type.
 pub fn fit(data_type: Option<DataType>, uploaded: &Uploaded) -> Result<Fitted, FitError> {
     let found = uploaded.bytes.len();
     let odd = uploaded.announced.filter(|&size| usize::try_from(size) != Ok(found));
@@ -161,7 +161,7 @@ mod tests {
         assert!(text(DataType::Integer(4), &uploaded(&[], true)).is_err());
         assert_eq!(
             text(DataType::Real32, &uploaded(&[0, 0], true)).map_err(|error| error.to_string()),
-            Err("the device delivered 2 bytes where r32 has 4".into())
+            Err("the device delivered 2 bytes, but r32 has 4".into())
         );
     }
 

@@ -1,7 +1,7 @@
 //! SDO client: transfers as pure state machines (CiA 301, 7.2.4).
 //!
-//! A machine is fed the frames of the bus and says whether a frame was its own, what to send next, and
-//! how the transfer ended. It never waits: time-outs are told to it.
+//! The caller passes received frames and time-outs to a state machine. It returns whether a frame belongs to the
+//! transfer, what to send next, and how the transfer ended. It never waits.
 
 mod abort;
 mod block_download;
@@ -25,21 +25,21 @@ use super::frame::Frame;
 use super::id::{CanId, NodeId};
 use super::object::ObjectId;
 
-/// How a machine took a frame or a time-out.
+/// The result of a frame or a time-out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Progress<T> {
-    /// The frame is no part of this transfer, or a part that has come before; nothing has changed.
+    /// The frame does not belong to this transfer, or repeats an earlier one. Nothing changed.
     NotOurs,
-    /// The transfer goes on.
+    /// The transfer continues.
     Continue,
     /// The transfer is complete.
     Done(T),
-    /// The transfer is over without a result.
+    /// The transfer failed.
     Failed(TransferError),
 }
 
 impl<T> Progress<T> {
-    /// The same with another result.
+    /// The same progress with a converted result.
     pub fn map<U>(self, result: impl FnOnce(T) -> U) -> Progress<U> {
         match self {
             Progress::NotOurs => Progress::NotOurs,
@@ -50,57 +50,57 @@ impl<T> Progress<T> {
     }
 }
 
-/// Why a transfer has no result.
+/// Why a transfer failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TransferError {
-    /// The device refused.
+    /// The device sent an abort code.
     Aborted(AbortCode),
-    /// The device answered against the protocol.
+    /// The answer violates the protocol.
     Violation(Violation, Frame),
-    /// No answer came in time.
+    /// The device did not answer in time.
     NoAnswer,
 }
 
-/// What is wrong with an answer that is ours.
+/// How an answer to our transfer violates the protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Violation {
-    /// Command specifier 60h, the acknowledge of a write, as the answer to a read.
-    #[error("acknowledge of a write (60h) as the answer to a read")]
+    /// Command specifier 60h, the acknowledge of a download, in answer to an upload.
+    #[error("acknowledge of a write (60h) in answer to a read")]
     WriteAcknowledgeToRead,
-    /// A command specifier that fits no answer to this request.
+    /// The command specifier does not answer this request.
     #[error("unexpected command specifier")]
     Command,
     /// The toggle bit of a segment did not alternate.
     #[error("toggle bit not alternated")]
     Toggle,
-    /// More bytes than any object of a measuring device has.
-    #[error("transfer without end")]
+    /// The transfer exceeds the limit of its size.
+    #[error("the transfer does not end")]
     TooLong,
-    /// Too few bytes to say what it must say.
+    /// The frame has too few bytes.
     #[error("frame too short")]
     Short,
-    /// No block size from 1 to 127.
+    /// The block size is not in 1 to 127.
     #[error("invalid block size")]
     BlockSize,
-    /// The acknowledge of segments that have not been sent.
+    /// An acknowledge of segments that were not sent.
     #[error("acknowledge of segments that were not sent")]
     Sequence,
-    /// One sub-block after the other of which nothing arrives.
-    #[error("no segment gets through")]
+    /// Several blocks in a row without any received segment.
+    #[error("no segment was received")]
     Stuck,
-    /// The data of a block transfer and its CRC do not fit together.
+    /// The CRC of a block transfer does not match the data.
     #[error("CRC does not match the data")]
     Crc,
-    /// Another size than announced, and segments had to be sent again: something was mixed up.
-    #[error("another size than announced after lost segments")]
+    /// The size differs from the announced one after segments were repeated.
+    #[error("the size differs from the announced one after lost segments")]
     Size,
 }
 
-/// How many sub-blocks in a row may bring nothing before a block transfer is given up.
-const PATIENCE: u8 = 3;
+/// The number of blocks in a row without progress after which a block transfer is aborted.
+const MAX_STALLED_BLOCKS: u8 = 3;
 
 impl Violation {
-    /// The abort code that tells the server.
+    /// The abort code to send to the server.
     fn abort_code(self) -> AbortCode {
         match self {
             Violation::WriteAcknowledgeToRead | Violation::Command => AbortCode::COMMAND_SPECIFIER,
@@ -122,7 +122,7 @@ pub fn abort_frame(node: NodeId, object: ObjectId, code: AbortCode) -> Frame {
     Frame::full(CanId::sdo_request(node), [0x80, a, b, c, d, e, f, g])
 }
 
-/// The multiplexer in bytes 1 to 3, where the frame has them.
+/// The multiplexer in bytes 1 to 3, if the frame has them.
 fn multiplexer(data: &[u8]) -> Option<ObjectId> {
     match data {
         [_, a, b, c, ..] => Some(ObjectId::from_multiplexer([*a, *b, *c])),
@@ -130,7 +130,7 @@ fn multiplexer(data: &[u8]) -> Option<ObjectId> {
     }
 }
 
-/// The number in bytes 4 to 7, where the frame has them.
+/// The number in bytes 4 to 7, if the frame has them.
 fn number(data: &[u8]) -> Option<u32> {
     match data {
         [_, _, _, _, a, b, c, d, ..] => Some(u32::from_le_bytes([*a, *b, *c, *d])),
@@ -140,8 +140,8 @@ fn number(data: &[u8]) -> Option<u32> {
 
 /// The abort code of a frame that aborts the transfer of `object`. A truncated code reads as 0.
 ///
-/// An abort on the identifier of the request counts too: the D-20-9 manual (page 7) draws it there, and
-/// another client's abort of the same object ends the server's transfer just the same.
+/// An abort with the identifier of the request counts too. The D-20-9 manual (page 7) shows it there, and an abort of
+/// another master also ends the transfer.
 fn abort_of(frame: &Frame, node: NodeId, object: ObjectId) -> Option<AbortCode> {
     let here = frame.id() == CanId::sdo_response(node) || frame.id() == CanId::sdo_request(node);
     let data = frame.data();

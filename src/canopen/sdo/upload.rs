@@ -13,7 +13,7 @@ pub(super) const LONGEST: usize = 64 << 20;
 pub struct Uploaded {
     /// The bytes in wire order. Of an answer without size: all four.
     pub bytes: Vec<u8>,
-    /// Whether the server said how many bytes count (it did not: 42h).
+    /// Whether the server indicated the size (not with 42h).
     pub indicated: bool,
     /// The size that a segmented transfer announced.
     pub announced: Option<u32>,
@@ -51,7 +51,7 @@ impl Upload {
         Frame::full(CanId::sdo_request(self.node), [0x40, a, b, c, 0, 0, 0, 0])
     }
 
-    /// Whether the server has begun to answer, so that it must be told when we give up.
+    /// Whether the server has answered, so that it needs an abort.
     pub fn has_begun(&self) -> bool {
         self.state != State::Initiated
     }
@@ -77,13 +77,13 @@ impl Upload {
         }
     }
 
-    /// Gives up: the server is told, if it had begun to answer.
+    /// Handles a time-out: sends an abort if the server had answered.
     pub fn on_timeout(&mut self, out: &mut Vec<Frame>) -> TransferError {
         self.abort(AbortCode::TIMEOUT, out);
         TransferError::NoAnswer
     }
 
-    /// Tells the server that the transfer is over, if it had begun to answer.
+    /// Ends the transfer: sends an abort if the server had answered.
     pub fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
         if self.has_begun() {
             out.push(abort_frame(self.node, self.object, code));
@@ -108,7 +108,7 @@ impl Upload {
         }
         if expedited {
             let unused = if indicated { usize::from(command >> 2 & 3) } else { 0 };
-            // A short frame holds fewer bytes than it says: what is there is used, never filled up.
+            // A short frame has fewer bytes than it declares. The present bytes are used and never padded.
             let end = data.len().min(8 - unused).max(4);
             return Progress::Done(Uploaded {
                 bytes: data[4..end].to_vec(),

@@ -1,4 +1,4 @@
-//! Why an LSS service has no result.
+//! Errors of LSS services.
 
 use crate::bus::{BusError, time::spoken};
 use crate::canopen::frame::Frame;
@@ -6,58 +6,58 @@ use crate::canopen::lss::{ErrorCode, FastscanError, LssAddress, Service, Violati
 use crate::master::Error;
 use std::time::Duration;
 
-/// Why an LSS service has no result.
+/// Why an LSS service failed.
 #[derive(Debug, thiserror::Error)]
 pub enum LssError {
-    /// The slave said no.
+    /// The slave rejected the request with an error code.
     #[error("LSS {service}: refused by the device ({})", code.spoken(*.service))]
     Refused {
-        /// What was asked for.
+        /// The service.
         service: Service,
-        /// Its reason.
+        /// The error code.
         code: ErrorCode,
     },
-    /// Nobody answered.
+    /// No slave answered in time.
     #[error("LSS {service}: no answer within {}", spoken(*.waited))]
     NoAnswer {
-        /// What was asked for.
+        /// The service.
         service: Service,
         /// The longest wait for one answer.
         waited: Duration,
     },
-    /// More than one slave answered where one was meant.
+    /// More than one slave answered a request for one slave.
     #[error("LSS {service}: more than one slave answers")]
     Several {
-        /// What was asked for.
+        /// The service.
         service: Service,
         /// The different answers.
         frames: Vec<Frame>,
     },
-    /// A slave answered against the protocol.
+    /// An answer violates the protocol.
     #[error("LSS {service}: {violation}: {frame}")]
     Violation {
-        /// What was asked for.
+        /// The service.
         service: Service,
-        /// What is wrong with the answer.
+        /// The violation.
         violation: Violation,
         /// The answer.
         frame: Frame,
     },
-    /// Another LSS master is at work: whose slave is in configuration state cannot be told.
+    /// Another LSS master is active. The slave in configuration state may be the one that it addressed.
     #[error("another LSS master sends at the same time: {0}")]
     Disturbed(Frame),
-    /// Fastscan finds somebody and no address.
+    /// Fastscan got answers but found no address.
     #[error("LSS fastscan: {0}")]
     Fastscan(FastscanError),
-    /// The slave that fastscan found calls itself by another address, or several do.
-    #[error("LSS fastscan: found {found}, but the device calls itself {told}")]
-    Mistaken {
-        /// What fastscan found.
+    /// The slave that fastscan found reports another address, or several slaves report theirs.
+    #[error("LSS fastscan: found {found}, but the device reports {reported}")]
+    AddressMismatch {
+        /// The address that fastscan found.
         found: LssAddress,
-        /// What the slave in configuration state says.
-        told: LssAddress,
+        /// The address that the slave in configuration state reports.
+        reported: LssAddress,
     },
-    /// The bus fails, or the user asked to stop.
+    /// The bus failed or the user interrupted.
     #[error(transparent)]
     Master(#[from] Error),
 }

@@ -1,76 +1,76 @@
-//! Fastscan over a bus: how long is waited for an answer that says no by not coming.
+//! Fastscan over a bus. In fastscan, a missing answer means "no", so the time-outs decide the duration.
 
 use super::{Lss, LssError};
 use crate::bus::Mono;
 use crate::canopen::lss::{Fastscan, LssAddress, Mode, Progress, Step, Wait};
 use std::time::Duration;
 
-/// The shortest wait for an answer. Most of the steps of a scan are this long, and an answer that comes later
-/// costs a part of the scan.
-const SHORTEST: Duration = Duration::from_millis(4);
+/// The shortest wait for an answer. Most steps of a scan take this time. A later answer makes a part of the scan
+/// repeat.
+const MIN_STEP_TIMEOUT: Duration = Duration::from_millis(4);
 
-/// The shortest wait for an answer that should come.
-const CHECK: Duration = Duration::from_millis(50);
+/// The shortest wait for an expected answer.
+const MIN_CHECK_TIMEOUT: Duration = Duration::from_millis(50);
 
-/// What the program, its host and the wire take beside the device.
-const MARGIN: Duration = Duration::from_millis(2);
+/// The time that program, host and bus take in addition to the device.
+const HOST_MARGIN: Duration = Duration::from_millis(2);
 
-/// Everybody has so long after the first answer to answer, too.
-const GATHERING: Duration = Duration::from_millis(20);
+/// The time for further slaves to answer after the first answer.
+const GATHERING_TIME: Duration = Duration::from_millis(20);
 
-/// How fast the slaves answer.
+/// The measured answer time of the slaves.
 #[derive(Clone, Copy, Debug)]
 struct Pace {
-    /// About the slowest of the latest answers.
+    /// The slowest recent answer; old ones are forgotten gradually.
     slowest: Duration,
     timeout: Duration,
 }
 
 impl Pace {
-    /// An answer came after this time. What was slow once is forgotten after some answers.
+    /// Records the time of an answer.
     fn note(&mut self, latency: Duration) {
         self.slowest = latency.max(self.slowest * 7 / 8);
     }
 
-    /// Half as long again as the slowest answer, and some more; twice as long each time that was too short.
-    fn usual(self, impatience: u8) -> Duration {
-        self.stretched(SHORTEST.max(self.slowest * 3 / 2 + MARGIN), impatience)
+    /// The time-out of a step: 1.5 times the slowest answer plus a margin, doubled for each earlier time-out that was
+    /// too short.
+    fn usual(self, extensions: u8) -> Duration {
+        self.stretched(MIN_STEP_TIMEOUT.max(self.slowest * 3 / 2 + HOST_MARGIN), extensions)
     }
 
-    /// For an answer that should come.
-    fn check(self, impatience: u8) -> Duration {
-        self.stretched(CHECK.max(self.usual(0) * 4), impatience)
+    /// The time-out for an expected answer.
+    fn check(self, extensions: u8) -> Duration {
+        self.stretched(MIN_CHECK_TIMEOUT.max(self.usual(0) * 4), extensions)
     }
 
-    fn stretched(self, length: Duration, impatience: u8) -> Duration {
-        length.saturating_mul(2u32.saturating_pow(impatience.into())).min(self.timeout.max(SHORTEST))
+    fn stretched(self, length: Duration, extensions: u8) -> Duration {
+        length.saturating_mul(2u32.saturating_pow(extensions.into())).min(self.timeout.max(MIN_STEP_TIMEOUT))
     }
 }
 
 impl Lss<'_, '_> {
-    /// 51h: finds a slave without a node-ID and takes it to configuration state; `None` where there is none.
-    /// Several slaves are found one after the other, each given a node-ID before the next is looked for, or set
-    /// aside: see [`Lss::fastscan_beside`].
+    /// Finds a slave without a node-ID and switches it to configuration state (51h); `None` if there is none. To find
+    /// several slaves, give each one a node-ID before the next scan, or use [`Lss::fastscan_beside`].
     ///
-    /// Everybody is sent to waiting state first. That the slave in configuration state is the one found is
-    /// confirmed by its own words, or where it has none by addressing it.
+    /// All slaves are switched to waiting state first. The found address is confirmed by inquiry. If the slave does not
+    /// support that, it is confirmed by selective addressing.
     ///
     /// # Errors
-    /// Slaves that answer and have no address that holds; what stops everything.
+    /// Slaves answer, but no address can be confirmed; the bus failed or the user interrupted.
     pub fn fastscan(&mut self) -> Result<Option<LssAddress>, LssError> {
         self.fastscan_beside(&[])
     }
 
-    /// The same with slaves set aside: they are addressed and wait in configuration state, where they are not to take
-    /// part (CiA 305, 7.5.3.5). Nothing is changed in them. One that takes part all the same is found again.
+    /// Like [`Lss::fastscan`], but ignores the slaves in `aside`. They are switched to configuration state, where slaves
+    /// do not take part (CiA 305, 7.5.3.5). Nothing is changed in them. A slave that takes part anyway is found again.
     ///
     /// # Errors
-    /// As [`Lss::fastscan`], and one of `aside` that does not answer.
+    /// As [`Lss::fastscan`], or a slave in `aside` does not answer.
     pub fn fastscan_beside(&mut self, aside: &[LssAddress]) -> Result<Option<LssAddress>, LssError> {
         let mut scan = Fastscan::new(self.master.timing.retries);
         let mut pace = Pace { slowest: Duration::ZERO, timeout: self.master.timing.timeout };
         self.is_configuring = true;
-        self.pass_by()?;
+        self.discard_received()?;
         loop {
             let step = scan.step();
             if step.wait == Wait::Everybody {
@@ -94,13 +94,13 @@ impl Lss<'_, '_> {
         }
     }
 
-    /// Carries out one step: how many answers came.
+    /// Carries out one step and returns the number of answers.
     fn step(&mut self, step: Step, pace: &mut Pace) -> Result<usize, LssError> {
-        let sent = self.put_out(step.request.frame())?;
-        let usual = sent + pace.usual(step.impatience);
+        let sent = self.send_now(step.request.frame())?;
+        let usual = sent + pace.usual(step.extensions);
         let mut deadline = match step.wait {
             Wait::Everybody | Wait::Advance => sent + pace.timeout,
-            Wait::Check => sent + pace.check(step.impatience),
+            Wait::Check => sent + pace.check(step.extensions),
             Wait::Bit => usual,
         };
         let mut answers = 0;
@@ -122,15 +122,15 @@ impl Lss<'_, '_> {
 
     fn confirm(&mut self, found: LssAddress) -> Result<(), LssError> {
         match self.inquire_address() {
-            Ok(told) if told == found => Ok(()),
-            Ok(told) => Err(LssError::Mistaken { found, told }),
-            // It need not know the service.
+            Ok(reported) if reported == found => Ok(()),
+            Ok(reported) => Err(LssError::AddressMismatch { found, reported }),
+            // The service is optional.
             Err(LssError::NoAnswer { .. }) => self.readdress(found),
             Err(error) => Err(error),
         }
     }
 
-    /// Addresses the slave that was found. An answer is one to this address, and nobody else stays in configuration
+    /// Addresses the slave that was found. If it answers, it has this address and is the only one in configuration
     /// state.
     fn readdress(&mut self, found: LssAddress) -> Result<(), LssError> {
         self.switch_global(Mode::Waiting)?;
@@ -138,7 +138,7 @@ impl Lss<'_, '_> {
     }
 }
 
-/// When everybody has answered, counted from the slowest so far.
+/// When all slaves have answered, estimated from the slowest answer so far.
 fn end_of_gathering(sent: Mono, answered: Mono) -> Mono {
-    answered + GATHERING.max(answered.since(sent))
+    answered + GATHERING_TIME.max(answered.since(sent))
 }

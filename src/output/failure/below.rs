@@ -52,7 +52,7 @@ pub(super) fn lss(error: &LssError) -> Words {
             "address one device, by its node-ID or as VENDOR:PRODUCT:REVISION:SERIAL, or connect it as the only device",
         ),
         LssError::Disturbed(_) => Some("stop the other program, or try again"),
-        LssError::Fastscan(_) | LssError::Mistaken { .. } => {
+        LssError::Fastscan(_) | LssError::AddressMismatch { .. } => {
             Some("connect the devices without a node-ID one at a time")
         }
         LssError::Violation { .. } | LssError::Master(_) => None,

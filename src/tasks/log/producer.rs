@@ -68,7 +68,7 @@ impl Producer {
     /// Ends the production and returns what was sent.
     pub(super) fn finish(mut self, master: &mut Master<'_>) -> SyncStatistics {
         self.check_sent(master);
-        let unsent = u64::from(master.take_back_first());
+        let unsent = u64::from(master.remove_first());
         self.statistics.left_out = self.slot - self.statistics.sent - unsent;
         self.statistics
     }

@@ -127,7 +127,7 @@ impl<'a> Retiming<'a> {
         tell(Note::Step(format!("{name} goes to {new} in {DELAY_MS} ms, this side too")));
         let followed = self.follow(master, begun);
         let followed = followed.map_err(|failure| self.go_back(master, failure, (begun, before), done, tell));
-        master.ride_out(false);
+        master.set_tolerates_outages(false);
         followed?;
         done.retimed = true;
         tell(Note::Step(format!("{name} answers at {new}")));
@@ -152,7 +152,7 @@ impl<'a> Retiming<'a> {
     /// Follows the device to the new rate, and looks for it there.
     fn follow(&self, master: &mut Master<'_>, begun: Mono) -> Result<(), Failure> {
         // Where the device is not, nobody acknowledges.
-        master.ride_out(true);
+        master.set_tolerates_outages(true);
         wait(master, begun + DELAY + MARGIN)?;
         set(master, self.new)?;
         wait(master, begun + DELAY * 2 + MARGIN)?;
@@ -217,9 +217,9 @@ impl<'a> Retiming<'a> {
         wait(master, settled)?;
         set(master, self.new)?;
         done.retimed = true;
-        master.ride_out(true);
+        master.set_tolerates_outages(true);
         let found = is_there(master, subject, self.job.id.or(subject.node));
-        master.ride_out(false);
+        master.set_tolerates_outages(false);
         if found? {
             return Ok(());
         }

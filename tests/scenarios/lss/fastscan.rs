@@ -141,7 +141,7 @@ fn without_inquiry_the_address_itself_confirms() {
     let mut mistaken = Slave::new(DPS, 0xff);
     mistaken.says.insert(0x5d, vec![0x5d, 1, 2, 3, 4, 0, 0, 0]);
     let (found, _) = scan(&mut bus_of([mistaken]));
-    assert!(matches!(found, Err(LssError::Mistaken { .. })), "{found:?}");
+    assert!(matches!(found, Err(LssError::AddressMismatch { .. })), "{found:?}");
 }
 
 /// Whatever gets lost: who is found is there, and alone in configuration state.

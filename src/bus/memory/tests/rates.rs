@@ -1,4 +1,4 @@
-//! Bit rates: who understands whom, and what those see who do not.
+//! Bit rates: which stations receive which frames, and which errors the others see.
 
 use super::*;
 use crate::bus::{BitRateControl, Fault, Mode};
@@ -7,7 +7,7 @@ fn seconds(seconds: u64) -> Mono {
     Mono::at(Duration::from_secs(seconds))
 }
 
-/// A script at a bit rate of its own.
+/// A script with its own bit rate.
 struct Tuned {
     script: Script,
     tuning: Tuning,
@@ -54,7 +54,7 @@ fn bus(stations: impl IntoIterator<Item = Tuned>) -> MemoryBus {
     bus
 }
 
-/// Frames and faults up to `until`, each with how often it came in a row.
+/// Frames and faults up to `until`, each with its number of repetitions in a row.
 fn seen(bus: &mut MemoryBus, until: Mono) -> Vec<(String, u32)> {
     let mut seen: Vec<(String, u32)> = Vec::new();
     loop {
@@ -80,7 +80,7 @@ fn own(text: &str, times: u32) -> (String, u32) {
 }
 
 #[test]
-fn nobody_acknowledges() {
+fn without_a_receiver_no_frame_is_acknowledged() {
     // No station, one without power, and one that only could if it were there.
     for stations in [vec![], vec![tuned(Tuning::Off, &[(10, "701#00")])]] {
         let mut bus = bus(stations);
@@ -90,12 +90,12 @@ fn nobody_acknowledges() {
             events[..4],
             [own("NoAcknowledge", 12), own("ErrorWarning", 1), own("NoAcknowledge", 4), own("ErrorPassive", 1)]
         );
-        // It goes on for ever, but no further.
+        // It continues, but the state does not get worse.
         assert_eq!(events.len(), 5);
         assert_eq!(events[4].0, "NoAcknowledge");
         (0..QUEUE_LENGTH).for_each(|_| _ = bus.send(&frame("080#")));
         assert!(matches!(bus.send(&frame("080#")), Err(BusError::QueueFull)));
-        // As soon as somebody is there, everything gets out.
+        // As soon as a station acknowledges, all frames are sent.
         bus.attach(tuned(Tuning::At(BIT_RATE), &[]));
         seen(&mut bus, seconds(1));
         assert_eq!(received(&bus, bus.stations::<Tuned>().count() - 1), QUEUE_LENGTH);
@@ -103,7 +103,7 @@ fn nobody_acknowledges() {
 }
 
 #[test]
-fn a_device_at_another_rate_is_deaf_and_takes_the_program_off_the_bus() {
+fn a_device_at_a_different_bit_rate_receives_nothing_and_makes_the_program_bus_off() {
     let mut bus = bus([tuned(Tuning::At(125_000), &[])]);
     bus.send(&frame("080#")).expect("room");
     let events = seen(&mut bus, seconds(1));
@@ -119,7 +119,7 @@ fn a_device_at_another_rate_is_deaf_and_takes_the_program_off_the_bus() {
         ]
     );
     assert_eq!(received(&bus, 0), 0);
-    // Off is off, whatever else is there, until the interface is set up anew.
+    // Bus-off lasts until the interface is set up again, whichever stations are there.
     bus.attach(tuned(Tuning::At(BIT_RATE), &[(2_000_000, "701#00")]));
     assert_eq!(seen(&mut bus, seconds(3)), []);
     bus.stations_mut::<Tuned>().skip(1).for_each(|station| station.tuning = Tuning::Off);
@@ -131,15 +131,15 @@ fn a_device_at_another_rate_is_deaf_and_takes_the_program_off_the_bus() {
 }
 
 #[test]
-fn a_device_at_another_rate_is_mute_and_disturbs_the_others() {
+fn frames_of_a_device_at_a_different_bit_rate_are_errors_for_the_others() {
     let mut bus =
         bus([tuned(Tuning::At(125_000), &[(0, "701#00")]), tuned(Tuning::At(BIT_RATE), &[(1_000_000, "702#00")])]);
     let events = seen(&mut bus, us(900_000));
     assert_eq!(events, [own("Protocol", 32)], "until the one that is alone with its rate is bus-off");
     assert_eq!(received(&bus, 1), 0);
-    // What the other one sends does not arrive either.
+    // Frames of the other station do not arrive either.
     assert_eq!(seen(&mut bus, seconds(2)), [own("Protocol", 32)]);
-    // Nobody disturbs the others for ever: who hears 128 errors is error-passive, and frames get through.
+    // After 128 errors a station is error-passive and no longer disturbs the frames of the others.
     for round in 0..4 {
         bus.set_bit_rate(BIT_RATE, Mode::Normal).expect("allowed");
         bus.send(&frame("080#")).expect("room");
@@ -150,7 +150,7 @@ fn a_device_at_another_rate_is_mute_and_disturbs_the_others() {
 }
 
 #[test]
-fn those_of_one_rate_understand_each_other_and_a_listener_disturbs_nobody() {
+fn stations_at_one_bit_rate_communicate_and_listen_only_disturbs_none() {
     let mut bus = bus([
         tuned(Tuning::At(125_000), &[(0, "701#00"), (500_000, "702#00"), (1_500_000, "703#00")]),
         tuned(Tuning::At(125_000), &[]),
@@ -161,24 +161,24 @@ fn those_of_one_rate_understand_each_other_and_a_listener_disturbs_nobody() {
     assert_eq!(received(&bus, 1), 1);
     bus.set_bit_rate(125_000, Mode::ListenOnly).expect("allowed");
     assert_eq!(seen(&mut bus, seconds(1)), [own("702#00", 1)]);
-    // As a participant at the wrong rate it would.
+    // A station at the wrong rate that takes part does disturb them.
     bus.set_bit_rate(500_000, Mode::Normal).expect("allowed");
     assert_eq!(seen(&mut bus, seconds(2)), [own("Protocol", 32)]);
 }
 
 #[test]
-fn of_a_single_sender_a_listener_hears_nothing_valid() {
+fn listen_only_receives_no_valid_frame_of_a_single_sender() {
     let mut bus = bus([tuned(Tuning::At(125_000), &[(0, "701#00")])]);
     bus.set_bit_rate(125_000, Mode::ListenOnly).expect("allowed");
     let events = seen(&mut bus, us(100_000));
     assert!(events.iter().all(|(text, _)| text != "701#00") && events[0].0 == "Protocol", "{events:?}");
-    // It still tries; somebody who acknowledges gets it.
+    // It still retries; a station that acknowledges receives the frame.
     bus.set_bit_rate(125_000, Mode::Normal).expect("allowed");
     assert_eq!(seen(&mut bus, seconds(1)), [own("701#00", 1)]);
 }
 
 #[test]
-fn stations_that_follow_hear_everybody() {
+fn stations_that_follow_the_bit_rate_receive_all_frames() {
     let mut bus = bus([tuned(Tuning::Follows, &[(500_000, "701#00")]), tuned(Tuning::At(125_000), &[])]);
     bus.set_bit_rate(125_000, Mode::Normal).expect("allowed");
     bus.send(&frame("080#")).expect("room");
@@ -187,7 +187,7 @@ fn stations_that_follow_hear_everybody() {
 }
 
 #[test]
-fn who_begins_together_with_the_same_merges_and_with_another_collides() {
+fn simultaneous_frames_merge_if_equal_and_collide_if_not() {
     let mut bus = bus([
         tuned(Tuning::Follows, &[(0, "7E4#44"), (1000, "585#01"), (500_000, "181#")]),
         tuned(Tuning::Follows, &[(0, "7E4#44"), (1000, "585#02")]),
@@ -201,10 +201,10 @@ fn who_begins_together_with_the_same_merges_and_with_another_collides() {
 }
 
 #[test]
-fn the_bit_rate_can_be_out_of_reach() {
+fn setting_the_bit_rate_can_be_forbidden() {
     let mut bus = MemoryBus::new(Clock::Virtual).with_retiming(false);
     assert!(matches!(bus.can_set_bit_rate(), Err(BusError::Permission(_))));
     assert!(matches!(bus.set_bit_rate(125_000, Mode::Normal), Err(BusError::Permission(_))));
     assert_eq!(bus.bit_rate(), Some(BIT_RATE));
-    assert_eq!(Fault::NoAcknowledge.to_string(), "no acknowledge: nobody else is listening at this bit rate");
+    assert_eq!(Fault::NoAcknowledge.to_string(), "no acknowledge: no other node at this bit rate");
 }
