@@ -16,8 +16,8 @@
 /// }
 ///
 /// impl<B: Bus> Bus for Counting<B> {
-///     cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive receive_buffer
-///         late_drops finish);
+///     cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive
+///         receive_buffer late_drops finish);
 ///
 ///     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
 ///         self.sent += 1;

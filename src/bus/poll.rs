@@ -4,8 +4,8 @@ use std::io;
 use std::os::fd::{AsRawFd, BorrowedFd};
 use std::time::Duration;
 
-/// Waits until one of `fds` is readable or `limit` has passed. An error or hang-up counts as readable. A signal ends the
-/// wait early with no descriptor ready; the caller checks its deadline.
+/// Waits until one of `fds` is readable or `limit` has passed. An error or hang-up counts as readable. A signal ends
+/// the wait early with no descriptor ready; the caller checks its deadline.
 pub(super) fn readable<const N: usize>(fds: [BorrowedFd<'_>; N], limit: Duration) -> io::Result<[bool; N]> {
     let mut set = fds.map(|fd| libc::pollfd { fd: fd.as_raw_fd(), events: libc::POLLIN, revents: 0 });
     if wait(&mut set, limit) >= 0 {

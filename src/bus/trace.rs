@@ -5,7 +5,8 @@ use crate::canopen::frame::Frame;
 use std::io::{self, BufWriter, Write};
 use std::time::Duration;
 
-/// The longest time that a line stays in the buffer, so that a trace can be read while the program runs or after a kill.
+/// The longest time that a line stays in the buffer, so that a trace can be read while the program runs or after a
+/// kill.
 const FLUSH_INTERVAL: Duration = Duration::from_secs(1);
 
 /// A bus that writes a trace, one line per frame: `(1436509052.249713) can0 044#2A366C2BBA`.

@@ -1,5 +1,5 @@
-//! A CAN bus inside the process: a wire with arbitration and a bit rate, a clock that is real for
-//! people and virtual for tests, and stations on it. The simulated devices are such stations.
+//! A simulated CAN bus inside the process: arbitration, bit rates, a real clock for interactive use or a virtual one
+//! for tests, and stations. The simulated devices are stations.
 
 mod clock;
 mod controller;
@@ -18,24 +18,24 @@ use std::any::Any;
 use std::collections::{BTreeSet, VecDeque};
 use wire::{Sender, Wire};
 
-/// How many frames of the program wait for the wire before [`BusError::QueueFull`]: Linux's default
-/// `txqueuelen` of a CAN interface.
+/// The length of the transmit queue of the program, the default `txqueuelen` of a Linux CAN interface. If it is full,
+/// [`Bus::send`] returns [`BusError::QueueFull`].
 pub const QUEUE_LENGTH: usize = 10;
 
-/// The bit rate unless another is asked for, in bit/s.
+/// The default bit rate in bit/s.
 pub const BIT_RATE: u32 = 250_000;
 
-/// A CAN bus inside the process, as the program sees it.
+/// A simulated CAN bus, as the program sees it.
 ///
-/// The program is one of the participants. It gets what the others send and not its own frames, as on
-/// SocketCAN. Everything happens in [`Bus::receive`] and [`Bus::send`]; there is no thread. On the real clock
-/// what was due while the program did something else is made up for, each happening at its own time.
+/// The program is one station. It receives the frames of the others but not its own, as on SocketCAN. All events are
+/// processed in [`Bus::receive`] and [`Bus::send`]; there is no thread. On the real clock, events that were due in the
+/// meantime are processed later, each with its own time.
 ///
-/// Every participant has a bit rate. A frame arrives if somebody at the sender's rate acknowledges it and
-/// nobody destroys it: who listens at another rate sees errors only and, until he is error-passive, destroys
-/// what he does not understand. Two frames with one identifier that begin together merge if they are the
-/// same and destroy each other if not. What failed is sent again. The program is told of every error on the
-/// wire, and of the state of its controller; after bus-off only [`Bus::set_bit_rate`] brings it back.
+/// Each station has a bit rate. A frame is delivered if a station with the same bit rate acknowledges it and none
+/// destroys it. A station at a different bit rate receives only errors, and destroys frames until it is error-passive.
+/// Two frames with one identifier that start together merge if they are equal, and destroy each other if not. A failed
+/// frame is sent again. The program gets all errors on the bus and the states of its controller as events. After
+/// bus-off, only [`BitRateControl::set_bit_rate`] brings it back.
 pub struct MemoryBus {
     name: String,
     bit_rate: u32,
@@ -46,7 +46,7 @@ pub struct MemoryBus {
     can_retime: bool,
     queue_length: usize,
     time_line: TimeLine,
-    /// How far the bus has been played.
+    /// The time up to which the bus was simulated.
     now: Mono,
     places: Vec<Place>,
     queue: VecDeque<Frame>,
@@ -54,13 +54,13 @@ pub struct MemoryBus {
     inbox: VecDeque<Event>,
     filters: Filters,
     wire: Wire,
-    /// The bit rate of the last frame that arrived: that of stations which follow the others.
+    /// The bit rate of the last delivered frame, used by stations that follow the others.
     heard_rate: u32,
     interrupts: BTreeSet<Mono>,
     sleeper: Box<dyn Sleeper>,
 }
 
-/// A station and what it has to send.
+/// A station and its waiting frames.
 struct Place {
     station: Box<dyn Station>,
     out: Outbox,
@@ -81,7 +81,7 @@ impl Place {
 }
 
 impl MemoryBus {
-    /// A bus without stations that goes by `clock`.
+    /// Makes a bus without stations, with this clock.
     pub fn new(clock: Clock) -> MemoryBus {
         MemoryBus {
             name: "sim".to_owned(),
@@ -104,26 +104,26 @@ impl MemoryBus {
         }
     }
 
-    /// The same bus at another bit rate, in bit/s.
+    /// Sets the bit rate, in bit/s.
     pub fn with_bit_rate(mut self, bit_rate: u32) -> MemoryBus {
         self.bit_rate = bit_rate.max(1);
         self.heard_rate = self.bit_rate;
         self
     }
 
-    /// The same bus, whose bit rate the program may or may not change.
+    /// Sets whether the program may change the bit rate.
     pub fn with_retiming(mut self, allowed: bool) -> MemoryBus {
         self.can_retime = allowed;
         self
     }
 
-    /// The same bus with another length of the program's transmit queue.
+    /// Sets the length of the transmit queue of the program, in frames.
     pub fn with_queue_length(mut self, length: usize) -> MemoryBus {
         self.queue_length = length;
         self
     }
 
-    /// The same bus with waits that something can interrupt.
+    /// Sets how to wait on the real clock, so that the user can interrupt.
     pub fn with_sleeper(mut self, sleeper: Box<dyn Sleeper>) -> MemoryBus {
         self.sleeper = sleeper;
         self
@@ -139,7 +139,7 @@ impl MemoryBus {
         self.places.push(place);
     }
 
-    /// Switches the power of every station off and on.
+    /// Switches the power of all stations off and on.
     pub fn power_cycle(&mut self) {
         for place in &mut self.places {
             place.out.clear();
@@ -149,7 +149,7 @@ impl MemoryBus {
         }
     }
 
-    /// The stations of one kind, in the order in which they were attached.
+    /// The stations of type `S`, in the order of attachment.
     pub fn stations<S: Station>(&self) -> impl Iterator<Item = &S> {
         self.places.iter().filter_map(|place| {
             let station: &dyn Any = &*place.station;
@@ -157,22 +157,22 @@ impl MemoryBus {
         })
     }
 
-    /// The stations of one kind, to be changed.
+    /// The stations of type `S`, mutable.
     pub fn stations_mut<S: Station>(&mut self) -> impl Iterator<Item = &mut S> {
         self.places.iter_mut().filter_map(|place| {
-            // The caller may change when the station wants to be woken.
+            // The caller may change the next wake time.
             place.next_wake = Some(Mono::START);
             let station: &mut dyn Any = &mut *place.station;
             station.downcast_mut()
         })
     }
 
-    /// Lets the user ask to stop at `moment`: [`Event::Interrupted`], once.
+    /// Simulates an interrupt by the user at `moment`: [`Event::Interrupted`], once.
     pub fn interrupt_at(&mut self, moment: Mono) {
         self.interrupts.insert(moment);
     }
 
-    /// The next moment at which something happens by itself, not before the present one.
+    /// The time of the next event, not before the present time.
     fn next_happening(&self) -> Option<Mono> {
         let wire = match &self.wire {
             Wire::Busy(transmission) => Some(transmission.complete),
@@ -187,8 +187,8 @@ impl MemoryBus {
         next.map(|moment| moment.max(self.now))
     }
 
-    /// Plays everything that happens up to and including `limit`, at most until the program has something
-    /// to receive; `true` as long as there is more.
+    /// Processes the next event up to `limit`, and stops when the program has an event to receive. `true` if there may
+    /// be more.
     fn step(&mut self, limit: Mono) -> bool {
         let Some(moment) = self.next_happening().filter(|moment| *moment <= limit) else { return false };
         self.now = moment;
@@ -197,8 +197,8 @@ impl MemoryBus {
             self.inbox.push_back(Event::Interrupted);
             return true;
         }
-        // What is complete now is delivered before anybody who wakes now, and everybody who wakes now takes
-        // part in the arbitration of now.
+        // A frame that is complete now is delivered before stations wake. All stations that wake now take part in the
+        // arbitration.
         if let Wire::Busy(transmission) = &self.wire
             && transmission.complete <= moment
         {
@@ -223,7 +223,7 @@ impl MemoryBus {
         true
     }
 
-    /// On the real clock: plays what is due by now. Returns the host's time.
+    /// On the real clock, processes all events that are due. Returns the time of the host.
     fn catch_up(&mut self) -> Option<Mono> {
         let host_now = self.time_line.host_now()?;
         while self.step(host_now) {}
@@ -294,7 +294,7 @@ impl Bus for MemoryBus {
     }
 
     fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
-        // What was complete before now was received under the old filters.
+        // Frames that were complete before now passed the old filters.
         self.catch_up();
         self.filters = filters.clone();
         Ok(())

@@ -1,36 +1,34 @@
-//! Both times of a frame, from the kernel's one.
+//! Computes the monotonic and wall time of a frame from its kernel timestamp.
 
 use crate::bus::{Mono, Stamp, Wall};
 use std::time::Duration;
 
-/// How long a comparison of the clocks holds. They drift apart by less than 1 ms in that time.
+/// How long a comparison of the clocks is valid. They drift apart by less than 1 ms in that time.
 const COMPARE_EVERY: Duration = Duration::from_secs(1);
-/// Two readings of the clocks that lie no further apart are good enough to compare them.
+/// The largest distance of two readings for a good comparison.
 const CLOSE: Duration = Duration::from_micros(100);
-/// How far a time may be off because one clock is read after the other, or has drifted.
+/// The inaccuracy caused by successive readings and drift.
 const JITTER: Duration = Duration::from_millis(1);
 
-/// The kernel stamps frames with the wall clock only. What matters for deadlines and intervals is the
-/// monotonic time, so the clocks are compared now and then, and a frame's wall time is shifted by the
-/// difference.
+/// The kernel timestamps frames with the wall clock only. Deadlines and intervals need the monotonic time. So the
+/// clocks are compared regularly, and the wall time of a frame is shifted by the difference.
 ///
-/// The wall clock may be set at any time. That shows where a frame would then have been received
-/// after it was read, or before the socket was last seen empty; and it cannot do more harm than lie
-/// between these two.
+/// The wall clock may be set at any time. Then a frame seems to be received after it was read, or before the socket was
+/// last seen empty. The result always stays between these two moments.
 #[derive(Debug, Default)]
 pub(super) struct Clocks {
-    /// When the present batch was read.
+    /// When the current batch was read.
     read: Mono,
-    /// When the socket was last seen empty before.
+    /// When the socket was last seen empty before that.
     empty_at: Mono,
-    /// The reading of the present batch left nothing in the socket.
+    /// Whether the current batch left the socket empty.
     emptied: bool,
-    /// When the clocks were last compared, and the wall time at [`Mono::START`] according to that.
+    /// When the clocks were last compared, and the resulting wall time at [`Mono::START`].
     compared: Option<(Mono, Duration)>,
 }
 
 impl Clocks {
-    /// A batch was read at `now`, and nothing was left if `emptied`.
+    /// Records a batch that was read at `now`. `emptied`: the socket was empty afterwards.
     pub(super) fn batch(&mut self, now: Mono, emptied: bool) {
         if self.emptied {
             self.empty_at = self.read;
@@ -39,7 +37,7 @@ impl Clocks {
         self.read = now;
     }
 
-    /// When a frame of the present batch was received. `now` reads both clocks.
+    /// The receive time of a frame of the current batch. `now` reads both clocks.
     pub(super) fn stamp(&mut self, kernel: Option<Duration>, now: &dyn Fn() -> Stamp) -> Stamp {
         let start = match self.compared {
             Some((at, start)) if self.read.since(at) < COMPARE_EVERY => start,
@@ -49,10 +47,10 @@ impl Clocks {
             return Stamp { mono: self.read, wall: Wall::at(start.saturating_add(self.read.since_start())) };
         };
         let mut mono = self.place(wall, start);
-        // Once a batch is enough: what does not fit then was stamped before the clock was set.
+        // Once per batch: a frame that still does not fit was received before the clock was set.
         if mono.is_none() && self.compared.is_some_and(|(at, _)| at < self.read) {
             let start = self.compare(now);
-            // The batch may have been read later than its time says, which is only a guess after a send.
+            // After a send, the recorded read time is only an estimate.
             self.read = self.read.max(now().mono);
             mono = self.place(wall, start);
         }
@@ -60,8 +58,8 @@ impl Clocks {
     }
 
     fn compare(&mut self, now: &dyn Fn() -> Stamp) -> Duration {
-        // The wall clock was read between two readings of the other. If these lie far apart, something
-        // came between, and the next try is better.
+        // The wall clock was read between two readings of the other clock. If these are far apart, the program was
+        // interrupted, and the next try is better.
         let mut first = now();
         let mut best = (first, Duration::MAX);
         for _ in 0..4 {
@@ -81,7 +79,7 @@ impl Clocks {
         start
     }
 
-    /// The monotonic time that belongs to `wall`, if a frame of this batch can have come then.
+    /// The monotonic time for `wall`, if a frame of this batch can have that time.
     fn place(&self, wall: Duration, start: Duration) -> Option<Mono> {
         let mono = Mono::at(wall.checked_sub(start)?);
         let possible = mono + JITTER >= self.empty_at && mono <= self.read + JITTER;
@@ -100,7 +98,7 @@ mod tests {
         Mono::at(Duration::from_millis(millis))
     }
 
-    /// The clocks of a computer, in milliseconds; they are looked at as seldom as possible.
+    /// The clocks of a host, in milliseconds. Readings are counted.
     struct Computer {
         mono: Cell<u64>,
         wall: Cell<u64>,
@@ -173,7 +171,7 @@ mod tests {
             computer.wall.set(before.saturating_add_signed(step));
             computer.pass(2);
             clocks.batch(mono(112), true);
-            // As stamped before the step and as after it, whatever order they were read in.
+            // Timestamps from before and after the step, in either order.
             let after = computer.wall.get();
             assert_eq!(computer.stamp(&mut clocks, after), mono(112), "{step}");
             assert!((mono(100)..=mono(112)).contains(&computer.stamp(&mut clocks, before)), "{step}");
@@ -190,7 +188,7 @@ mod tests {
         assert_eq!(computer.stamp(&mut clocks, OPENED + 10), mono(10));
         clocks.batch(mono(101), true);
         assert_eq!(computer.stamp(&mut clocks, OPENED + 20), mono(20));
-        // Read at 101 with nothing left: what comes now is not older, whatever the jitter.
+        // Read at 101 and left empty: later frames are not older.
         clocks.batch(mono(105), true);
         assert_eq!(computer.stamp(&mut clocks, OPENED + 100), mono(101));
     }
@@ -200,7 +198,7 @@ mod tests {
         let readings = RefCell::new([0, 5, 5].into_iter());
         let now = || {
             let millis = readings.borrow_mut().next().unwrap();
-            // The program stood still between the first two readings, before the wall clock was read.
+            // The program was interrupted between the first two readings, before it read the wall clock.
             let late = if millis == 0 { 5 } else { 0 };
             Stamp { mono: mono(millis), wall: Wall::at(Duration::from_millis(OPENED + millis + late)) }
         };

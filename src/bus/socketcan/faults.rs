@@ -1,11 +1,10 @@
-//! From the kernel's error frames to faults.
+//! Converts the kernel's error frames to faults.
 
 use crate::bus::Fault;
 use socketcan::CanErrorFrame;
 use socketcan::errors::{ControllerProblems, ErrorCause, Location};
 
-/// What an error frame reports, each fault once. Nothing for what is no trouble: arbitration lost to
-/// another sender, error counters alone.
+/// The faults in an error frame, each once. Lost arbitration and error counters are not faults.
 pub(super) fn faults(frame: CanErrorFrame) -> Vec<Fault> {
     let mut found = Vec::new();
     let mut add = |fault| {
@@ -21,7 +20,7 @@ pub(super) fn faults(frame: CanErrorFrame) -> Vec<Fault> {
                 if problems.intersects(ControllerProblems::RX_OVERFLOW | ControllerProblems::TX_OVERFLOW) {
                     add(Fault::ControllerOverflow);
                 }
-                // The kernel may set a state for each direction; the worse one is the controller's.
+                // The kernel may report a state for each direction. The worse one counts.
                 if problems.intersects(ControllerProblems::RX_PASSIVE | ControllerProblems::TX_PASSIVE) {
                     add(Fault::ErrorPassive);
                 } else if problems.intersects(ControllerProblems::RX_WARNING | ControllerProblems::TX_WARNING) {
@@ -30,13 +29,13 @@ pub(super) fn faults(frame: CanErrorFrame) -> Vec<Fault> {
                     add(Fault::ErrorActive);
                 }
             }
-            // Some drivers report a missing acknowledge only by the place of the violation.
+            // Some drivers report a missing acknowledge only by the location of the violation.
             ErrorCause::Protocol { location: Location::AckSlot, .. } | ErrorCause::NoAck => add(Fault::NoAcknowledge),
             ErrorCause::Protocol { .. } => add(Fault::Protocol),
             ErrorCause::Transceiver { .. } => add(Fault::Transceiver),
             ErrorCause::BusOff => add(Fault::BusOff),
             ErrorCause::Restarted => add(Fault::Restarted),
-            // A class that says no more than that there was an error; others in the frame say which.
+            // This class only reports that there was an error. Others in the frame say which one.
             ErrorCause::BusError => {}
             _ => add(Fault::Other),
         }

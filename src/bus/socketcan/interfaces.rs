@@ -1,4 +1,4 @@
-//! Which CAN interfaces this machine has, from sysfs.
+//! Lists the CAN interfaces of this host, from sysfs.
 
 use std::fs;
 use std::path::Path;
@@ -9,23 +9,23 @@ const CAN_HARDWARE: &str = "280";
 /// `IFF_UP`: switched on by the administrator.
 const UP: u32 = 1;
 
-/// A CAN interface of this machine.
+/// A CAN interface of this host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Interface {
-    /// Its name, as `can0`.
+    /// Its name, for example `can0`.
     pub name: String,
-    /// Whether it is switched on.
+    /// Whether it is up.
     pub up: bool,
-    /// The driver of its hardware, as `gs_usb`. Nothing for an interface without hardware (vcan).
+    /// The driver, for example `gs_usb`; `None` without hardware (vcan).
     pub driver: Option<String>,
 }
 
-/// The CAN interfaces of this machine by name. None where there is no sysfs.
+/// The CAN interfaces of this host, sorted by name. Empty without sysfs.
 pub fn interfaces() -> Vec<Interface> {
     interfaces_in(Path::new(NET))
 }
 
-/// Whether an interface of that name is switched on. Nothing when sysfs does not tell.
+/// Whether the interface is up; `None` if sysfs does not report it.
 pub(super) fn is_up(name: &str) -> Option<bool> {
     up_in(&Path::new(NET).join(name))
 }
@@ -44,7 +44,7 @@ fn interfaces_in(net: &Path) -> Vec<Interface> {
             })
         })
         .collect();
-    // can2 before can10, as people count.
+    // Numeric order: can2 before can10.
     found.sort_by(|a, b| (a.name.len(), &a.name).cmp(&(b.name.len(), &b.name)));
     found
 }

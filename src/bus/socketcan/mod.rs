@@ -1,9 +1,8 @@
 //! Linux SocketCAN: kernel filters, timestamps of the interface or the kernel, the kernel's drop counter, error
 //! frames.
 //!
-//! A system call costs more than everything else done for a frame. So one `recvmmsg` serves up to
-//! 64 calls of `receive`, the clock is read once for all of them, and the socket is waited for
-//! only after it was found empty.
+//! A system call costs more than all other work for a frame. So one `recvmmsg` serves up to 64 calls of `receive`, the
+//! clock is read once for all of them, and the program waits for the socket only after the socket was found empty.
 
 mod clocks;
 mod faults;
@@ -35,10 +34,10 @@ use std::io;
 use std::os::fd::AsFd;
 use std::time::{Duration, Instant};
 
-/// How often an interface that went down is looked at; the kernel does not tell when it is back.
+/// The interval of checks whether an interface is up again. The kernel does not report it.
 const LINK_CHECK: Duration = Duration::from_millis(200);
-/// How long the first wait after a send goes without looking at the clock or for a signal: an answer that
-/// comes within this time costs one system call and not four.
+/// The first wait after a send, without reading the clock or checking for signals. An answer within this time costs one
+/// system call instead of four.
 const ANSWER: Duration = Duration::from_millis(10);
 
 /// A CAN interface of the Linux kernel.
@@ -50,40 +49,40 @@ pub struct SocketCan {
     batch: Batch,
     clocks: Clocks,
     own_clock: OwnClock,
-    /// When the last frame was received that has been looked at.
+    /// The time of the last frame that was processed.
     passed: Mono,
-    /// The socket is empty as far as is known: wait before reading again.
+    /// The socket was found empty: wait before the next read.
     drained: bool,
-    /// A frame has been sent and nothing waited for since: an answer may be on its way.
+    /// A frame was sent since the last wait: an answer may come soon.
     sent: bool,
-    /// What the clock said when it was last looked at.
+    /// The last reading of the clock.
     looked: Cell<Mono>,
-    /// Events that come before the rest of the batch.
+    /// Events to deliver before the rest of the batch.
     ready: VecDeque<Event>,
-    /// The interface is up, as far as the user of this bus has been told.
+    /// Whether the interface is up, as last reported.
     up: bool,
-    /// The interface has been removed, and the socket with it is of no use any more.
+    /// The interface was removed. Its socket is useless.
     gone: bool,
-    /// The kernel's count of lost frames when it was last reported.
+    /// The kernel's count of lost frames at the last report.
     lost: u32,
-    /// What is wanted, for another socket.
+    /// The filters, for a new socket.
     filters: Filters,
-    /// The identifiers wanted, where they are too many for the kernel.
+    /// The identifiers to deliver, if they are too many for the kernel.
     wanted: Option<BTreeSet<CanId>>,
     timestamps: TimestampSource,
-    /// Asked for once while the interface stays up: it costs some system calls.
+    /// The bit rate, read once while the interface stays up: that takes some system calls.
     bit_rate: Cell<Option<Option<u32>>>,
     /// The interface before its bit rate was set.
     before: Option<Link>,
 }
 
 impl SocketCan {
-    /// Opens the CAN interface `name`, which has to be up.
+    /// Opens the CAN interface `name`, which must be up.
     pub fn open(name: &str) -> Result<SocketCan, BusError> {
         SocketCan::open_filtered(name, &Filters::All)
     }
 
-    /// Opens the CAN interface `name`, which may be down: for setting its bit rate.
+    /// Opens the CAN interface `name`, which may be down, for setting its bit rate.
     pub fn open_even_down(name: &str) -> Result<SocketCan, BusError> {
         let mut bus = SocketCan::bound(name, &Filters::All)?;
         match bus.socket.as_raw_socket().take_error() {
@@ -94,7 +93,7 @@ impl SocketCan {
         Ok(bus)
     }
 
-    /// Opens the CAN interface `name` with filters that hold from the first frame on.
+    /// Opens the CAN interface `name` with filters that apply from the first frame on.
     pub fn open_filtered(name: &str, filters: &Filters) -> Result<SocketCan, BusError> {
         let bus = SocketCan::bound(name, filters)?;
         // Binding to an interface that is down succeeds and leaves the error on the socket.
@@ -136,14 +135,14 @@ impl SocketCan {
         match source.raw_os_error() {
             Some(libc::ENOBUFS | libc::EAGAIN) => BusError::QueueFull,
             Some(libc::ENETDOWN) => BusError::Down(self.name.clone()),
-            // The interface was removed, as an adapter that is pulled out.
+            // The interface was removed, for example an unplugged adapter.
             Some(libc::ENODEV | libc::ENXIO) => BusError::NoInterface(self.name.clone()),
             Some(libc::EPERM | libc::EACCES) => BusError::Permission(format!("{doing} {}", self.name)),
             _ => BusError::Io { what: format!("{doing} {}", self.name), source },
         }
     }
 
-    /// Makes [`Event::Link`] of a change that has not been told yet.
+    /// Queues [`Event::Link`] if the state differs from the last reported one.
     fn link(&mut self, up: bool) {
         if self.up != up {
             self.up = up;
@@ -152,17 +151,17 @@ impl SocketCan {
         }
     }
 
-    /// Does `work` to the interface, which may take it down and up again: that is no news to the user of this
-    /// bus. What was received before goes when `work` calls for it, that nothing of it is taken for new.
+    /// Runs `work`, which may take the interface down and up without an [`Event::Link`]. When `work` calls its
+    /// argument, the frames received so far are discarded.
     fn reset<T>(&mut self, work: impl FnOnce(&str, &mut dyn FnMut()) -> Result<T, BusError>) -> Result<T, BusError> {
         let (batch, ready, socket) = (&mut self.batch, &mut self.ready, self.socket.as_fd());
         let result = work(&self.name, &mut || {
             ready.clear();
-            // Frames until there are none, and the news that the interface is down, which comes once.
+            // Read all frames, then the error that the interface is down, which comes once.
             while batch.fill(socket, false).is_ok() {}
             while batch.fill(socket, false).is_ok() {}
         });
-        // No news either: that it went down once more, on the way back from a rate that it cannot do.
+        // The interface may have gone down again, on the way back from an unsupported bit rate.
         let _ = self.socket.as_raw_socket().take_error();
         self.drained = false;
         self.bit_rate.set(None);
@@ -170,14 +169,14 @@ impl SocketCan {
         result
     }
 
-    /// Reads what the kernel holds for this socket.
-    /// With `wait` it waits for [`ANSWER`] if there is nothing.
+    /// Reads the frames that the kernel holds for this socket.
+    /// With `wait`, it waits up to [`ANSWER`] for the first one.
     fn fill(&mut self, wait: bool) -> Result<(), BusError> {
         match self.batch.fill(self.socket.as_fd(), wait) {
             Ok(count) => {
                 self.drained = count < receive::BATCH;
                 if wait {
-                    // No later than this, as a rule; a frame that does not fit makes the clocks be looked at.
+                    // Usually not later than this. A frame that does not fit makes the clocks be compared.
                     self.clocks.batch(self.looked.get() + ANSWER + ANSWER, false);
                 } else {
                     self.clocks.batch(self.mono(), self.drained);
@@ -190,7 +189,7 @@ impl SocketCan {
                     Ok(())
                 }
                 Some(libc::EINTR) => Ok(()),
-                // Told once by the kernel; the socket stays bound and works again with the interface.
+                // The kernel reports this once. The socket stays bound and works again with the interface.
                 Some(libc::ENETDOWN) => {
                     self.link(false);
                     Ok(())
@@ -204,12 +203,11 @@ impl SocketCan {
         }
     }
 
-    /// Waits until there is something to read, a signal or the deadline. Whether the deadline has
-    /// been reached with nothing there.
+    /// Waits for a frame, a signal or the deadline. Whether the deadline was reached without an event.
     fn wait(&mut self, deadline: Mono) -> Result<bool, BusError> {
         let left = deadline.since(self.mono());
         let limit = if self.up { left } else { left.min(LINK_CHECK) };
-        // A socket without an interface has nothing more to say.
+        // A socket without an interface receives nothing.
         let ready = if self.gone {
             poll::readable([self.interrupts.fd()], limit).map(|[signal]| [false, signal])
         } else {
@@ -229,7 +227,7 @@ impl SocketCan {
         Ok(!frames && !signal && self.ready.is_empty() && self.mono() >= deadline)
     }
 
-    /// Whether the interface, which was down, is up.
+    /// Whether the interface was down and is up again.
     fn is_back(&self) -> bool {
         !self.up && !self.gone && interfaces::is_up(&self.name) == Some(true)
     }
@@ -239,15 +237,15 @@ impl SocketCan {
         self.link(false);
     }
 
-    /// Opens the interface again where it has been removed and there is one of that name once more: an adapter
-    /// that was pulled out and put in.
+    /// Opens the interface again after it was removed, if one with its name exists: an adapter was unplugged and
+    /// plugged in again.
     ///
     /// # Errors
-    /// Why it cannot be opened although it is there.
+    /// The interface exists but cannot be opened.
     fn find_again(&mut self) -> Result<(), BusError> {
         let bound = match socket::bind(&self.name, &self.filters, ANSWER) {
             Ok(bound) => bound,
-            // Not yet, or not yet ready: it is made, renamed and set up step by step.
+            // Not ready yet: the interface is created, renamed and set up step by step.
             Err(BusError::NoInterface(_) | BusError::NotCan(_)) => return Ok(()),
             Err(error) => return Err(error),
         };
@@ -258,7 +256,7 @@ impl SocketCan {
         (self.socket, self.wanted, self.timestamps) = (bound.socket, bound.wanted, bound.timestamps);
         (self.gone, self.lost, self.drained) = (false, 0, false);
         self.own_clock = OwnClock::default();
-        // What says that it is down is the socket's first error; where there is none it is up.
+        // If the interface is down, that is the first error of the socket.
         match self.socket.as_raw_socket().take_error() {
             Ok(None) => self.link(true),
             Ok(Some(error)) | Err(error) => match error.raw_os_error() {
@@ -270,16 +268,15 @@ impl SocketCan {
         Ok(())
     }
 
-    /// The frame of a message, if nothing comes before it. Otherwise what the message tells is ready,
-    /// in order.
+    /// Processes a message. Returns its frame if no other event comes first; otherwise all events are queued in order.
     fn take_in(&mut self, message: Message) -> Option<Event> {
-        // Told by whatever comes through, sooner than by the next look at the interface; but what had been
-        // received before it went down comes through, too.
+        // A received frame shows earlier than the next check that the interface is up. But frames from before it went
+        // down arrive too.
         if self.is_back() {
             self.link(true);
         }
         if let Some(lost) = message.lost {
-            // The count when this frame was queued; it may have been told of later ones already.
+            // The count at the time when this frame was queued. Later drops may already be reported.
             let more = lost.wrapping_sub(self.lost);
             if more > 0 && more <= u32::MAX / 2 {
                 self.lost = lost;
@@ -384,7 +381,7 @@ impl Bus for SocketCan {
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         self.sent = true;
         self.socket.write_frame(&to_kernel(frame)).map_err(|error| {
-            // The kernel gives the news to whichever call comes first, and only once.
+            // The kernel reports this once, to the first call.
             match error.raw_os_error() {
                 Some(libc::ENETDOWN) => self.link(false),
                 Some(libc::ENODEV | libc::ENXIO) => self.lose_interface(),
@@ -409,7 +406,7 @@ impl Bus for SocketCan {
                     None => unwanted = true,
                 }
             } else if unwanted && self.passed > deadline {
-                // Frames that nobody sees must not keep the deadline from being reached.
+                // Discarded frames must not delay the deadline.
                 return Ok(Event::Timeout);
             } else if !self.drained {
                 self.fill(false)?;
@@ -446,7 +443,7 @@ fn to_kernel(frame: &Frame) -> CanFrame {
     CanFrame::from(raw)
 }
 
-/// Nothing for a frame that is no classic data or remote frame.
+/// `None` if it is not a classic data or remote frame.
 fn from_kernel(raw: &libc::can_frame) -> Option<Frame> {
     let id = if raw.can_id & libc::CAN_EFF_FLAG != 0 {
         CanId::extended(raw.can_id & libc::CAN_EFF_MASK)?

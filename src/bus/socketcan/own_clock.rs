@@ -1,31 +1,31 @@
-//! The interface's own clock, laid upon the computer's.
+//! Converts the interface's own clock to the host's time.
 
 use crate::bus::{Mono, Stamp, Wall};
 use std::time::Duration;
 
-/// By how many parts in a million the two clocks may run apart. Crystals are off by 100 at most, and the computer's
-/// clock is slewed by up to 500.
+/// The largest drift between the two clocks, in parts per million. Crystals are off by at most 100, and the host clock
+/// is slewed by up to 500.
 const DRIFT: i128 = 600;
-/// No frame takes longer from the interface to the kernel. If one seems to, the interface's clock was set or began
-/// anew.
+/// The longest time of a frame from the interface to the kernel. If it seems longer, the clock of the interface was set
+/// or restarted.
 const LATENCY: Duration = Duration::from_millis(50);
 
-/// Some drivers say when the interface itself saw a frame, by a clock of its own: it runs on while the computer is
-/// busy, so it tells intervals far better than the kernel; but it starts anywhere, drifts, and nobody sets it.
+/// Some drivers report when the interface received a frame, by its own clock. That clock is not delayed by a busy host,
+/// so it gives better intervals than the kernel. But it starts at any value, drifts, and is never set.
 ///
-/// A frame is never in the kernel before it was on the bus. The least that the kernel's time was ever later than
-/// the interface's is therefore how far the clocks are apart, and it may grow no faster than they can drift. What
-/// comes out is never later than the kernel says, never earlier by more than [`LATENCY`], and goes backwards never.
+/// The kernel never has a frame before it was on the bus. So the smallest difference between the two times is the
+/// offset of the clocks. It may grow only as fast as they can drift. The result is never later than the time of the
+/// kernel, never earlier by more than [`LATENCY`], and never goes backwards.
 #[derive(Debug, Default)]
 pub(super) struct OwnClock {
-    /// What it showed last, and how far the computer's was ahead of it then, in nanoseconds.
+    /// The last reading, and how far the host clock was ahead of it, in nanoseconds.
     known: Option<(i128, i128)>,
     /// When the last frame was received.
     last: Mono,
 }
 
 impl OwnClock {
-    /// When a frame was received that the interface saw at `own`, and the kernel at `kernel`.
+    /// The time of a frame that the interface received at `own` and the kernel at `kernel`.
     pub(super) fn place(&mut self, own: Duration, kernel: Stamp) -> Stamp {
         let own = nanoseconds(own);
         let ahead = nanoseconds(kernel.mono.since_start()) - own;
@@ -44,7 +44,7 @@ impl OwnClock {
         Stamp { mono, wall: Wall::at(wall) }
     }
 
-    /// A frame of which only the kernel says when it came: none that follows is earlier.
+    /// Records a frame with only a kernel time: no later frame gets an earlier time.
     pub(super) fn pass(&mut self, kernel: Stamp) {
         self.last = kernel.mono;
     }
@@ -68,13 +68,13 @@ mod tests {
         Duration::from_micros(microseconds)
     }
 
-    /// How late the kernel is for the `n`th frame: mostly a little, now and then a lot.
+    /// The delay of the kernel for the `n`th frame: mostly short, sometimes long.
     fn latency(n: u64) -> Duration {
         let noise = n.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
         if noise.is_multiple_of(50) { us(20_000) } else { us(100 + noise % 2000) }
     }
 
-    /// What a clock shows that is wrong by this many parts in a million.
+    /// The reading of a clock that is wrong by this many parts per million.
     fn shown(length: Duration, wrong: i32) -> Duration {
         let by = length * wrong.unsigned_abs() / 1_000_000;
         if wrong < 0 { length - by } else { length + by }
@@ -82,7 +82,7 @@ mod tests {
 
     #[test]
     fn intervals_are_those_of_the_interface() {
-        // It began an hour before, and runs 80 ppm too fast or too slow for half an hour.
+        // The clock started an hour earlier and runs 80 ppm too fast or too slow for half an hour.
         for wrong in [-80, 0, 80] {
             let mut clock = OwnClock::default();
             let mut last = None;
@@ -108,7 +108,7 @@ mod tests {
         let mut clock = OwnClock::default();
         let mut last = Mono::START;
         for n in 0..2000u64 {
-            // Begins anew, jumps ahead, stands still, shows anything.
+            // The clock restarts, jumps ahead, stands still, or shows random values.
             let own = match n / 500 {
                 0 => us(n * 1000),
                 1 => us((n % 100) * 1000),

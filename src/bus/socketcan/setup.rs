@@ -1,5 +1,5 @@
-//! Switches interfaces on and off and sets their bit rates. What is not asked for stays as it is, what could not
-//! be done is undone, and what is reported as done has been read back.
+//! Switches interfaces on and off and sets their bit rates. Other settings stay unchanged. A failed change is undone,
+//! and each result is read back.
 
 use super::netlink::{self, BitTiming, Link, Refusal};
 use crate::bus::{BusError, Mode};
@@ -7,33 +7,33 @@ use std::fs;
 
 /// `CAP_NET_ADMIN`, the right to set interfaces.
 const NET_ADMIN: u32 = 12;
-/// How far the rate that the hardware makes may be off, in parts per thousand: both sides of a bus share what
-/// its bits can bear, some 1 %.
+/// The accepted deviation of the actual bit rate, in parts per thousand. Both sides of a bus share a tolerance of about
+/// 1 %.
 const TOLERANCE: u64 = 5;
 
-/// What was done.
+/// A change of an interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Change {
     /// The interface before.
     pub before: Link,
-    /// And now; the same where nothing had to be done.
+    /// The interface now; equal to `before` if there was nothing to do.
     pub after: Link,
 }
 
-/// The CAN interface of that name as it is now.
+/// Reads the present state of a CAN interface.
 ///
 /// # Errors
-/// There is none of that name, or it is no CAN interface.
+/// There is no interface of that name, or it is not a CAN interface.
 pub fn link(name: &str) -> Result<Link, BusError> {
     let link = netlink::get(name).map_err(|refusal| refusal.into_error(&format!("ask about {name}"), name))?;
     if link.is_can { Ok(link) } else { Err(BusError::NotCan(name.to_owned())) }
 }
 
-/// Switches an interface on; with a rate and a mode where they are given, for which one that is up goes down
+/// Switches an interface on. With a bit rate, it also sets bit rate and mode; an interface that is up then goes down
 /// for a moment.
 ///
 /// # Errors
-/// What the kernel says; the interface is then as it was.
+/// The kernel rejects the change. The interface is then unchanged.
 pub fn bring_up(name: &str, bit_rate: Option<u32>, mode: Mode) -> Result<Change, BusError> {
     let before = link(name)?;
     let after = match bit_rate {
@@ -57,30 +57,30 @@ pub fn bring_up(name: &str, bit_rate: Option<u32>, mode: Mode) -> Result<Change,
 /// Switches an interface off.
 ///
 /// # Errors
-/// What the kernel says.
+/// The kernel rejects the change.
 pub fn bring_down(name: &str) -> Result<Change, BusError> {
     let before = link(name)?;
     let after = if before.up { switch(name, &before, false)? } else { before.clone() };
     Ok(Change { before, after })
 }
 
-/// Whether the bit rate of this interface can be set from here.
+/// Checks whether this process can set the bit rate of the interface.
 ///
 /// # Errors
-/// Why not.
+/// It is not a controller, or the privilege is missing.
 pub(super) fn can_set_bit_rate(name: &str) -> Result<(), BusError> {
     is_controller(name, &link(name)?)?;
-    // Where the system does not tell, the kernel will when it comes to it.
+    // If the privilege is unknown, the kernel decides later.
     if fs::read_to_string("/proc/self/status").is_ok_and(|status| has_net_admin(&status) == Some(false)) {
         return Err(BusError::Permission(format!("set the bit rate of {name}")));
     }
     Ok(())
 }
 
-/// Takes an interface to another bit rate and mode and leaves it up. `while_down` is called while it is down.
+/// Sets bit rate and mode of an interface and switches it on. `while_down` is called while it is down.
 ///
 /// # Errors
-/// What the kernel says; the interface is then as it was, or the error says that it is not.
+/// The kernel rejects the change. The interface is then restored, or the error says that it is not.
 pub(super) fn retime(
     name: &str,
     before: &Link,
@@ -93,7 +93,7 @@ pub(super) fn retime(
     if listens && before.can_listen_only == Some(false) {
         return Err(no_listening(name));
     }
-    // A controller that knows no such mode is not asked to leave it.
+    // The mode is not set on a controller that does not support it.
     let listen_only = (listens || before.listen_only.is_some()).then_some(listens);
     let doing = format!("set the bit rate of {name} to {bit_rate} bit/s");
     let work = |while_down: &mut dyn FnMut()| {
@@ -120,10 +120,10 @@ pub(super) fn retime(
     })
 }
 
-/// Makes an interface what it was.
+/// Restores the former state of an interface.
 ///
 /// # Errors
-/// What the kernel says, and what the interface now is.
+/// The kernel rejects the change; the error describes the present state.
 pub(super) fn put_back(name: &str, before: &Link, while_down: &mut dyn FnMut()) -> Result<(), BusError> {
     let mut now = link(name)?;
     let timing = before.bit_timing.or(now.bit_timing);
@@ -135,10 +135,10 @@ pub(super) fn put_back(name: &str, before: &Link, while_down: &mut dyn FnMut()) 
         now = switch(name, &now, false)?;
     }
     while_down();
-    // One that had no rate keeps the last one: the kernel has no way back to none.
+    // An interface without a former bit rate keeps the last one: the kernel cannot clear it.
     if differs && let Some(timing) = timing {
         let set = |timing| netlink::configure(&now, timing, before.listen_only);
-        // Quanta give the very same bits; a driver that takes none gets the rate.
+        // Time quanta give exactly the same bit timing. If the driver rejects them, the bit rate is used.
         set(timing.again())
             .or_else(|_| set(BitTiming::of_rate(timing.bit_rate)))
             .map_err(|refusal| refusal.into_error(&format!("put {name} back to {} bit/s", timing.bit_rate), name))?;
@@ -151,7 +151,7 @@ pub(super) fn put_back(name: &str, before: &Link, while_down: &mut dyn FnMut()) 
     }
 }
 
-/// Switches an interface on or off, and reads it back.
+/// Switches an interface on or off, and reads its state back.
 fn switch(name: &str, link: &Link, up: bool) -> Result<Link, BusError> {
     let direction = if up { "up" } else { "down" };
     netlink::switch(link, up).map_err(|refusal| refusal.into_error(&format!("bring {name} {direction}"), name))?;
@@ -159,7 +159,7 @@ fn switch(name: &str, link: &Link, up: bool) -> Result<Link, BusError> {
     if now.up == up { Ok(now) } else { Err(unchanged(name, &format!("it did not go {direction}"))) }
 }
 
-/// Whether an interface that makes one rate is at the other, which was asked for.
+/// Whether an actual bit rate is close enough to the requested one.
 fn is_near(made: u32, bit_rate: u32) -> bool {
     u64::from(made.abs_diff(bit_rate)) * 1000 <= u64::from(bit_rate) * TOLERANCE
 }
@@ -202,7 +202,7 @@ fn unchanged(name: &str, what: &str) -> BusError {
     BusError::Io { what: format!("{name} was told, and said yes"), source }
 }
 
-/// What the kernel's refusal of a bit rate means.
+/// Explains why the kernel rejected a bit rate.
 fn explain(refusal: Refusal, doing: &str, name: &str, bit_rate: u32, listens: bool) -> BusError {
     match refusal.code() {
         Some(libc::EINVAL | libc::EDOM | libc::ERANGE) => {
@@ -214,13 +214,13 @@ fn explain(refusal: Refusal, doing: &str, name: &str, bit_rate: u32, listens: bo
     }
 }
 
-/// An error, and a worse one that came of it.
+/// Combines an error with a second one that occurred while restoring.
 fn not_put_back(error: BusError, worse: &BusError) -> BusError {
     let what = format!("{error}; and it could not be put back as it was");
     BusError::Io { what, source: std::io::Error::other(worse.to_string()) }
 }
 
-/// Whether a process may set interfaces, by its `/proc/PID/status`.
+/// Whether a process may configure interfaces, according to its `/proc/PID/status`.
 fn has_net_admin(status: &str) -> Option<bool> {
     let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"))?;
     Some(u64::from_str_radix(effective.trim(), 16).ok()? >> NET_ADMIN & 1 != 0)

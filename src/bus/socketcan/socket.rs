@@ -1,4 +1,4 @@
-//! The kernel's socket: made so that it loses as little as possible and tells what it loses.
+//! Opens CAN sockets that lose as few frames as possible and report the loss.
 
 use crate::bus::{BusError, Filters, ReceiveBuffer, TimestampSource};
 use crate::canopen::id::CanId;
@@ -8,29 +8,29 @@ use std::io;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
 use std::time::Duration;
 
-/// More filters than this the kernel does not take (`CAN_RAW_FILTER_MAX`).
+/// The largest number of filters that the kernel accepts (`CAN_RAW_FILTER_MAX`).
 const MAX_FILTERS: usize = 512;
-/// The receive buffer asked for; the kernel doubles it. A frame takes some 800 bytes of it: 40,000 frames, five
-/// seconds of a full bus at 1 Mbit/s.
+/// The requested receive buffer in bytes; the kernel doubles it. A frame takes about 800 bytes: this holds 40,000
+/// frames, five seconds of a full bus at 1 Mbit/s.
 const RECEIVE_BUFFER: i32 = 16 << 20;
 
 /// A socket that is bound to an interface.
 pub(super) struct Bound {
     pub(super) socket: CanSocket,
-    /// The identifiers wanted, where they are too many for the kernel.
+    /// The identifiers to deliver, if they are too many for the kernel.
     pub(super) wanted: Option<BTreeSet<CanId>>,
-    /// Where the times of its frames come from, until the interface tells its own.
+    /// The timestamp source, until the interface delivers its own.
     pub(super) timestamps: TimestampSource,
 }
 
-/// A socket that blocks for `limit` at most, on the interface `name`, which may be down: then that is left as
-/// the socket's error.
+/// Opens a socket on the interface `name` that blocks for at most `limit`. If the interface is down, that is left as
+/// the error of the socket.
 pub(super) fn bind(name: &str, filters: &Filters, limit: Duration) -> Result<Bound, BusError> {
     let socket = new(limit)?;
     let failed = |what: &str, source| BusError::Io { what: format!("{what} {name}"), source };
     let address = CanAddr::from_iface(name).map_err(|_| BusError::NoInterface(name.to_owned()))?;
     socket.set_error_filter_accept_all().map_err(|error| failed("set the error filter of", error))?;
-    // Each of these only improves what is measured; a kernel that lacks one still delivers frames.
+    // These options improve measurements only. A kernel without one of them still delivers frames.
     let timestamps = match socket.set_recv_timestamp(true) {
         Ok(()) => TimestampSource::Kernel,
         Err(_) => TimestampSource::Program,
@@ -67,7 +67,7 @@ fn new(limit: Duration) -> Result<CanSocket, BusError> {
     }
 }
 
-/// Tells the kernel which frames are wanted. The identifiers are returned where they are too many for it.
+/// Sets the filters of the kernel. Returns the identifiers if they are too many for it.
 pub(super) fn set_filters(socket: &CanSocket, filters: &Filters) -> io::Result<Option<BTreeSet<CanId>>> {
     let ids: BTreeSet<CanId> = match filters {
         Filters::All => return socket.set_filter_accept_all().map(|()| None),
@@ -83,7 +83,7 @@ pub(super) fn set_filters(socket: &CanSocket, filters: &Filters) -> io::Result<O
     socket.set_filters(&filters).map(|()| None)
 }
 
-/// Identifier and mask that let through data frames with exactly this identifier.
+/// The filter for data frames with exactly this identifier.
 fn filter(id: CanId) -> (u32, u32) {
     const EXACT: u32 = libc::CAN_EFF_FLAG | libc::CAN_RTR_FLAG;
     match id {
@@ -92,21 +92,21 @@ fn filter(id: CanId) -> (u32, u32) {
     }
 }
 
-/// What the kernel holds back for this socket at most, beside what was asked for.
+/// The size of the receive buffer, and the requested size.
 pub(super) fn receive_buffer(socket: &CanSocket) -> Option<ReceiveBuffer> {
     let bytes = socket.as_raw_socket().recv_buffer_size().ok()?;
     Some(ReceiveBuffer { bytes, wanted: usize::try_from(RECEIVE_BUFFER).ok()? * 2 })
 }
 
-/// The kernel's count of the frames that this socket has lost in all, asked for now: what came with a frame is the
-/// count when that one was queued. `None` where the kernel does not tell (before Linux 4.12).
+/// The kernel's present count of frames lost by this socket. The count that comes with a frame is older. `None` before
+/// Linux 4.12.
 pub(super) fn lost(socket: &CanSocket) -> Option<u32> {
-    // The last of what `SO_MEMINFO` gives (`SK_MEMINFO_DROPS`).
+    // The last value of `SO_MEMINFO` (`SK_MEMINFO_DROPS`).
     const DROPS: usize = 8;
     read_memory_info(socket.as_fd()).ok()?.get(DROPS).copied()
 }
 
-/// `SO_MEMINFO`: how much memory a socket uses, and what did not fit. As many numbers as the kernel knows.
+/// Reads `SO_MEMINFO`: the memory use of a socket and its drops. The kernel decides the number of values.
 #[expect(unsafe_code, reason = "neither socket2 nor the socketcan crate reads SO_MEMINFO")]
 fn read_memory_info(socket: BorrowedFd<'_>) -> io::Result<Vec<u32>> {
     /// `SO_MEMINFO` of linux/socket.h; libc names it on some architectures only.

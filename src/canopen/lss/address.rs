@@ -66,8 +66,8 @@ impl LssAddress {
         Part::ALL.map(|part| Request::Select(part, self.part(part)))
     }
 
-    /// The ranges with its vendor and product and a lower, or a higher, serial number, for all revisions. `None` if there
-    /// is no lower or higher number.
+    /// The ranges with its vendor and product and a lower, or a higher, serial number, for all revisions. `None` if
+    /// there is no lower or higher number.
     pub fn neighbours(&self) -> [Option<LssRange>; 2] {
         let range = |serial| LssRange { vendor: self.vendor, product: self.product, revision: (0, u32::MAX), serial };
         [

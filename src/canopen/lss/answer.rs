@@ -34,8 +34,8 @@ impl Answer {
     /// Parses an answer to `service`; `None` if the frame is something else.
     ///
     /// # Errors
-    /// The frame answers this service, but required bytes are missing or invalid. Unused bytes may be missing: some devices
-    /// send two bytes instead of eight.
+    /// The frame answers this service, but required bytes are missing or invalid. Unused bytes may be missing: some
+    /// devices send two bytes instead of eight.
     pub fn parse(frame: &Frame, service: Service) -> Option<Result<Answer, Violation>> {
         let (&specifier, rest) = frame.data().split_first()?;
         if frame.id() != CanId::LSS_SLAVE || service.answer_specifier() != Some(specifier) {

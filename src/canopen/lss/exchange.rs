@@ -81,8 +81,8 @@ impl Exchange {
         self.count > 0
     }
 
-    /// Whether more than one slave answered: the answers differ, or there were more answers than requests. The number does
-    /// not count for a service that all slaves answer with the same frame.
+    /// Whether more than one slave answered: the answers differ, or there were more answers than requests. The number
+    /// does not count for a service that all slaves answer with the same frame.
     pub fn is_crowded(&self) -> bool {
         self.heard.len() > 1 || self.count > self.asked
     }
@@ -92,8 +92,8 @@ impl Exchange {
         &self.heard
     }
 
-    /// The result if one slave is addressed. If all slaves send the same frame ([`Service::is_chorus`]), several count as
-    /// one.
+    /// The result if one slave is addressed. If all slaves send the same frame ([`Service::is_chorus`]), several count
+    /// as one.
     ///
     /// # Errors
     /// No answer, several slaves, a rejection, or a protocol violation.

@@ -218,7 +218,8 @@ impl Fastscan {
                 self.look_at(next);
             }
             Phase::Advance => {
-                // It is unknown whether the slave continued: restart, and check the numbers found so far in one step each.
+                // It is unknown whether the slave continued: restart, and check the numbers found so far in one step
+                // each.
                 self.restarts += 1;
                 if self.restarts > RESTARTS {
                     return self.unsettled();

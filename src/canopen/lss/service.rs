@@ -142,8 +142,8 @@ pub enum Request {
     Inquire(Part),
     /// 5Eh.
     InquireNodeId,
-    /// 46h to 4Bh: asks for slaves with this vendor-ID, this product code, and numbers in this range. Slaves answer the last
-    /// one.
+    /// 46h to 4Bh: asks for slaves with this vendor-ID, this product code, and numbers in this range. Slaves answer the
+    /// last one.
     Identify(Limit, u32),
     /// 4Ch: asks for slaves without a node-ID.
     IdentifyUnconfigured,

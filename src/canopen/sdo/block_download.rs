@@ -2,8 +2,8 @@
 //! a whole (CiA 301, 7.2.4.3.9 to 7.2.4.3.11).
 //!
 //! All segments of a block go to `out` at once. The caller paces them and reports each frame that was sent
-//! ([`BlockDownload::on_sent`]). Segments that the server does not acknowledge are sent again. Nothing is repeated after
-//! a time-out.
+//! ([`BlockDownload::on_sent`]). Segments that the server does not acknowledge are sent again. Nothing is repeated
+//! after a time-out.
 
 use super::crc::crc16;
 use super::{
@@ -63,8 +63,8 @@ impl BlockDownload {
         Frame::full(CanId::sdo_request(self.node), frame)
     }
 
-    /// Whether the server has accepted data. An abort before that rejects the request, so another kind of transfer may be
-    /// tried.
+    /// Whether the server has accepted data. An abort before that rejects the request, so another kind of transfer may
+    /// be tried.
     pub fn has_begun(&self) -> bool {
         self.state != State::Initiated
     }
@@ -79,8 +79,8 @@ impl BlockDownload {
         }
     }
 
-    /// One of the frames was sent. A server never acknowledges unsent segments, so a repeated acknowledge of the previous
-    /// block can be recognised.
+    /// One of the frames was sent. A server never acknowledges unsent segments, so a repeated acknowledge of the
+    /// previous block can be recognised.
     pub fn on_sent(&mut self) {
         if let State::SubBlock { count, sent, .. } = &mut self.state {
             *sent = (*count).min(*sent + 1);
@@ -119,8 +119,8 @@ impl BlockDownload {
         TransferError::NoAnswer
     }
 
-    /// Aborts the transfer, even if the request was not answered: the answer may be lost, and a server in a block transfer
-    /// treats all further frames as part of it.
+    /// Aborts the transfer, even if the request was not answered: the answer may be lost, and a server in a block
+    /// transfer treats all further frames as part of it.
     pub fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
         out.push(abort_frame(self.node, self.object, code));
     }

@@ -59,8 +59,8 @@ enum State {
 }
 
 impl BlockUpload {
-    /// An upload of `object` from `node`. With a `threshold` ("protocol switch threshold" of the standard, 0 for none) the
-    /// server may answer expedited or segmented if the object is not larger, in bytes. For `accept_60` see
+    /// An upload of `object` from `node`. With a `threshold` ("protocol switch threshold" of the standard, 0 for none)
+    /// the server may answer expedited or segmented if the object is not larger, in bytes. For `accept_60` see
     /// [`Upload::new`].
     pub fn new(node: NodeId, object: ObjectId, threshold: u8, accept_60: bool) -> BlockUpload {
         BlockUpload {
@@ -112,8 +112,8 @@ impl BlockUpload {
         if self.state == State::Plain { self.plain.received() } else { (self.bytes.len(), self.announced) }
     }
 
-    /// Handles a received frame. Frames to send go to `out`. An accepted segment returns [`Progress::Continue`] with nothing
-    /// to send; the time-out restarts.
+    /// Handles a received frame. Frames to send go to `out`. An accepted segment returns [`Progress::Continue`] with
+    /// nothing to send; the time-out restarts.
     pub fn on_frame(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
         if self.state == State::Plain {
             return self.plain.on_frame(frame, out);
@@ -151,8 +151,8 @@ impl BlockUpload {
         Some(TransferError::NoAnswer)
     }
 
-    /// Aborts the transfer, even if the request was not answered: the answer may be lost, and a server in a block transfer
-    /// treats all further frames as part of it.
+    /// Aborts the transfer, even if the request was not answered: the answer may be lost, and a server in a block
+    /// transfer treats all further frames as part of it.
     pub fn abort(&mut self, code: AbortCode, out: &mut Vec<Frame>) {
         out.push(abort_frame(self.node, self.object, code));
     }

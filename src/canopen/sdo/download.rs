@@ -36,8 +36,8 @@ enum State {
 }
 
 impl Download {
-    /// A download of `data` to `object` of `node`. One to four bytes are expedited, other sizes segmented (also 0, which
-    /// an expedited transfer cannot indicate).
+    /// A download of `data` to `object` of `node`. One to four bytes are expedited, other sizes segmented (also 0,
+    /// which an expedited transfer cannot indicate).
     pub fn new(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> Download {
         Download { node, object, data, size, state: State::Initiated }
     }

@@ -61,8 +61,9 @@ impl Lss<'_, '_> {
         self.fastscan_beside(&[])
     }
 
-    /// Like [`Lss::fastscan`], but ignores the slaves in `aside`. They are switched to configuration state, where slaves
-    /// do not take part (CiA 305, 7.5.3.5). Nothing is changed in them. A slave that takes part anyway is found again.
+    /// Like [`Lss::fastscan`], but ignores the slaves in `aside`. They are switched to configuration state, where
+    /// slaves do not take part (CiA 305, 7.5.3.5). Nothing is changed in them. A slave that takes part anyway is found
+    /// again.
     ///
     /// # Errors
     /// As [`Lss::fastscan`], or a slave in `aside` does not answer.

@@ -1,4 +1,4 @@
-//! A CAN interface as the kernel describes it, and what of it can be set: linux/can/netlink.h.
+//! The description of a CAN interface by the kernel (linux/can/netlink.h), and its settings.
 
 use super::message::{Attributes, Header, NAME, Request, u16_at, u32_at};
 
@@ -24,22 +24,22 @@ const SUPPORTED: u16 = 1;
 /// `CAN_CTRLMODE_LISTENONLY`.
 const LISTEN_ONLY: u32 = 2;
 
-/// What a CAN controller says of itself.
+/// The state of a CAN controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
     /// Both error counters are below 96.
     ErrorActive,
     /// An error counter has reached 96.
     ErrorWarning,
-    /// An error counter has reached 128: it signals errors only passively.
+    /// An error counter has reached 128.
     ErrorPassive,
-    /// It has switched itself off after too many errors.
+    /// It switched itself off after too many errors.
     BusOff,
     /// It is switched off.
     Stopped,
     /// It sleeps.
     Sleeping,
-    /// A state that did not exist when this was written.
+    /// An unknown state code.
     Unknown(u32),
 }
 
@@ -56,7 +56,7 @@ impl State {
         }
     }
 
-    /// Its name, as `ip` has it, in small letters.
+    /// Its name in lower case, as `ip` shows it.
     pub fn as_str(self) -> &'static str {
         match self {
             State::ErrorActive => "error-active",
@@ -70,14 +70,14 @@ impl State {
     }
 }
 
-/// `struct can_bittiming`: how a bit is put together.
+/// `struct can_bittiming`: the bit timing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitTiming {
     /// Bit rate in bit/s.
     pub bit_rate: u32,
     /// Sample point in tenths of a percent of a bit.
     pub sample_point: u32,
-    /// Time quantum in nanoseconds; 0 where the hardware knows its rates only by name.
+    /// Time quantum in nanoseconds; 0 if the hardware only has fixed bit rates.
     pub(super) quantum: u32,
     /// Propagation segment, phase segments 1 and 2, jump width, in time quanta.
     pub(super) segments: [u32; 4],
@@ -94,18 +94,18 @@ impl BitTiming {
         })
     }
 
-    /// What the kernel makes a bit of this rate of.
+    /// The bit timing that the kernel computes for this bit rate.
     pub(in super::super) fn of_rate(bit_rate: u32) -> BitTiming {
         BitTiming { bit_rate, sample_point: 0, quantum: 0, segments: [0; 4] }
     }
 
-    /// The same bit again, for the kernel, which takes either a rate or quanta.
+    /// The same bit timing as a request: the kernel accepts either a bit rate or time quanta.
     pub(in super::super) fn again(self) -> BitTiming {
         if self.quantum == 0 { BitTiming::of_rate(self.bit_rate) } else { BitTiming { bit_rate: 0, ..self } }
     }
 
     fn bytes(self) -> Vec<u8> {
-        // The prescaler, at the end, is the kernel's affair.
+        // The kernel computes the prescaler, the last value.
         let [propagation, phase1, phase2, jump] = self.segments;
         [self.bit_rate, self.sample_point, self.quantum, propagation, phase1, phase2, jump, 0]
             .into_iter()
@@ -114,10 +114,10 @@ impl BitTiming {
     }
 }
 
-/// An interface.
+/// A network interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Link {
-    /// The number by which the kernel knows it.
+    /// Its index in the kernel.
     pub(super) index: i32,
     /// Its name. An interface may have further names (altname).
     pub name: String,
@@ -125,32 +125,32 @@ pub struct Link {
     pub is_can: bool,
     /// Whether it is switched on.
     pub up: bool,
-    /// What it is to the kernel: `can` is a controller, `vcan` and `vxcan` are virtual. Nothing where it has no kind.
+    /// The kind: `can` is a controller, `vcan` and `vxcan` are virtual. `None` if it has no kind.
     pub kind: Option<String>,
-    /// The bits it makes, where a rate has been set.
+    /// The bit timing, if a bit rate was set.
     pub bit_timing: Option<BitTiming>,
     /// The controller's state.
     pub state: Option<State>,
     /// Whether the controller only listens.
     pub listen_only: Option<bool>,
-    /// Whether it can only listen, where the kernel tells (Linux 5.17).
+    /// Whether it supports listen-only mode, if the kernel reports that (Linux 5.17).
     pub can_listen_only: Option<bool>,
-    /// After how many milliseconds it is restarted after bus-off; 0: never.
+    /// The time in milliseconds until a restart after bus-off; 0: never.
     pub restart_ms: Option<u32>,
-    /// Error counters of sending and receiving.
+    /// The transmit and receive error counters.
     pub errors: Option<(u16, u16)>,
-    /// The only bit rates of this hardware in bit/s, where it has such a list.
+    /// The fixed bit rates of the hardware in bit/s, if it has such a list.
     pub fixed_rates: Option<Vec<u32>>,
-    /// The highest bit rate in bit/s, where there is one.
+    /// The highest bit rate in bit/s, if known.
     pub rate_max: Option<u32>,
 }
 
 impl Link {
-    /// Reads the kernel's description.
+    /// Parses the kernel's description.
     pub(super) fn read(header: Header, attributes: Attributes<'_>) -> Link {
         let info = attributes.nested(LINK_INFO);
         let kind = info.and_then(|info| info.text(INFO_KIND));
-        // The numbers of other kinds mean other things.
+        // The attributes of other kinds have other meanings.
         let can = info.filter(|_| kind == Some("can")).and_then(|info| info.nested(INFO_DATA));
         let mode = |data: &[u8]| u32_at(data, 4).map(|flags| flags & LISTEN_ONLY != 0);
         let supported = can.and_then(|can| can.nested(CONTROL_MODE_MORE)?.u32(SUPPORTED));
@@ -175,12 +175,12 @@ impl Link {
         }
     }
 
-    /// The bit rate in bit/s, where one has been set.
+    /// The bit rate in bit/s, if one was set.
     pub fn bit_rate(&self) -> Option<u32> {
         self.bit_timing.map(|timing| timing.bit_rate)
     }
 
-    /// Whether a bit rate is something that this interface has.
+    /// Whether the interface is a controller with a bit rate.
     pub fn is_controller(&self) -> bool {
         self.kind.as_deref() == Some("can")
     }
@@ -190,7 +190,7 @@ impl Link {
         Request::set(self.index, u32::from(up), UP)
     }
 
-    /// Sets its bits and whether it only listens; nothing else.
+    /// Sets its bit timing and listen-only mode.
     pub(super) fn configure(&self, timing: BitTiming, listen_only: Option<bool>) -> Request {
         let mut request = Request::set(self.index, 0, 0);
         request.nest(LINK_INFO, |request| {

@@ -1,9 +1,9 @@
-//! The bytes of rtnetlink: a header, a fixed part, attributes. As in linux/netlink.h and linux/rtnetlink.h,
-//! in the byte order of the machine. Reading is total: what does not fit is not there.
+//! Encodes and decodes rtnetlink messages: a header, a fixed part, attributes (linux/netlink.h, linux/rtnetlink.h), in
+//! host byte order. Decoding is total: invalid parts are skipped.
 
 /// `NLMSG_ERROR`: an acknowledge (0) or an error.
 const ERROR: u16 = 2;
-/// `RTM_NEWLINK`: an interface as it is, or as it is to be.
+/// `RTM_NEWLINK`: describes or sets an interface.
 const NEW_LINK: u16 = 16;
 /// `RTM_GETLINK`.
 const GET_LINK: u16 = 18;
@@ -15,13 +15,13 @@ const ACK: u16 = 4;
 const CAPPED: u16 = 0x100;
 /// `NLM_F_ACK_TLVS`: attributes follow an error.
 const EXPLAINED: u16 = 0x200;
-/// `NLMSGERR_ATTR_MSG`: the kernel's words.
+/// `NLMSGERR_ATTR_MSG`: the message of the kernel.
 const WORDS: u16 = 1;
 /// `IFLA_IFNAME`.
 pub(super) const NAME: u16 = 3;
 /// The flag bits of an attribute's type: nested, network byte order.
 const KIND: u16 = 0x3fff;
-/// The length of `nlmsghdr`, and by chance that of `ifinfomsg`.
+/// The length of `nlmsghdr`, which equals that of `ifinfomsg`.
 const HEADER: usize = 16;
 
 /// A request under construction.
@@ -36,13 +36,13 @@ impl Request {
         request
     }
 
-    /// Changes the interface with this index: of its flags those in `change`, and what attributes say.
+    /// Sets the interface with this index: the flags in `change`, and the attributes added later.
     pub(super) fn set(index: i32, flags: u32, change: u32) -> Request {
         Request::new(NEW_LINK, REQUEST | ACK, index, flags, change)
     }
 
     fn new(kind: u16, how: u16, index: i32, flags: u32, change: u32) -> Request {
-        // Length, sequence number and port are filled in later, the latter by the kernel.
+        // Length and sequence number are set later, the port by the kernel.
         let mut bytes = vec![0; HEADER];
         bytes[4..6].copy_from_slice(&kind.to_ne_bytes());
         bytes[6..8].copy_from_slice(&how.to_ne_bytes());
@@ -59,19 +59,19 @@ impl Request {
         self.nest(kind, |request| request.0.extend_from_slice(data));
     }
 
-    /// Adds an attribute that consists of attributes.
+    /// Adds a nested attribute.
     pub(super) fn nest(&mut self, kind: u16, fill: impl FnOnce(&mut Request)) {
         let start = self.0.len();
         self.0.extend_from_slice(&[0, 0]);
         self.0.extend_from_slice(&kind.to_ne_bytes());
         fill(self);
-        // Requests are built here and are short.
+        // Requests are short, so the length fits.
         let length = u16::try_from(self.0.len() - start).unwrap_or(u16::MAX);
         self.0[start..start + 2].copy_from_slice(&length.to_ne_bytes());
         self.0.resize(self.0.len().next_multiple_of(4), 0);
     }
 
-    /// The bytes to send.
+    /// Completes the message.
     pub(super) fn finish(mut self, sequence: u32) -> Vec<u8> {
         let length = u32::try_from(self.0.len()).unwrap_or(u32::MAX);
         self.0[..4].copy_from_slice(&length.to_ne_bytes());
@@ -80,12 +80,12 @@ impl Request {
     }
 }
 
-/// What the kernel answers.
+/// An answer of the kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reply<'a> {
     /// Done.
     Done,
-    /// Not done: the error number, and the kernel's words where it has any.
+    /// Rejected: the error number, and the message of the kernel if there is one.
     Refused(i32, Option<&'a str>),
     /// An interface.
     Link(Header, Attributes<'a>),
@@ -94,15 +94,15 @@ pub(super) enum Reply<'a> {
 /// The fixed part of the description of an interface: `ifinfomsg`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
-    /// `ARPHRD_…`: what kind of hardware it is.
+    /// `ARPHRD_…`: the kind of hardware.
     pub(super) hardware: u16,
-    /// The number by which the kernel knows it.
+    /// The index in the kernel.
     pub(super) index: i32,
     /// `IFF_…`.
     pub(super) flags: u32,
 }
 
-/// The reply with this sequence number in what was received. Nothing where there is none.
+/// Finds the reply with this sequence number; `None` if there is none.
 pub(super) fn reply(mut bytes: &[u8], sequence: u32) -> Option<Reply<'_>> {
     while let Some(header) = bytes.first_chunk::<HEADER>() {
         let length = usize::try_from(u32_at(header, 0)?).ok()?;
@@ -124,7 +124,7 @@ pub(super) fn reply(mut bytes: &[u8], sequence: u32) -> Option<Reply<'_>> {
     None
 }
 
-/// An error message: a negative error number, the header of the request or all of it, the kernel's words.
+/// Parses an error: a negative error number, the header or all of the request, the message.
 fn refusal(body: &[u8], how: u16) -> Option<Reply<'_>> {
     let code = i32::from_ne_bytes(*body.first_chunk()?);
     if code == 0 {
@@ -136,7 +136,7 @@ fn refusal(body: &[u8], how: u16) -> Option<Reply<'_>> {
     Some(Reply::Refused(code.saturating_neg(), words))
 }
 
-/// Attributes one after the other.
+/// A sequence of attributes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Attributes<'a>(pub(super) &'a [u8]);
 
@@ -151,14 +151,14 @@ impl<'a> Attributes<'a> {
         self.get(kind).map(Attributes)
     }
 
-    /// An attribute that is a text, without the zero at its end.
+    /// A text attribute without its terminating zero.
     pub(super) fn text(self, kind: u16) -> Option<&'a str> {
         let data = self.get(kind)?;
         let text = data.split(|&byte| byte == 0).next().unwrap_or(data);
         std::str::from_utf8(text).ok()
     }
 
-    /// The number at the beginning of an attribute.
+    /// The number at the start of an attribute.
     pub(super) fn u32(self, kind: u16) -> Option<u32> {
         u32_at(self.get(kind)?, 0)
     }
@@ -175,12 +175,12 @@ impl<'a> Iterator for Attributes<'a> {
     }
 }
 
-/// The number at this place.
+/// The 32-bit number at this offset.
 pub(super) fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
     Some(u32::from_ne_bytes(*bytes.get(at..)?.first_chunk()?))
 }
 
-/// The number at this place.
+/// The 16-bit number at this offset.
 pub(super) fn u16_at(bytes: &[u8], at: usize) -> Option<u16> {
     Some(u16::from_ne_bytes(*bytes.get(at..)?.first_chunk()?))
 }

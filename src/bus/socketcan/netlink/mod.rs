@@ -1,6 +1,6 @@
-//! Asks the kernel about CAN interfaces and sets them: the little of rtnetlink that this takes.
+//! Reads and sets CAN interfaces by rtnetlink.
 //!
-//! The setters of the `socketcan` crate lose the kernel's error number, and its words.
+//! The setters of the `socketcan` crate lose the error number and message of the kernel.
 
 mod link;
 mod message;
@@ -15,21 +15,21 @@ use std::io::{self, Read};
 use std::os::fd::{AsRawFd, RawFd};
 use std::time::Duration;
 
-/// `SOL_NETLINK`, `NETLINK_CAP_ACK` and `NETLINK_EXT_ACK`: errors without the request, and with words.
+/// `SOL_NETLINK`, `NETLINK_CAP_ACK` and `NETLINK_EXT_ACK`: errors without a copy of the request, and with a message.
 const LEVEL: i32 = 270;
 const CAPPED: i32 = 10;
 const EXPLAINED: i32 = 11;
-/// Larger than any description of an interface: the kernel's own limit for a message.
+/// The largest message of the kernel.
 const LARGEST: usize = 32 * 1024;
-/// The kernel answers at once; this only keeps a fault from hanging the program.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// The kernel answers immediately. This limit keeps a fault from blocking the program.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Why the kernel did not do it.
+/// An error of the kernel.
 #[derive(Debug)]
 pub(super) struct Refusal {
-    /// The system's error.
+    /// The error number.
     pub(super) error: io::Error,
-    /// The kernel's words, where it has any.
+    /// The message of the kernel, if there is one.
     pub(super) words: Option<String>,
 }
 
@@ -45,7 +45,7 @@ impl Refusal {
         self.error.raw_os_error()
     }
 
-    /// As an error of the bus: `doing` something to the interface `name`.
+    /// Converts it to a bus error for the operation `doing` on the interface `name`.
     pub(super) fn into_error(self, doing: &str, name: &str) -> BusError {
         match self.code() {
             Some(libc::ENODEV | libc::ENXIO) => BusError::NoInterface(name.to_owned()),
@@ -74,16 +74,16 @@ impl Kernel {
         let domain = socket2::Domain::from(libc::AF_NETLINK);
         let protocol = socket2::Protocol::from(libc::NETLINK_ROUTE);
         let kernel = Kernel(socket2::Socket::new(domain, socket2::Type::RAW, Some(protocol))?);
-        kernel.0.set_read_timeout(Some(PATIENCE))?;
-        // Kernels without these (before 4.12) tell less, in a form that is understood too.
+        kernel.0.set_read_timeout(Some(ANSWER_TIMEOUT))?;
+        // Kernels before 4.12 lack these options and give less detail.
         let _ = kernel.set_socket_option_int(LEVEL, CAPPED, 1);
         let _ = kernel.set_socket_option_int(LEVEL, EXPLAINED, 1);
         Ok(kernel)
     }
 
-    /// Sends a request and hands its answer to `take`.
+    /// Sends a request and passes its answer to `take`.
     fn ask<T>(&self, request: Request, take: impl FnOnce(Reply<'_>) -> Result<T, Refusal>) -> Result<T, Refusal> {
-        // One request a connection: any number tells its answer from nothing else.
+        // One request per connection, so the number is arbitrary.
         const SEQUENCE: u32 = 1;
         self.0.send(&request.finish(SEQUENCE))?;
         let mut bytes = vec![0; LARGEST];
@@ -104,7 +104,7 @@ impl Kernel {
     }
 }
 
-/// The interface of that name as it is now.
+/// Reads an interface by name.
 pub(super) fn get(name: &str) -> Result<Link, Refusal> {
     Kernel::open()?.ask(Request::get(name), |reply| match reply {
         Reply::Link(header, attributes) => Ok(Link::read(header, attributes)),
@@ -117,7 +117,7 @@ pub(super) fn switch(link: &Link, up: bool) -> Result<(), Refusal> {
     set(link.switch(up))
 }
 
-/// Sets the bits of an interface that is down, and whether it only listens.
+/// Sets the bit timing of an interface that is down, and its listen-only mode.
 pub(super) fn configure(link: &Link, timing: BitTiming, listen_only: Option<bool>) -> Result<(), Refusal> {
     set(link.configure(timing, listen_only))
 }
