@@ -6,7 +6,7 @@ mod recorder;
 
 use super::args::{Duration, Nodes, SignalArg};
 use super::recording::{print_verdicts, refuse_to_send, sync_interval};
-use super::{Format, Global, When, open};
+use super::{Global, When, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::measure::decode::Wanted;
@@ -14,7 +14,6 @@ use crate::measure::expression::Expression;
 use crate::output::console::Console;
 use crate::output::progress::Progress;
 use crate::output::rows::FileFormat;
-use crate::output::summary;
 use crate::tasks::check::Checker;
 use crate::tasks::log::{Mode, Plan, log};
 use crate::tasks::{Failure, Kind};
@@ -94,7 +93,7 @@ impl Log {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         refuse_to_send(global, self.sync.or(self.poll))?;
         self.check_expectations()?;
-        let format = if global.format == Format::Json { FileFormat::JsonLines } else { FileFormat::Csv };
+        let format = FileFormat::from(global.format);
         self.files.check(format, self.sync.or(self.poll).is_some())?;
         let mut files = self.files.open(format, self.count)?;
         let finished = self.record(global, &mut files)?;
@@ -159,9 +158,11 @@ impl Log {
         if let Some(failure) = report.nothing {
             return Err(failure.into());
         }
+        let mut finished = Finished { report, verdicts: Vec::new(), written, is_limited, is_closed };
         let console = global.console();
-        summary::lines(&report, written).iter().for_each(|line| console.note(line));
-        Ok(Finished { report, verdicts: verdicts?, written, is_limited, is_closed })
+        finished.summary().lines().iter().for_each(|line| console.note(line));
+        finished.verdicts = verdicts?;
+        Ok(finished)
     }
 
     fn plan(&self, global: &Global, nodes: Vec<NodeId>, is_live: bool) -> anyhow::Result<Plan> {

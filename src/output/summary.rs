@@ -1,13 +1,13 @@
 //! The summary of a recording: lines for people, one JSON object for programs.
 
 use super::events::remark_text;
+use super::report::{Cell, Column, Format, Report, render};
 use super::text::{grouped, significant};
 use crate::bus::time::spoken;
 use crate::measure::histogram::Histogram;
-use crate::measure::sample::Source;
+use crate::measure::sample::{Number, Source};
 use crate::measure::statistics::{Jitter, Statistics};
 use crate::tasks::log::{RecordingReport, Remark, SyncStatistics};
-use serde::Serialize;
 use std::io::{self, Write};
 use std::time::Duration;
 
@@ -24,8 +24,180 @@ pub struct Written {
     pub left_out: u64,
 }
 
-/// The summary as lines of text.
-pub fn lines(report: &RecordingReport, written: Written) -> Vec<String> {
+/// The summary of a recording.
+#[derive(Clone, Copy, Debug)]
+pub struct Summary<'a> {
+    /// What was recorded.
+    pub report: &'a RecordingReport,
+    /// What was written.
+    pub written: Written,
+    /// Whether the recording reached its planned end: `--count`, `--duration`, or any end if none is planned.
+    pub complete: bool,
+}
+
+impl Report for Summary<'_> {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("complete"),
+        Column::new("rows"),
+        Column::new("rows_lost"),
+        Column::new("events_lost"),
+        Column::new("values_left_out"),
+        Column::new("length_s"),
+        Column::new("timestamps"),
+        Column::new("dropped"),
+        Column::new("gaps"),
+        Column::new("emergencies"),
+        Column::new("skipped_polls"),
+        Column::new("syncs"),
+        Column::new("syncs_left_out"),
+        Column::new("sync_delay_s"),
+        Column::new("restarts"),
+        Column::new("node_losses"),
+        Column::new("heartbeat_losses"),
+        Column::new("changes"),
+        Column::new("not_recorded"),
+        Column::new("wrong_lengths"),
+        Column::new("link_losses"),
+        Column::new("bus_offs"),
+        Column::new("receive_buffer_bytes"),
+        Column::new("lost_nodes"),
+        Column::new("left_operational"),
+        Column::new("remarks"),
+        Column::nested(
+            "signals",
+            &[
+                Column::new("node"),
+                Column::new("signal"),
+                Column::new("unit"),
+                Column::new("count"),
+                Column::new("invalid"),
+                Column::new("rate"),
+                Column::new("min"),
+                Column::new("max"),
+                Column::new("mean"),
+                Column::new("sd"),
+                Column::new("longest_interval_s"),
+                Column::new("gaps"),
+                Column::new("interval_s"),
+                Column::new("jitter_s"),
+            ],
+        ),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let Summary { report, written, complete } = *self;
+        let events = &report.events;
+        vec![
+            complete.into(),
+            written.rows.into(),
+            written.lost.into(),
+            written.events_lost.into(),
+            written.left_out.into(),
+            seconds(report.length),
+            report.timestamps.to_string().as_str().into(),
+            report.dropped.into(),
+            report.gaps.into(),
+            report.emergencies.into(),
+            report.skipped.into(),
+            report.syncs.sent.into(),
+            report.syncs.left_out.into(),
+            spread(&report.syncs.delays),
+            events.restarts.into(),
+            events.silences.into(),
+            events.heartbeat_losses.into(),
+            events.changes.into(),
+            events.not_recorded.into(),
+            events.wrong_lengths.into(),
+            events.link_losses.into(),
+            events.bus_offs.into(),
+            report.receive_buffer.map(|buffer| buffer.bytes as u64).into(),
+            Cell::list(report.lost.iter().copied()),
+            left_operational(report),
+            Cell::list(report.remarks.iter().map(|remark| Cell::from(remark_text(remark).as_str()))),
+            Cell::Rows(report.statistics.iter().map(|(source, statistics)| signal_cells(source, statistics)).collect()),
+        ]
+    }
+
+    /// The lines at the end of a recording.
+    fn text(summaries: &[Self], out: &mut dyn Write) -> io::Result<()> {
+        summaries.iter().flat_map(Summary::lines).try_for_each(|line| writeln!(out, "{line}"))
+    }
+}
+
+fn signal_cells(source: &Source, statistics: &Statistics) -> Vec<Cell> {
+    let jitter = statistics.jitter().map_or(Cell::Null, |jitter| {
+        Cell::Object(vec![("p50", seconds(jitter.p50)), ("p99", seconds(jitter.p99)), ("max", seconds(jitter.max))])
+    });
+    vec![
+        source.node.into(),
+        (&*source.signal).into(),
+        (&*source.unit).into(),
+        statistics.count().into(),
+        statistics.invalid().into(),
+        real(statistics.rate()),
+        real(statistics.min()),
+        real(statistics.max()),
+        real(statistics.mean()),
+        real(statistics.deviation()),
+        seconds(statistics.longest_interval()),
+        statistics.gaps().into(),
+        spread(statistics.intervals()),
+        jitter,
+    ]
+}
+
+/// A computed number in full precision.
+fn real(number: Option<f64>) -> Cell {
+    number.map_or(Cell::Null, |number| Cell::Number(Number::Real64(number)))
+}
+
+fn seconds(time: Duration) -> Cell {
+    real(Some(time.as_secs_f64()))
+}
+
+/// The distribution of times, in seconds.
+fn spread(times: &Histogram) -> Cell {
+    let (Some(p50), Some(p99), Some(max)) = (times.quantile(0.5), times.quantile(0.99), times.longest()) else {
+        return Cell::Null;
+    };
+    let min = times.shortest().unwrap_or_default();
+    Cell::Object(vec![("min", seconds(min)), ("p50", seconds(p50)), ("p99", seconds(p99)), ("max", seconds(max))])
+}
+
+/// The nodes that were started and stay operational, because their previous state is unknown.
+fn left_operational(report: &RecordingReport) -> Cell {
+    let nodes = report.remarks.iter().filter_map(|remark| match remark {
+        Remark::LeftOperational(nodes) => Some(nodes),
+        _ => None,
+    });
+    Cell::list(nodes.flatten().copied())
+}
+
+impl Summary<'_> {
+    /// The summary as lines of text.
+    pub fn lines(&self) -> Vec<String> {
+        let Summary { report, written, .. } = self;
+        let mut lines = vec![head(report, *written)];
+        if report.events.not_recorded > 0 {
+            let count = grouped(report.events.not_recorded);
+            lines.push(format!(
+                "{count} TPDOs or polled values made no row: the setup of their node had to be read again"
+            ));
+        }
+        lines.extend(syncs(&report.syncs));
+        lines.extend(report.statistics.iter().map(|(source, statistics)| signal_line(source, statistics)));
+        if written.left_out > 0 {
+            lines.push(format!(
+                "{} values are in no row: late, or not the first in their cycle (--layout long contains all values)",
+                grouped(written.left_out)
+            ));
+        }
+        lines.extend(report.remarks.iter().map(remark_text));
+        lines
+    }
+}
+
+fn head(report: &RecordingReport, written: Written) -> String {
     let mut head = format!(
         "{} rows in {}, {} timestamps, {} frames dropped, {} gaps",
         grouped(written.rows),
@@ -35,41 +207,24 @@ pub fn lines(report: &RecordingReport, written: Written) -> Vec<String> {
         grouped(report.gaps)
     );
     let events = &report.events;
-    for (count, what) in [
-        (report.emergencies, ["emergency message", "emergency messages"]),
-        (events.restarts, ["restart", "restarts"]),
-        (events.silences, ["silent node", "silent nodes"]),
-        (events.heartbeat_losses, ["heartbeat lost", "heartbeats lost"]),
-        (events.changes, ["changed mapping or unit", "changed mappings or units"]),
-        (events.wrong_lengths, ["TPDO of the wrong length", "TPDOs of the wrong length"]),
-        (events.link_losses, ["interface loss", "interface losses"]),
-        (events.bus_offs, ["bus-off", "bus-offs"]),
-        (report.skipped, ["poll skipped", "polls skipped"]),
-        (written.lost, ["row lost", "rows lost"]),
-        (written.events_lost, ["event lost", "events lost"]),
+    for (count, one, several) in [
+        (report.emergencies, "emergency message", "emergency messages"),
+        (events.restarts, "restart", "restarts"),
+        (events.silences, "silent node", "silent nodes"),
+        (events.heartbeat_losses, "heartbeat lost", "heartbeats lost"),
+        (events.changes, "changed mapping or unit", "changed mappings or units"),
+        (events.wrong_lengths, "TPDO of the wrong length", "TPDOs of the wrong length"),
+        (events.link_losses, "interface loss", "interface losses"),
+        (events.bus_offs, "bus-off", "bus-offs"),
+        (report.skipped, "poll skipped", "polls skipped"),
+        (written.lost, "row lost", "rows lost"),
+        (written.events_lost, "event lost", "events lost"),
     ] {
         if count > 0 {
-            let [one, several] = what;
             head.push_str(&format!(", {} {}", grouped(count), if count == 1 { one } else { several }));
         }
     }
-    let mut lines = vec![head];
-    if events.not_recorded > 0 {
-        let count = grouped(events.not_recorded);
-        lines.push(format!("{count} TPDOs or polled values made no row: the setup of their node had to be read again"));
-    }
-    lines.extend(syncs(&report.syncs));
-    for (source, statistics) in &report.statistics {
-        lines.push(signal(source, statistics));
-    }
-    if written.left_out > 0 {
-        lines.push(format!(
-            "{} values are in no row: late, or not the first in their cycle (--layout long contains all values)",
-            grouped(written.left_out)
-        ));
-    }
-    lines.extend(report.remarks.iter().map(remark_text));
-    lines
+    head
 }
 
 fn syncs(syncs: &SyncStatistics) -> Option<String> {
@@ -80,7 +235,7 @@ fn syncs(syncs: &SyncStatistics) -> Option<String> {
     Some(format!("{} SYNC sent, delay min {min}  p50 {p50}  p99 {p99}  max {max}", grouped(syncs.sent)))
 }
 
-fn signal(source: &Source, statistics: &Statistics) -> String {
+fn signal_line(source: &Source, statistics: &Statistics) -> String {
     let mut line = format!("node {} {}  n {}", source.node, source.signal, grouped(statistics.count()));
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| significant(value, 6));
     if statistics.mean().is_some() {
@@ -105,139 +260,10 @@ fn signal(source: &Source, statistics: &Statistics) -> String {
     line.trim_end().to_owned()
 }
 
-/// The distribution of times, in seconds.
-#[derive(Serialize)]
-struct Spread {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    min: Option<f64>,
-    p50: f64,
-    p99: f64,
-    max: f64,
-}
-
-impl Spread {
-    fn of(times: &Histogram) -> Option<Spread> {
-        let seconds = |time: Duration| time.as_secs_f64();
-        Some(Spread {
-            min: times.shortest().map(seconds),
-            p50: times.quantile(0.5).map(seconds)?,
-            p99: times.quantile(0.99).map(seconds)?,
-            max: times.longest().map(seconds)?,
-        })
-    }
-}
-
-/// Writes the summary as one JSON object. `complete` is false if the recording ended before --count or --duration.
+/// Writes the summary as one JSON object.
 ///
 /// # Errors
-/// The output cannot be written.
-pub fn json(out: &mut dyn Write, report: &RecordingReport, written: Written, complete: bool) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Signal<'a> {
-        node: u8,
-        signal: &'a str,
-        unit: &'a str,
-        count: u64,
-        invalid: u64,
-        rate: Option<f64>,
-        min: Option<f64>,
-        max: Option<f64>,
-        mean: Option<f64>,
-        sd: Option<f64>,
-        longest_interval_s: f64,
-        gaps: u64,
-        interval_s: Option<Spread>,
-        jitter_s: Option<Spread>,
-    }
-    #[derive(Serialize)]
-    struct Summary<'a> {
-        complete: bool,
-        rows: u64,
-        rows_lost: u64,
-        events_lost: u64,
-        values_left_out: u64,
-        length_s: f64,
-        timestamps: String,
-        dropped: u64,
-        gaps: u64,
-        emergencies: u64,
-        skipped_polls: u64,
-        syncs: u64,
-        syncs_left_out: u64,
-        sync_delay_s: Option<Spread>,
-        restarts: u64,
-        node_losses: u64,
-        heartbeat_losses: u64,
-        changes: u64,
-        not_recorded: u64,
-        wrong_lengths: u64,
-        link_losses: u64,
-        bus_offs: u64,
-        receive_buffer_bytes: Option<usize>,
-        lost_nodes: Vec<u8>,
-        left_operational: Vec<u8>,
-        remarks: Vec<String>,
-        signals: Vec<Signal<'a>>,
-    }
-    let signals = report.statistics.iter().map(|(source, statistics)| Signal {
-        node: source.node.get(),
-        signal: &source.signal,
-        unit: &source.unit,
-        count: statistics.count(),
-        invalid: statistics.invalid(),
-        rate: statistics.rate(),
-        min: statistics.min(),
-        max: statistics.max(),
-        mean: statistics.mean(),
-        sd: statistics.deviation(),
-        longest_interval_s: statistics.longest_interval().as_secs_f64(),
-        gaps: statistics.gaps(),
-        interval_s: Spread::of(statistics.intervals()),
-        jitter_s: statistics.jitter().map(|jitter| Spread {
-            min: None,
-            p50: jitter.p50.as_secs_f64(),
-            p99: jitter.p99.as_secs_f64(),
-            max: jitter.max.as_secs_f64(),
-        }),
-    });
-    let events = &report.events;
-    let summary = Summary {
-        complete,
-        rows: written.rows,
-        rows_lost: written.lost,
-        events_lost: written.events_lost,
-        values_left_out: written.left_out,
-        length_s: report.length.as_secs_f64(),
-        timestamps: report.timestamps.to_string(),
-        dropped: report.dropped,
-        gaps: report.gaps,
-        emergencies: report.emergencies,
-        skipped_polls: report.skipped,
-        syncs: report.syncs.sent,
-        syncs_left_out: report.syncs.left_out,
-        sync_delay_s: Spread::of(&report.syncs.delays),
-        restarts: events.restarts,
-        node_losses: events.silences,
-        heartbeat_losses: events.heartbeat_losses,
-        changes: events.changes,
-        not_recorded: events.not_recorded,
-        wrong_lengths: events.wrong_lengths,
-        link_losses: events.link_losses,
-        bus_offs: events.bus_offs,
-        receive_buffer_bytes: report.receive_buffer.map(|buffer| buffer.bytes),
-        lost_nodes: report.lost.iter().map(|node| node.get()).collect(),
-        left_operational: left_operational(report),
-        remarks: report.remarks.iter().map(remark_text).collect(),
-        signals: signals.collect(),
-    };
-    super::json::line(out, &summary)
-}
-
-/// The nodes that were started and stay operational, because their previous state is unknown.
-fn left_operational(report: &RecordingReport) -> Vec<u8> {
-    let nodes = report.remarks.iter().filter_map(|remark| match remark {
-        Remark::LeftOperational(nodes) => Some(nodes),
-        _ => None,
-    });
-    nodes.flatten().map(|node| node.get()).collect()
+/// Those of `out`.
+pub fn write_json(summary: &Summary<'_>, out: &mut dyn Write) -> io::Result<()> {
+    render(std::slice::from_ref(summary), Format::Json, out)
 }

@@ -124,7 +124,7 @@ pub trait Observer {
     ///
     /// # Errors
     /// The recording must not start.
-    fn begin(&mut self, _instruments: &[Node]) -> Result<(), Failure> {
+    fn begin(&mut self, _nodes: &[Node]) -> Result<(), Failure> {
         Ok(())
     }
 
@@ -210,18 +210,16 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
         return record_passively(master, plan, observer);
     }
     master.listen_to(&plan.nodes)?;
-    let instruments = survey_nodes(master, &plan.nodes, &plan.overrides)?;
-    observer.begin(&instruments)?;
-    check_wanted(&instruments, plan)?;
-    let mut recording = Recording::new(instruments, plan, master.bus());
+    let nodes = survey_nodes(master, &plan.nodes, &plan.overrides)?;
+    observer.begin(&nodes)?;
+    check_wanted(&nodes, plan)?;
+    let mut recording = Recording::new(nodes, plan, master.bus());
     match plan.mode {
         Mode::Poll(period) => {
-            let poll = Poll::new(&recording.instruments, &plan.wanted, &mut recording.decoder, period)?;
+            let poll = Poll::new(&recording.nodes, &plan.wanted, &mut recording.decoder, period)?;
             recording.poll = Some(poll);
         }
-        _ => {
-            recording.instruments.iter().for_each(|instrument| recording.decoder.add(instrument.layout(), &plan.wanted))
-        }
+        _ => recording.nodes.iter().for_each(|node| recording.decoder.add(node.layout(), &plan.wanted)),
     }
     recording.update_sources();
     recording.excuse_nodes_without_signals();
@@ -231,12 +229,12 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     // Nodes may restart between their survey and the recording.
     let mut restarted = BTreeSet::new();
     if let Mode::Sync(period) = plan.mode {
-        refuse_second_sync(master, &recording.instruments, period, &mut restarted)?;
-        if let Some(share) = sync_share(master, &recording.instruments, period) {
+        refuse_second_sync(master, &recording.nodes, period, &mut restarted)?;
+        if let Some(share) = sync_share(master, &recording.nodes, period) {
             observer.note(&Note::Share(period, share), master.bus().now());
         }
     }
-    let started = recording.states.start(master, &recording.instruments, plan, &mut restarted);
+    let started = recording.states.start(master, &recording.nodes, plan, &mut restarted);
     let result = started.and_then(|()| {
         master.set_tolerates_outages(true);
         recording.restarted_before_start(&restarted, master, observer);

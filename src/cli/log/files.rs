@@ -166,7 +166,7 @@ impl Files {
             );
         }
         let of_csv = self.delimiter.is_some() || self.decimal.is_some() || self.bom;
-        if format == FileFormat::JsonLines && of_csv {
+        if !format.is_csv() && of_csv {
             return refuse("--delimiter, --decimal and --bom are for CSV", "omit --format json or these options");
         }
         let Dialect { delimiter, decimal, .. } = self.dialect();

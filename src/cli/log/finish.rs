@@ -8,7 +8,7 @@ use crate::bus::interrupt::Interrupts;
 use crate::measure::expression::verdict::Verdict;
 use crate::output::console::Console;
 use crate::output::events::Events;
-use crate::output::summary::{self, Written};
+use crate::output::summary::{Summary, Written, write_json};
 use crate::tasks::check::all_satisfied;
 use crate::tasks::log::{LogFailure, RecordingReport};
 use crate::tasks::{Failure, Kind};
@@ -76,13 +76,17 @@ impl Finished {
         !(self.is_limited && (self.is_closed || self.report.interrupted))
     }
 
+    pub(super) fn summary(&self) -> Summary<'_> {
+        Summary { report: &self.report, written: self.written, complete: self.is_complete() }
+    }
+
     /// Writes the summary as JSON, to a file or to stdout.
     pub(super) fn write_summary(&self, is_wanted: bool, files: &mut OpenFiles) -> anyhow::Result<()> {
         if !is_wanted {
             return Ok(());
         }
         let mut text = Vec::new();
-        summary::json(&mut text, &self.report, self.written, self.is_complete())?;
+        write_json(&self.summary(), &mut text)?;
         match &mut files.summary {
             Some(file) => file.write(&text),
             None if self.is_closed => Ok(()),

@@ -4,6 +4,7 @@ use super::csv::CsvRows;
 use super::json_lines::JsonRows;
 use super::row::{Columns, Row};
 use super::setup::Setup;
+use crate::output::report::Format;
 use std::fmt::Debug;
 use std::io;
 
@@ -15,6 +16,16 @@ pub enum FileFormat {
     Csv,
     /// JSON Lines.
     JsonLines,
+}
+
+impl From<Format> for FileFormat {
+    /// Files and pipes get CSV unless JSON is requested.
+    fn from(format: Format) -> FileFormat {
+        match format {
+            Format::Text | Format::Csv => FileFormat::Csv,
+            Format::Json => FileFormat::JsonLines,
+        }
+    }
 }
 
 /// Turns typed rows into lines.
@@ -39,6 +50,11 @@ pub(super) trait RowFormat: Debug {
 }
 
 impl FileFormat {
+    /// Whether the options for CSV apply.
+    pub fn is_csv(self) -> bool {
+        self == FileFormat::Csv
+    }
+
     /// The writer of this format.
     pub(super) fn writer(self, setup: &Setup) -> Box<dyn RowFormat> {
         match self {

@@ -14,32 +14,32 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// Every requested signal must exist, and must be mapped into a TPDO unless it is polled.
-pub(super) fn check_wanted(instruments: &[Node], plan: &Plan) -> Result<(), Failure> {
+pub(super) fn check_wanted(nodes: &[Node], plan: &Plan) -> Result<(), Failure> {
     let polled = matches!(plan.mode, Mode::Poll(_));
     for item in &plan.wanted {
-        let carried = |instrument: &Node| {
+        let carried = |node: &Node| {
             let entries = || {
-                let valid = instrument.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
+                let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
                 valid.flat_map(|tpdo| &tpdo.mapping)
             };
             match item {
-                Wanted::Signal(name) => instrument.mapped_signals().any(|signal| signal.name == *name),
+                Wanted::Signal(name) => node.mapped_signals().any(|signal| signal.name == *name),
                 Wanted::Object(object) => entries().any(|entry| entry.object == *object),
-                Wanted::Status(name) => instrument
+                Wanted::Status(name) => node
                     .signals
                     .iter()
                     .filter(|signal| signal.name == *name)
                     .any(|signal| entries().any(|entry| Some(entry.object) == signal.status)),
             }
         };
-        if !instruments.iter().any(carried) {
+        if !nodes.iter().any(carried) {
             let has = |name: &str, with_status: bool| {
-                let signals = instruments.iter().flat_map(|instrument| &instrument.signals);
+                let signals = nodes.iter().flat_map(|node| &node.signals);
                 signals.filter(|signal| signal.name == name).any(|signal| !with_status || signal.status.is_some())
             };
             let name = match item {
                 Wanted::Signal(name) | Wanted::Status(name) if !has(name, false) => {
-                    return Err(Failure::general(unknown_signal(name, instruments)));
+                    return Err(Failure::general(unknown_signal(name, nodes)));
                 }
                 Wanted::Status(name) if !has(name, true) => {
                     return Err(Failure::general(LogFailure::NoStatus { signal: name.clone() }));
@@ -70,11 +70,11 @@ fn unknown_signal(name: &str, nodes: &[Node]) -> LogFailure {
 /// meanwhile to `restarted`.
 pub(super) fn refuse_second_sync(
     master: &mut Master<'_>,
-    instruments: &[Node],
+    nodes: &[Node],
     period: Duration,
     restarted: &mut BTreeSet<NodeId>,
 ) -> Result<(), Failure> {
-    let ids: BTreeSet<CanId> = instruments.iter().map(|instrument| instrument.sync).collect();
+    let ids: BTreeSet<CanId> = nodes.iter().map(|node| node.sync).collect();
     if ids.len() > 1 {
         return Err(Failure::general(LogFailure::DifferentSyncIds));
     }
@@ -98,9 +98,9 @@ pub(super) fn refuse_second_sync(
 
 /// The share of the bus (0 to 1) that SYNC at this interval and the TPDOs after it take, at the greatest frame length;
 /// `None` if the bit rate is unknown.
-pub(super) fn sync_share(master: &Master<'_>, instruments: &[Node], period: Duration) -> Option<f64> {
+pub(super) fn sync_share(master: &Master<'_>, nodes: &[Node], period: Duration) -> Option<f64> {
     let bit_rate = master.bus().bit_rate()?;
-    let tpdos = instruments.iter().flat_map(|instrument| &instrument.tpdos).filter(|tpdo| tpdo.cob_id.is_valid());
+    let tpdos = nodes.iter().flat_map(|node| &node.tpdos).filter(|tpdo| tpdo.cob_id.is_valid());
     let answers = tpdos.filter_map(|tpdo| match tpdo.transmission? {
         Transmission::AcyclicSync => Some(MAX_FRAME_BITS),
         Transmission::Sync(every) => Some(MAX_FRAME_BITS / f64::from(every)),

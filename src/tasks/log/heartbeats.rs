@@ -38,12 +38,12 @@ pub(super) struct HeartbeatMonitor {
 
 impl HeartbeatMonitor {
     /// Watches the heartbeat of a node from now on, if it has one.
-    pub(super) fn watch(&mut self, instrument: &Node, now: Mono) {
-        self.heartbeats.remove(&instrument.id);
-        if let Some(milliseconds) = instrument.heartbeat_ms.filter(|&milliseconds| milliseconds > 0) {
+    pub(super) fn watch(&mut self, node: &Node, now: Mono) {
+        self.heartbeats.remove(&node.id);
+        if let Some(milliseconds) = node.heartbeat_ms.filter(|&milliseconds| milliseconds > 0) {
             let period = Duration::from_millis(u64::from(milliseconds));
             let heartbeat = Heartbeat { period, last: now, state: None, is_lost: false };
-            self.heartbeats.insert(instrument.id, heartbeat);
+            self.heartbeats.insert(node.id, heartbeat);
         }
     }
 
@@ -88,12 +88,12 @@ mod tests {
     fn lost_after_two_periods_and_back() {
         let at = |milliseconds| Mono::at(Duration::from_millis(milliseconds));
         let node = NodeId::new(5).expect("a node-ID");
-        let mut instrument = Node::new(node);
+        let mut recorded = Node::new(node);
         let mut monitor = HeartbeatMonitor::default();
-        monitor.watch(&instrument, at(0));
+        monitor.watch(&recorded, at(0));
         assert_eq!(monitor.next_lost(at(1_000_000)), None, "it has none");
-        instrument.heartbeat_ms = Some(100);
-        monitor.watch(&instrument, at(0));
+        recorded.heartbeat_ms = Some(100);
+        monitor.watch(&recorded, at(0));
         let operational = Life::State(NmtState::Operational);
         let stopped = Life::State(NmtState::Stopped);
         assert_eq!(monitor.take(node, operational, at(100)), HeartbeatChange::None);

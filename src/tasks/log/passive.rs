@@ -153,47 +153,47 @@ impl SetupListener {
         DataType::VisibleString.decode(bytes).ok().map(|value| value.to_string())
     }
 
-    fn update(&mut self, node: NodeId, decoder: &mut Decoder) {
-        let mut instrument = self.instrument(node);
+    fn update(&mut self, id: NodeId, decoder: &mut Decoder) {
+        let mut node = self.known_node(id);
         // Without its decimal digits an integer would be wrong by a power of ten.
-        let has_digits = |instrument: &Node, tpdo: &Tpdo| {
+        let has_digits = |node: &Node, tpdo: &Tpdo| {
             tpdo.mapping.iter().all(|entry| {
-                let signal = instrument.signals.iter().find(|signal| signal.is_value(entry.object));
+                let signal = node.signals.iter().find(|signal| signal.is_value(entry.object));
                 signal.is_none_or(|signal| {
                     let digits = ObjectId::new(0x6132, signal.channel);
-                    let is_integer = matches!(instrument.mapped_type(entry.object, entry.bits), DataType::Integer(_));
-                    !is_integer || signal.digits.is_some() || self.refused.contains(&(node, digits))
+                    let is_integer = matches!(node.mapped_type(entry.object, entry.bits), DataType::Integer(_));
+                    !is_integer || signal.digits.is_some() || self.refused.contains(&(id, digits))
                 })
             })
         };
-        let mut tpdos = std::mem::take(&mut instrument.tpdos);
-        tpdos.retain(|tpdo| has_digits(&instrument, tpdo));
-        instrument.tpdos = tpdos;
-        if !instrument.tpdos.is_empty() {
-            decoder.replace(instrument.layout(), &self.wanted);
+        let mut tpdos = std::mem::take(&mut node.tpdos);
+        tpdos.retain(|tpdo| has_digits(&node, tpdo));
+        node.tpdos = tpdos;
+        if !node.tpdos.is_empty() {
+            decoder.replace(node.layout(), &self.wanted);
             self.decoded = decoder.can_ids().collect();
-            self.not_understood.remove(&node);
+            self.not_understood.remove(&id);
         }
     }
 
     /// The node as far as it is known, with the TPDOs whose COB-ID and whole mapping are known.
-    fn instrument(&self, node: NodeId) -> Node {
-        let mut instrument = Node::new(node);
-        instrument.identity = Identity {
-            device_type: self.number(node, ObjectId::new(0x1000, 0)),
-            vendor: self.number(node, ObjectId::new(0x1018, 1)),
-            product: self.number(node, ObjectId::new(0x1018, 2)),
-            name: self.text(node, ObjectId::new(0x1008, 0)),
+    fn known_node(&self, id: NodeId) -> Node {
+        let mut node = Node::new(id);
+        node.identity = Identity {
+            device_type: self.number(id, ObjectId::new(0x1000, 0)),
+            vendor: self.number(id, ObjectId::new(0x1018, 1)),
+            product: self.number(id, ObjectId::new(0x1018, 2)),
+            name: self.text(id, ObjectId::new(0x1008, 0)),
             ..Identity::default()
         };
-        let mut traits = instrument.identity.traits();
-        let answers = self.known.iter().filter(|((of, _), _)| *of == node);
+        let mut traits = node.identity.traits();
+        let answers = self.known.iter().filter(|((of, _), _)| *of == id);
         traits.answers = answers.map(|(&(_, object), bytes)| (object, bytes.clone())).collect();
-        let model: Option<Arc<Model>> = self.overrides.get(&node).cloned().or_else(|| recognise(&traits));
-        instrument.model = model;
-        instrument.tpdos = (1..=512).filter_map(TpdoNumber::new).filter_map(|number| self.tpdo(node, number)).collect();
-        instrument.signals = self.signals(&instrument);
-        instrument
+        let model: Option<Arc<Model>> = self.overrides.get(&id).cloned().or_else(|| recognise(&traits));
+        node.model = model;
+        node.tpdos = (1..=512).filter_map(TpdoNumber::new).filter_map(|number| self.tpdo(id, number)).collect();
+        node.signals = self.signals(&node);
+        node
     }
 
     fn tpdo(&self, node: NodeId, number: TpdoNumber) -> Option<Tpdo> {
@@ -205,20 +205,20 @@ impl SetupListener {
         Some(Tpdo { number, cob_id, transmission, event_timer_ms: None, mapping: mapping? })
     }
 
-    fn signals(&self, instrument: &Node) -> Vec<Signal> {
-        let node = instrument.id;
+    fn signals(&self, node: &Node) -> Vec<Signal> {
+        let id = node.id;
         let unit_and_digits = |channel| {
-            let unit = self.number(node, ObjectId::new(0x6131, channel)).map(Unit);
-            (unit, self.byte(node, ObjectId::new(0x6132, channel)))
+            let unit = self.number(id, ObjectId::new(0x6131, channel)).map(Unit);
+            (unit, self.byte(id, ObjectId::new(0x6132, channel)))
         };
-        let described = instrument.model.as_ref().map_or(&[][..], |model| &model.description.signals);
+        let described = node.model.as_ref().map_or(&[][..], |model| &model.description.signals);
         if !described.is_empty() {
             let signal = |entry: &crate::device::description::SignalEntry| {
                 let (unit, digits) = unit_and_digits(entry.channel);
                 Signal {
                     name: entry.name.clone(),
                     channel: entry.channel,
-                    value: (entry.value, instrument.mapped_type(entry.value, 32)),
+                    value: (entry.value, node.mapped_type(entry.value, 32)),
                     also: entry.also.clone(),
                     status: entry.status,
                     marker: entry.marker,
@@ -228,7 +228,7 @@ impl SetupListener {
             };
             return described.iter().map(signal).collect();
         }
-        let entries = instrument.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
+        let entries = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
         let values = entries.filter(|entry| PROCESS_VALUES.iter().any(|&(index, _)| index == entry.object.index));
         let mut signals: Vec<Signal> = values
             .map(|entry| {
@@ -237,7 +237,7 @@ impl SetupListener {
                 Signal {
                     name: format!("ch{channel}"),
                     channel,
-                    value: (entry.object, instrument.mapped_type(entry.object, entry.bits)),
+                    value: (entry.object, node.mapped_type(entry.object, entry.bits)),
                     also: Vec::new(),
                     status: Some(ObjectId::new(0x6150, channel)),
                     marker: false,

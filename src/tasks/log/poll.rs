@@ -40,7 +40,7 @@ struct Parts {
 
 impl Poll {
     pub(super) fn new(
-        instruments: &[Node],
+        nodes: &[Node],
         wanted: &[Wanted],
         decoder: &mut Decoder,
         period: Duration,
@@ -54,8 +54,8 @@ impl Poll {
             answers: Vec::new(),
             failing: Vec::new(),
         };
-        for instrument in instruments {
-            poll.set_node(instrument, wanted, decoder)?;
+        for node in nodes {
+            poll.set_node(node, wanted, decoder)?;
         }
         Ok(poll)
     }
@@ -64,27 +64,22 @@ impl Poll {
     ///
     /// # Errors
     /// A requested signal cannot be read.
-    pub(super) fn set_node(
-        &mut self,
-        instrument: &Node,
-        wanted: &[Wanted],
-        decoder: &mut Decoder,
-    ) -> Result<(), Failure> {
+    pub(super) fn set_node(&mut self, node: &Node, wanted: &[Wanted], decoder: &mut Decoder) -> Result<(), Failure> {
         let mut number = 0;
         // Of several nodes each is polled for the signals it has. At least one has them: that was checked before.
         let has = |item: &&Wanted| match item {
-            Wanted::Signal(name) | Wanted::Status(name) => instrument.signals.iter().any(|signal| signal.name == *name),
+            Wanted::Signal(name) | Wanted::Status(name) => node.signals.iter().any(|signal| signal.name == *name),
             Wanted::Object(_) => true,
         };
         let own: Vec<Wanted> = wanted.iter().filter(has).cloned().collect();
         if own.is_empty() && !wanted.is_empty() {
             return Ok(());
         }
-        for mut target in targets(instrument, &own, &mut number)? {
+        for mut target in targets(node, &own, &mut number)? {
             target.reading.source = decoder.add_source(target.source.clone());
             // Earlier places of this node are free again.
             let is_free = |&at: &usize| {
-                !self.live[at] && self.answers[at].under_way == 0 && self.targets[at].source.node == instrument.id
+                !self.live[at] && self.answers[at].under_way == 0 && self.targets[at].source.node == node.id
             };
             match (0..self.targets.len()).find(is_free) {
                 Some(at) => (self.targets[at], self.live[at], self.failing[at]) = (target, true, false),

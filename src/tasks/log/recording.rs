@@ -27,7 +27,7 @@ use tally::Tally;
 /// A recording: what is known of the nodes, and what was recorded.
 pub(super) struct Recording<'p> {
     plan: &'p Plan,
-    pub(super) instruments: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
     pub(super) decoder: Decoder,
     pub(super) poll: Option<Poll>,
     pub(super) states: NmtStates,
@@ -48,14 +48,14 @@ pub(super) struct Recording<'p> {
 }
 
 impl<'p> Recording<'p> {
-    pub(super) fn new(instruments: Vec<Node>, plan: &'p Plan, bus: &dyn Bus) -> Recording<'p> {
+    pub(super) fn new(nodes: Vec<Node>, plan: &'p Plan, bus: &dyn Bus) -> Recording<'p> {
         // A passive recording expects no node in particular.
         let expected = plan.nodes.iter().copied().filter(|_| plan.mode != Mode::Passive);
         let mut emergencies = Emergencies::default();
-        instruments.iter().for_each(|instrument| emergencies.watch(instrument));
+        nodes.iter().for_each(|node| emergencies.watch(node));
         Recording {
             plan,
-            instruments,
+            nodes,
             decoder: Decoder::default(),
             poll: None,
             states: NmtStates::default(),
@@ -109,10 +109,10 @@ impl<'p> Recording<'p> {
     /// The recorded nodes' TPDOs, emergencies, heartbeats, SDO messages, and SYNC.
     pub(super) fn filters(&self) -> Filters {
         let mut ids: Vec<CanId> = self.decoder.can_ids().collect();
-        for instrument in &self.instruments {
-            let node = instrument.id;
-            ids.extend([instrument.emergency, instrument.sync, CanId::heartbeat(node)]);
-            ids.extend([CanId::sdo_response(node), CanId::sdo_request(node)]);
+        for node in &self.nodes {
+            let id = node.id;
+            ids.extend([node.emergency, node.sync, CanId::heartbeat(id)]);
+            ids.extend([CanId::sdo_response(id), CanId::sdo_request(id)]);
         }
         ids.sort_unstable();
         ids.dedup();

@@ -52,7 +52,7 @@ struct Pending {
 
 /// A node that was read again.
 pub(super) struct Reread {
-    pub(super) instrument: Node,
+    pub(super) node: Node,
     /// Whether it may have to be started again.
     pub(super) was_away: bool,
     /// Since when its frames made rows although its setup was uncertain.
@@ -139,10 +139,10 @@ impl Rereads {
     ) -> Option<Result<Reread, (NodeId, Error)>> {
         let (&node, pending) = self.pending.iter_mut().find(|(_, pending)| pending.has(ticket))?;
         match pending.survey.as_mut()?.take(ticket, result, master)? {
-            Ok(instrument) => {
+            Ok(node) => {
                 let (was_away, recorded_since) = (pending.was_away, pending.recorded_since);
-                self.pending.remove(&node);
-                Some(Ok(Reread { instrument, was_away, recorded_since }))
+                self.pending.remove(&node.id);
+                Some(Ok(Reread { node, was_away, recorded_since }))
             }
             Err(error) => {
                 pending.survey = None;

@@ -12,26 +12,26 @@ pub(super) fn why_nothing(recording: &Recording<'_>, plan: &Plan) -> Failure {
     if let Some(&node) = recording.listener.as_ref().and_then(|listener| listener.not_understood.first()) {
         return Failure::at(node, LogFailure::UnknownMapping);
     }
-    let Some(first) = recording.instruments.first() else {
+    let Some(first) = recording.nodes.first() else {
         return Failure::general(LogFailure::NothingReceived { within, nodes: plan.nodes.clone() });
     };
     let reason = match recording.decoder.wrong_lengths(first.id) {
         0 => silence_reason(first, plan.mode),
         _ => SilenceReason::WrongLength,
     };
-    let of_several = recording.instruments.len() > 1;
+    let of_several = recording.nodes.len() > 1;
     let cause = LogFailure::NoMeasurements { within, node: first.id, reason, of_several };
     if of_several { Failure::general(cause) } else { Failure::at(first.id, cause) }
 }
 
 /// Why a node with this setup sends no measurements.
-pub(super) fn silence_reason(instrument: &Node, mode: Mode) -> SilenceReason {
+pub(super) fn silence_reason(node: &Node, mode: Mode) -> SilenceReason {
     if matches!(mode, Mode::Poll(_)) {
         return SilenceReason::NoAnswer;
     }
-    let valid: Vec<&Tpdo> = instrument.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).collect();
+    let valid: Vec<&Tpdo> = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).collect();
     let waits_for_sync = |tpdo: &&&Tpdo| tpdo.transmission.is_some_and(|transmission| transmission.needs_sync());
-    if instrument.tpdos.is_empty() {
+    if node.tpdos.is_empty() {
         SilenceReason::NoTpdo
     } else if valid.is_empty() {
         SilenceReason::AllTpdosDisabled

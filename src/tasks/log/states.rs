@@ -27,19 +27,19 @@ impl NmtStates {
     pub(super) fn start(
         &mut self,
         master: &mut Master<'_>,
-        instruments: &[Node],
+        nodes: &[Node],
         plan: &Plan,
         restarted: &mut BTreeSet<NodeId>,
     ) -> Result<(), Error> {
         if !plan.nmt || matches!(plan.mode, Mode::Poll(_) | Mode::Passive) {
             return Ok(());
         }
-        let known = heartbeats(master, instruments, restarted)?;
-        for instrument in instruments {
-            let before = known.get(&instrument.id).copied();
+        let known = heartbeats(master, nodes, restarted)?;
+        for node in nodes {
+            let before = known.get(&node.id).copied();
             if before != Some(NmtState::Operational) {
-                self.started.insert(instrument.id, before);
-                master.send(NmtCommand::Start.frame(Some(instrument.id)));
+                self.started.insert(node.id, before);
+                master.send(NmtCommand::Start.frame(Some(node.id)));
             }
         }
         Ok(())
@@ -82,15 +82,14 @@ impl NmtStates {
 /// The states from heartbeats. Waits as long as the slowest heartbeat needs.
 fn heartbeats(
     master: &mut Master<'_>,
-    instruments: &[Node],
+    nodes: &[Node],
     restarted: &mut BTreeSet<NodeId>,
 ) -> Result<BTreeMap<NodeId, NmtState>, Error> {
-    let period = |instrument: &Node| {
-        let period = Duration::from_millis(u64::from(instrument.heartbeat_ms?));
+    let period = |node: &Node| {
+        let period = Duration::from_millis(u64::from(node.heartbeat_ms?));
         (!period.is_zero() && period <= MAX_HEARTBEAT_PERIOD).then_some(period)
     };
-    let expected: BTreeMap<NodeId, Duration> =
-        instruments.iter().filter_map(|instrument| Some((instrument.id, period(instrument)?))).collect();
+    let expected: BTreeMap<NodeId, Duration> = nodes.iter().filter_map(|node| Some((node.id, period(node)?))).collect();
     let mut known = BTreeMap::new();
     let Some(longest) = expected.values().max() else { return Ok(known) };
     let until = master.now() + *longest * 3 / 2;

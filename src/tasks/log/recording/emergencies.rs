@@ -19,17 +19,17 @@ pub(super) struct Emergencies {
 
 impl Emergencies {
     /// Takes the COB-ID (1014h) and the description of a node, instead of those known before.
-    pub(super) fn watch(&mut self, instrument: &Node) {
-        let node = instrument.id;
-        self.nodes.retain(|_, of| *of != node);
-        self.nodes.insert(instrument.emergency, node);
-        self.meanings.retain(|(of, _), _| *of != node);
-        let described = instrument.model.as_ref().map_or(&[][..], |model| &model.description.emergencies);
-        self.meanings.extend(described.iter().map(|entry| ((node, entry.code), entry.text.clone())));
-        let quirks = instrument.model.as_ref().map_or(&[][..], |model| &model.description.quirks);
-        self.repeating.remove(&node);
+    pub(super) fn watch(&mut self, node: &Node) {
+        let id = node.id;
+        self.nodes.retain(|_, of| *of != id);
+        self.nodes.insert(node.emergency, id);
+        self.meanings.retain(|(of, _), _| *of != id);
+        let described = node.model.as_ref().map_or(&[][..], |model| &model.description.emergencies);
+        self.meanings.extend(described.iter().map(|entry| ((id, entry.code), entry.text.clone())));
+        let quirks = node.model.as_ref().map_or(&[][..], |model| &model.description.quirks);
+        self.repeating.remove(&id);
         if quirks.contains(&Quirk::EmergencyRepeats) {
-            self.repeating.insert(node, None);
+            self.repeating.insert(id, None);
         }
     }
 

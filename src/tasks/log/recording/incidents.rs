@@ -95,7 +95,7 @@ impl Recording<'_> {
     /// The setup of a node is uncertain: it is read again, and until then its frames make no rows. A passive recording
     /// cannot read.
     fn request_reread(&mut self, node: NodeId, why: RereadReason, now: Mono, master: &mut Master<'_>) {
-        let is_recorded = self.listener.is_none() && self.instruments.iter().any(|known| known.id == node);
+        let is_recorded = self.listener.is_none() && self.nodes.iter().any(|known| known.id == node);
         if !is_recorded || !self.rereads.request(node, why, now, master) {
             return;
         }
@@ -109,7 +109,7 @@ impl Recording<'_> {
     }
 
     fn request_all_rereads(&mut self, why: RereadReason, now: Mono, master: &mut Master<'_>) {
-        let nodes: Vec<NodeId> = self.instruments.iter().map(|instrument| instrument.id).collect();
+        let nodes: Vec<NodeId> = self.nodes.iter().map(|node| node.id).collect();
         nodes.into_iter().for_each(|node| self.request_reread(node, why, now, master));
     }
 
@@ -168,36 +168,36 @@ impl Recording<'_> {
 
     /// Continues with the current setup of a node.
     fn update(&mut self, reread: Reread, master: &mut Master<'_>, observer: &mut dyn Observer) -> Result<(), Error> {
-        let Reread { instrument, was_away, recorded_since } = reread;
-        let (node, at) = (instrument.id, master.bus().now());
-        let Some(place) = self.instruments.iter().position(|known| known.id == node) else { return Ok(()) };
-        let changes = changes(&self.instruments[place], &instrument);
+        let Reread { node, was_away, recorded_since } = reread;
+        let (id, at) = (node.id, master.bus().now());
+        let Some(place) = self.nodes.iter().position(|known| known.id == id) else { return Ok(()) };
+        let changes = changes(&self.nodes[place], &node);
         match &mut self.poll {
             Some(poll) => {
-                if let Err(failure) = poll.set_node(&instrument, &self.plan.wanted, &mut self.decoder) {
-                    observer.note(&Note::Unreadable(node, Box::new(failure)), at);
+                if let Err(failure) = poll.set_node(&node, &self.plan.wanted, &mut self.decoder) {
+                    observer.note(&Note::Unreadable(id, Box::new(failure)), at);
                 }
             }
-            None => self.decoder.replace(instrument.layout(), &self.plan.wanted),
+            None => self.decoder.replace(node.layout(), &self.plan.wanted),
         }
         self.update_sources();
-        self.emergencies.watch(&instrument);
-        self.liveness.watch_heartbeat(&instrument, at.mono);
-        self.liveness.restart(node, at.mono);
-        self.instruments[place] = instrument;
+        self.emergencies.watch(&node);
+        self.liveness.watch_heartbeat(&node, at.mono);
+        self.liveness.restart(id, at.mono);
+        self.nodes[place] = node;
         master.listen(&self.filters())?;
         if was_away {
-            self.states.start_again(node, master);
+            self.states.start_again(id, master);
         }
         if !changes.is_empty() {
             self.tally.events.changes += 1;
-            self.rereads.forget_wrong_length(node);
-            self.wrong_length_reported.remove(&node);
+            self.rereads.forget_wrong_length(id);
+            self.wrong_length_reported.remove(&id);
             if let Some(since) = recorded_since {
-                self.remark(Remark::ChangedWhileFramesLost(node, at.mono.since(since)), at, observer);
+                self.remark(Remark::ChangedWhileFramesLost(id, at.mono.since(since)), at, observer);
             }
         }
-        observer.note(&Note::ReadAgain(node, changes), at);
+        observer.note(&Note::ReadAgain(id, changes), at);
         self.report_shared_cob_ids(at, observer);
         Ok(())
     }

@@ -46,8 +46,8 @@ impl Liveness {
     }
 
     /// Watches the heartbeat of a node from now on, if it has one.
-    pub(super) fn watch_heartbeat(&mut self, instrument: &Node, now: Mono) {
-        self.heartbeats.watch(instrument, now);
+    pub(super) fn watch_heartbeat(&mut self, node: &Node, now: Mono) {
+        self.heartbeats.watch(node, now);
     }
 
     /// Takes samples of a node. Returns whether it had been reported as silent.

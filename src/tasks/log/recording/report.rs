@@ -42,11 +42,11 @@ impl Recording<'_> {
         if self.tally.rows == 0 {
             return;
         }
-        for &node in lost {
-            if let Some(instrument) = self.instruments.iter().find(|instrument| instrument.id == node)
-                && !self.liveness.has_sent(node)
+        for &id in lost {
+            if let Some(node) = self.nodes.iter().find(|node| node.id == id)
+                && !self.liveness.has_sent(id)
             {
-                self.remarks.push(Remark::NoMeasurements(node, silence_reason(instrument, self.plan.mode)));
+                self.remarks.push(Remark::NoMeasurements(id, silence_reason(node, self.plan.mode)));
             }
         }
     }

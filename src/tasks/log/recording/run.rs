@@ -55,12 +55,12 @@ impl Recording<'_> {
         }
         let start = master.now();
         self.tally.extend_to(start);
-        for instrument in &self.instruments {
-            self.liveness.watch_heartbeat(instrument, start);
+        for node in &self.nodes {
+            self.liveness.watch_heartbeat(node, start);
         }
         let mut producer = match self.plan.mode {
             Mode::Sync(interval) => {
-                let id = self.instruments.first().map_or(CanId::SYNC, |first| first.sync);
+                let id = self.nodes.first().map_or(CanId::SYNC, |first| first.sync);
                 Some(Producer::new(interval, id, start))
             }
             _ => None,
