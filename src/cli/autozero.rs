@@ -8,7 +8,7 @@ use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
 use crate::measure::sample::Number;
-use crate::output::{csv, json, table};
+use crate::output::{csv, json, notes, table};
 use crate::tasks::Kind;
 use crate::tasks::autozero::{Limit, Options, Zeroed, autozero};
 use clap::Args;
@@ -84,8 +84,8 @@ impl Autozero {
         let mut each =
             each(global, &self.nodes, |master, node, overrides| autozero(master, node, overrides, &options))?;
         print(&each.done, global.format).map_err(stdout)?;
-        for (node, zeroed) in &each.done {
-            zeroed.notes.iter().for_each(|note| global.console().note(&format!("node {node}: {note}")));
+        for (_, zeroed) in &each.done {
+            zeroed.notes.iter().for_each(|note| notes::print(&global.console(), note));
         }
         if self.nodes == Nodes::All {
             each.excuse(global, |failure| failure.kind() == Kind::Usage);

@@ -1,5 +1,6 @@
 //! JSON Lines: one object a line.
 
+use super::notes::{Told, notes};
 use super::text::steers;
 use crate::canopen::id::NodeId;
 use crate::measure::sample::{Number, Source, Status};
@@ -101,6 +102,7 @@ pub fn zeroed(out: &mut dyn Write, node: NodeId, zeroed: &Zeroed) -> io::Result<
         offset_before: JsonNumber,
         offset: JsonNumber,
         stored: bool,
+        notes: Vec<Told>,
     }
     // Two digits more than those that tell something: a mean has as many as it likes.
     let round = |mean: f64| format!("{mean:.*}", zeroed.decimals + 2).parse().unwrap_or(mean);
@@ -113,6 +115,7 @@ pub fn zeroed(out: &mut dyn Write, node: NodeId, zeroed: &Zeroed) -> io::Result<
         offset_before: JsonNumber(zeroed.offset_before),
         offset: JsonNumber(zeroed.offset),
         stored: zeroed.stored,
+        notes: notes(&zeroed.notes),
     };
     line(out, &row)
 }

@@ -3,6 +3,7 @@
 //! Each has a code for scripts, which never changes, and a message for people. Some have a command to type.
 
 use super::console::Console;
+use super::failure::autozero;
 use super::failure::host::up_by_hand;
 use crate::canopen::id::NodeId;
 use crate::tasks::{Effect, Fact, Note};
@@ -53,6 +54,7 @@ pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> Told {
         .command("set it back", up_by_hand(interface, *bit_rate)),
         Effect::WasOperational => Told::new("was-operational", "the node was operational before")
             .command("start it again", format!("cangauge nmt start {number}")),
+        Effect::Autozero(effect) => autozero::effect(&number, effect),
         Effect::Text(text) | Effect::Hint(text) => Told::new("other", text.clone()),
     }
 }
@@ -68,6 +70,8 @@ pub fn note(note: &Note) -> Told {
             "left-operational",
             "the node was started; its previous state is unknown, so it stays operational",
         ),
+        Fact::Autozero(fact) => autozero::fact(note.node, fact),
+        Fact::Text(text) => Told::new("other", text.clone()),
         Fact::StateAsBooted => Told::new(
             "state-as-booted",
             "the state before the reset is unknown; the node is in the state in which it boots",

@@ -9,9 +9,9 @@ mod failure;
 mod safety;
 mod samples;
 
-pub use failure::AutozeroFailure;
+pub use failure::{AutozeroEffect, AutozeroFact, AutozeroFailure, OffsetChange, Quantity, Undo};
 
-pub use safety::Limit;
+pub use safety::{Limit, Objection};
 
 use crate::canopen::id::NodeId;
 use crate::device::description::StoreGroup;
@@ -23,9 +23,9 @@ use crate::node::Overrides;
 use crate::node::survey::survey_nodes;
 use crate::tasks::signature::{may_have_acted, sign};
 use crate::tasks::store::{self, Group, Plan};
-use crate::tasks::{Failure, Kind};
+use crate::tasks::{Effect, Fact, Failure, Kind, Note};
 use channel::{Channel, Offset};
-use safety::{Hint, Limits, Measured};
+use safety::{Limits, Measured};
 use samples::Samples;
 use std::time::Duration;
 
@@ -67,8 +67,8 @@ pub struct Zeroed {
     pub stored: bool,
     /// Digits behind the point that tell something of this range.
     pub decimals: usize,
-    /// What else is worth knowing, in whole sentences without the node.
-    pub notes: Vec<String>,
+    /// Notes: skipped checks, how to undo it, whether it is stored.
+    pub notes: Vec<Note>,
 }
 
 impl Zeroed {
@@ -94,8 +94,8 @@ struct Procedure<'a> {
 struct Written {
     offsets: Vec<Offset>,
     after: Samples,
-    /// What proved that it acted, where no acknowledge did.
-    shown_by: Option<&'static str>,
+    /// If no acknowledge came: whether the offset, else the reading, proves that the device acted.
+    is_offset_proof: Option<bool>,
 }
 
 /// Sets the zero of a channel, unless something speaks against it. With `store` the group that keeps the offset is
@@ -111,7 +111,7 @@ pub fn autozero(
     options: &Options,
 ) -> Result<Zeroed, Failure> {
     let unchanged = |failure: Failure| match failure.kind() {
-        Kind::Interrupted => failure.knowing(node, "nothing was changed"),
+        Kind::Interrupted => failure.with(node, Effect::NothingChanged),
         _ => failure,
     };
     let device = survey_nodes(master, &[node], overrides).map_err(|error| unchanged(error.into()))?;
@@ -119,7 +119,7 @@ pub fn autozero(
     let procedure = Procedure::prepare(master, &device, options).map_err(unchanged)?;
     let mut notes = procedure.check(options)?;
     if options.dry_run {
-        notes.push("nothing was changed".to_owned());
+        notes.push(Note::of_node(node, AutozeroFact::NothingChanged));
         return Ok(procedure.report(None, notes));
     }
     let plan = match options.store {
@@ -128,9 +128,10 @@ pub fn autozero(
     };
     let written = procedure.write(master, options.samples)?;
     procedure.prove(&written)?;
-    notes.extend(written.shown_by.map(|what| format!("no answer came to the signature; {what} shows that it acted")));
+    let proved_by = |offset| Note::of_node(node, AutozeroFact::ProvedBy { offset });
+    notes.extend(written.is_offset_proof.map(proved_by));
     let mut report = procedure.report(Some(&written), notes);
-    report.notes.push(procedure.undo(&written.offsets, options.store));
+    report.notes.push(Note::of_node(node, AutozeroFact::Undo(procedure.undo(&written.offsets, options.store))));
     procedure.keep(master, plan, &written, &mut report)?;
     Ok(report)
 }
@@ -142,9 +143,8 @@ impl<'a> Procedure<'a> {
         let unit = channel.signal.unit;
         let limits = Limits::new(options.limit, channel.range, unit);
         if let (Limit::Value(_, Some(named)), None) = (options.limit, limits) {
-            let present = unit.map_or_else(|| "in no known unit".to_owned(), |unit| format!("in {unit}"));
-            let message = format!("{} is {present}, and a limit in {named} does not convert", channel.signal.name);
-            return Err(Failure::of_node(Kind::Usage, device.id, message));
+            let cause = AutozeroFailure::LimitUnit { signal: channel.signal.name, unit, limit: named };
+            return Err(Failure::at(device.id, cause));
         }
         let offsets = channel::offsets(master, device, &channel)?;
         let group = group(master, device, &channel, options.store)?;
@@ -154,43 +154,38 @@ impl<'a> Procedure<'a> {
     }
 
     /// What speaks against it: a failure, or with `force` notes.
-    fn check(&self, options: &Options) -> Result<Vec<String>, Failure> {
+    fn check(&self, options: &Options) -> Result<Vec<Note>, Failure> {
         let (node, channel) = (self.device.id, &self.channel);
         if self.before.booted {
-            let message = "it restarted while it was measured: nothing was changed";
-            return Err(Failure::of_node(Kind::Unexpected, node, message));
+            return Err(Failure::at(node, AutozeroFailure::RestartedBefore));
         }
-        let unit = unit_text(channel.signal.unit);
         let measured = Measured {
             signal: &channel.signal.name,
-            unit: &unit,
+            unit: channel.signal.unit,
             decimals: self.decimals,
             absolute: channel.absolute,
             before: &self.before,
             offset: self.offsets.first().map(|offset| offset.number.as_f64()),
         };
-        let objections = measured.objections(self.limits.as_ref());
-        let first = match objections.first() {
-            Some(first) if !options.force => first,
-            _ => return Ok(objections.into_iter().map(|objection| format!("forced: {}", objection.reason)).collect()),
-        };
-        let hint = match &first.hint {
-            Hint::Say(text) => text.clone(),
-            Hint::Limit(enough) => {
-                let choice = options.channel.map(|channel| format!(" --channel {channel}")).unwrap_or_default();
-                format!("vent the line, or allow it: cangauge autozero {node}{choice} --limit {enough}")
-            }
-        };
-        let message = format!("{}: nothing was changed", first.reason);
-        Err(Failure::of_node(Kind::CheckFailed, node, message).hint(hint))
+        let mut objections = measured.objections(self.limits.as_ref());
+        if objections.is_empty() || options.force {
+            let forced = |objection| Note::of_node(node, AutozeroFact::Forced(objection));
+            return Ok(objections.into_iter().map(forced).collect());
+        }
+        let cause = AutozeroFailure::Unsafe { objection: objections.swap_remove(0), channel: options.channel };
+        Err(Failure::at(node, cause))
     }
 
     /// Writes the signature once, and measures again.
     fn write(&self, master: &mut Master<'_>, count: u32) -> Result<Written, Failure> {
         let (device, channel) = (self.device, &self.channel);
         let node = device.id;
-        let sent = format!("the signature went to {} once and is not repeated", channel.object);
-        let unsure = |failure: Failure| failure.knowing(node, &sent).knowing(node, self.was()).hint(self.look());
+        let sent = AutozeroEffect::SignatureSent { object: channel.object };
+        let signal = || channel.signal.name.clone();
+        let offset = self.offsets.first().map(|offset| (offset.object, offset.number));
+        let unsure = |failure: Failure| {
+            failure.with(node, sent.clone()).with(node, AutozeroEffect::OffsetBefore { offset, signal: signal() })
+        };
         let result = sign(master, device, channel.object, &channel.signature, Duration::ZERO);
         let error = match result.map_err(|error| unsure(error.into()))? {
             Ok(()) => None,
@@ -201,20 +196,16 @@ impl<'a> Procedure<'a> {
         let after = samples::take(master, device, &channel.signal.name, count).map_err(unsure)?;
         // Last, so that a device that has restarted meanwhile shows the offset of before.
         let offsets = channel::offsets(master, device, channel).map_err(unsure)?;
-        let shown_by = match error {
+        let is_offset_proof = match error {
             None => None,
-            Some(_) if self.moved(&offsets).is_some() => Some("the offset"),
-            Some(_) if self.shows_it(&after) && self.is_zero(&after) => Some("the reading"),
+            Some(_) if self.moved(&offsets).is_some() => Some(true),
+            Some(_) if self.shows_it(&after) && self.is_zero(&after) => Some(false),
             Some(error) => {
-                let now = if self.offsets.is_empty() {
-                    "no offset can be read here, and the reading has not come to zero"
-                } else {
-                    "the offset is as before"
-                };
-                return Err(Failure::from(error).knowing(node, sent).knowing(node, now).hint(self.look()));
+                let seen = AutozeroEffect::NoChangeSeen { offset: offset.map(|(object, _)| object), signal: signal() };
+                return Err(Failure::from(error).with(node, sent).with(node, seen));
             }
         };
-        Ok(Written { offsets, after, shown_by })
+        Ok(Written { offsets, after, is_offset_proof })
     }
 
     /// The offset that is another one now, as it was and as it is.
@@ -251,31 +242,26 @@ impl<'a> Procedure<'a> {
         self.before.mean().is_some_and(|before| before.abs() <= self.before.spread() + digit)
     }
 
-    /// That the reading is zero now.
+    /// Checks that the reading is zero afterwards.
     fn prove(&self, written: &Written) -> Result<(), Failure> {
         let node = self.device.id;
-        let fail = |message: String| {
-            Err(Failure::of_node(Kind::Unexpected, node, message).hint(self.undo(&written.offsets, false)))
+        let fail = |cause: AutozeroFailure| {
+            Err(Failure::at(node, cause).with(node, AutozeroEffect::Undo(self.undo(&written.offsets, false))))
         };
         if written.after.booted {
-            return fail("it took the signature and restarted: a zero that was not stored is gone".to_owned());
+            return fail(AutozeroFailure::RestartedAfter);
         }
-        let acted = self.moved(&written.offsets).is_some() || self.shows_it(&written.after) || self.was_zero();
-        if acted && self.is_zero(&written.after) {
+        let has_acted = self.moved(&written.offsets).is_some() || self.shows_it(&written.after) || self.was_zero();
+        if has_acted && self.is_zero(&written.after) {
             return Ok(());
         }
-        let signal = &self.channel.signal.name;
-        let reads = match written.after.mean() {
-            Some(mean) if acted => format!("{signal} reads {} afterwards, which is not zero", self.show(mean)),
-            Some(mean) => format!("nothing has changed: {signal} reads {}", self.show(mean)),
-            None => format!("{signal} has no valid value afterwards"),
-        };
         let offset = match self.moved(&written.offsets) {
-            Some((old, new)) => format!("the offset went from {} to {}", old.number, new.number),
-            None if self.offsets.is_empty() => "no offset can be read here".to_owned(),
-            None => "the offset is as before".to_owned(),
+            Some((old, new)) => OffsetChange::Changed(old.number, new.number),
+            None if self.offsets.is_empty() => OffsetChange::Unreadable,
+            None => OffsetChange::Unchanged,
         };
-        fail(format!("it took the signature, and {reads}; {offset}"))
+        let reading = written.after.mean().map(|mean| self.quantity(mean));
+        fail(AutozeroFailure::NotZero { signal: self.channel.signal.name.clone(), reading, has_acted, offset })
     }
 
     /// Stores, if that was asked for, and looks whether what was stored is this zero: a device that restarts just
@@ -289,28 +275,24 @@ impl<'a> Procedure<'a> {
     ) -> Result<(), Failure> {
         let node = self.device.id;
         let Some(plan) = plan else {
-            let group = self.group.as_str();
-            report.notes.push(format!("not stored, gone with the power: cangauge store {node} --group {group}"));
+            report.notes.push(Note::of_node(node, AutozeroFact::NotStored { group: self.group }));
             return Ok(());
         };
-        let set = match report.shift() {
-            Some(shift) => format!("the zero was moved by {}", self.show(shift)),
-            None => "the zero was set".to_owned(),
-        };
-        let done = store::carry_out(master, self.device, plan, false).map_err(|failure| failure.knowing(node, &set))?;
+        let moved = AutozeroEffect::Moved(report.shift().map(|shift| self.quantity(shift)));
+        let done =
+            store::carry_out(master, self.device, plan, false).map_err(|failure| failure.with(node, moved.clone()))?;
         let now = channel::offsets(master, self.device, &self.channel)
-            .map_err(|failure| failure.knowing(node, format!("{set}, and stored")))?;
+            .map_err(|failure| failure.with(node, moved).with(node, AutozeroEffect::Stored))?;
         if now != written.offsets {
-            let message = "the offset has changed since it was set: what was stored is not this zero";
-            return Err(Failure::of_node(Kind::Unexpected, node, message).hint(self.look()));
+            return Err(Failure::at(node, AutozeroFailure::OtherOffsetStored));
         }
         report.stored = true;
-        report.notes.push(format!("stored: {}", done.groups()));
-        report.notes.extend(done.notes);
+        report.notes.push(Note::of_node(node, AutozeroFact::Stored { groups: done.groups() }));
+        report.notes.extend(done.notes.into_iter().map(|text| Note::of_node(node, Fact::Text(text))));
         Ok(())
     }
 
-    fn report(&self, written: Option<&Written>, notes: Vec<String>) -> Zeroed {
+    fn report(&self, written: Option<&Written>, notes: Vec<Note>) -> Zeroed {
         let moved = written.and_then(|written| self.moved(&written.offsets));
         let still = || written.and_then(|written| self.offsets.first().zip(written.offsets.first()));
         let (old, new) = match moved.or_else(still) {
@@ -332,50 +314,20 @@ impl<'a> Procedure<'a> {
         }
     }
 
-    fn show(&self, value: f64) -> String {
-        let unit = unit_text(self.channel.signal.unit);
-        format!("{value:.*} {unit}", self.decimals).trim_end().to_owned()
+    fn quantity(&self, value: f64) -> Quantity {
+        Quantity { value, unit: self.channel.signal.unit, decimals: self.decimals }
     }
 
-    /// The offset as it was.
-    fn was(&self) -> String {
-        match self.offsets.first() {
-            Some(offset) => format!("the offset {} was {}", offset.object, offset.number),
-            None => "no offset can be read here".to_owned(),
-        }
-    }
-
-    /// How to see what became of it.
-    fn look(&self) -> String {
-        let (node, signal) = (self.device.id, &self.channel.signal.name);
-        match self.offsets.first() {
-            Some(offset) => format!("see what became of it: cangauge sdo read {node} {}", offset.object),
-            None => format!("see what became of it: cangauge read {node} {signal}"),
-        }
-    }
-
-    /// The line that takes it back.
-    fn undo(&self, now: &[Offset], stored: bool) -> String {
-        let node = self.device.id;
-        let written = |object| {
+    /// How to undo it.
+    fn undo(&self, now: &[Offset], stored: bool) -> Undo {
+        let is_writable = |object| {
             let entry = self.device.model.as_ref().and_then(|model| model.dictionary.get(object));
             entry.is_none_or(|entry| entry.access.is_writable())
         };
         match self.moved(now) {
-            Some((old, _)) if written(old.object) => {
-                let line =
-                    format!("undo: cangauge sdo write {node} {} {} --type {}", old.object, old.value, old.data_type);
-                let again = if stored {
-                    format!(" && cangauge store {node} --group {}", self.group.as_str())
-                } else {
-                    String::new()
-                };
-                line + &again
-            }
-            _ if stored => {
-                format!("undo: no offset to be written is known; back to delivery: cangauge restore {node} --reset")
-            }
-            _ => format!("undo: what is not stored ends with a reset: cangauge nmt reset {node}"),
+            Some((old, _)) if is_writable(old.object) => Undo::write(old, stored.then_some(self.group)),
+            _ if stored => Undo::Restore,
+            _ => Undo::Reset,
         }
     }
 }

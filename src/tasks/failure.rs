@@ -155,6 +155,7 @@ impl Cause {
                 SdoFailure::Refused(code) => Some(code),
                 _ => None,
             },
+            Cause::Autozero(cause) => cause.abort(),
             Cause::Text(text) => text.abort,
             _ => None,
         }

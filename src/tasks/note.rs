@@ -2,6 +2,7 @@
 //!
 //! These types contain no text for people. [`crate::output::notes`] turns them into text.
 
+use super::autozero::{AutozeroEffect, AutozeroFact};
 use crate::canopen::id::NodeId;
 
 /// What a task that failed had changed before, or what state it left behind.
@@ -20,6 +21,8 @@ pub enum Effect {
     },
     /// The node was operational and may not be operational any more.
     WasOperational,
+    /// An autozero failed.
+    Autozero(AutozeroEffect),
     /// Text of a task that has no typed effects yet.
     Text(String),
     /// The hint of a task that has no typed causes yet.
@@ -44,6 +47,10 @@ pub enum Fact {
     OperationalAgain,
     /// The node was started, its previous state is unknown, and it stays operational.
     LeftOperational,
+    /// An autozero succeeded.
+    Autozero(AutozeroFact),
+    /// Text of a task that has no typed notes yet.
+    Text(String),
     /// The state of the node before a reset is unknown; it is in the state in which it boots.
     StateAsBooted,
 }
@@ -52,7 +59,12 @@ impl Fact {
     /// Whether the user should act on it: printed as a warning.
     pub fn is_warning(&self) -> bool {
         match self {
-            Fact::KeptUntilPowerOff | Fact::OperationalAgain | Fact::LeftOperational | Fact::StateAsBooted => false,
+            Fact::KeptUntilPowerOff
+            | Fact::OperationalAgain
+            | Fact::LeftOperational
+            | Fact::StateAsBooted
+            | Fact::Autozero(_)
+            | Fact::Text(_) => false,
         }
     }
 }

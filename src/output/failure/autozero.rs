@@ -1,10 +1,187 @@
-//! Text for causes: a channel was not set to zero.
+//! Text for causes, effects and notes: a channel was not set to zero, and what to report about a zero that was set.
 
 use super::Words;
+use crate::canopen::id::NodeId;
+use crate::output::notes::Told;
 use crate::tasks::Failure;
-use crate::tasks::autozero::AutozeroFailure;
+use crate::tasks::autozero::{AutozeroEffect, AutozeroFact, AutozeroFailure, Objection, OffsetChange, Quantity, Undo};
 
 /// The message and the hint for a cause.
-pub(super) fn words(_failure: &Failure, cause: &AutozeroFailure) -> Words {
-    match *cause {}
+pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
+    let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
+    match cause {
+        AutozeroFailure::NoAutozero { title } => Words::new(format!("{title} has no autozero")),
+        AutozeroFailure::NoSuchChannel { title, channel, available } => {
+            Words::new(format!("{title} has no autozero of channel {channel}"))
+                .hint(format!("it has one of: {}", list(available)))
+        }
+        AutozeroFailure::WhichChannel { available } if available.is_empty() => {
+            Words::new("the device has several channels: choose one")
+                .hint(format!("cangauge autozero {node} --channel 1"))
+        }
+        AutozeroFailure::WhichChannel { available } => Words::new("the device has several channels: choose one")
+            .hint(format!("--channel with one of {}", list(available))),
+        AutozeroFailure::NoMeasuredValue => Words::new("it has no measured value of CiA 404"),
+        AutozeroFailure::NoMeasuredValueOnChannel { channel } => {
+            Words::new(format!("it has no measured value on channel {channel}"))
+        }
+        AutozeroFailure::NoObject { channel, object, .. } => {
+            Words::new(format!("it has no autozero of channel {channel} (no {object})"))
+        }
+        AutozeroFailure::LimitUnit { signal, unit, limit } => {
+            let present = unit.map_or_else(|| "in no known unit".to_owned(), |unit| format!("in {unit}"));
+            Words::new(format!("{signal} is {present}, and a limit in {limit} does not convert"))
+        }
+        AutozeroFailure::RestartedBefore => {
+            Words::new("the device restarted during the measurement: nothing was changed")
+        }
+        AutozeroFailure::Unsafe { objection, channel } => {
+            let words = Words::new(format!("{}: nothing was changed", reason(objection)));
+            let choice = channel.map(|channel| format!(" --channel {channel}")).unwrap_or_default();
+            words.hint(way_out(objection, &format!("cangauge autozero {node}{choice}")))
+        }
+        AutozeroFailure::RestartedAfter => {
+            Words::new("the device accepted the signature and restarted: a zero that is not stored is lost")
+        }
+        AutozeroFailure::NotZero { signal, reading, has_acted, offset } => {
+            let reads = match reading {
+                Some(mean) if *has_acted => format!("{signal} reads {} afterwards, not zero", quantity(*mean)),
+                Some(mean) => format!("nothing has changed: {signal} reads {}", quantity(*mean)),
+                None => format!("{signal} has no valid value afterwards"),
+            };
+            let offset = match offset {
+                OffsetChange::Changed(old, new) => format!("the offset went from {old} to {new}"),
+                OffsetChange::Unchanged => "the offset is as before".to_owned(),
+                OffsetChange::Unreadable => "no offset can be read here".to_owned(),
+            };
+            Words::new(format!("the device accepted the signature, and {reads}; {offset}"))
+        }
+        AutozeroFailure::OtherOffsetStored => {
+            Words::new("the offset has changed since it was set: the stored offset is not this zero")
+        }
+    }
+}
+
+fn list(channels: &[u8]) -> String {
+    channels.iter().map(u8::to_string).collect::<Vec<_>>().join(", ")
+}
+
+fn quantity(quantity: Quantity) -> String {
+    let unit = quantity.unit.map(|unit| unit.to_string()).unwrap_or_default();
+    format!("{:.*} {unit}", quantity.decimals, quantity.value).trim_end().to_owned()
+}
+
+/// Why the safety checks stopped it.
+fn reason(objection: &Objection) -> String {
+    let part = |percent: &Option<f64>, otherwise: &str| {
+        percent.map_or_else(|| otherwise.to_owned(), |percent| format!("{percent} % of the range"))
+    };
+    match objection {
+        Objection::Absolute => {
+            "the sensor measures absolute pressure: if it is vented, it reads the air pressure, not zero".to_owned()
+        }
+        Objection::Invalid { signal, status } => format!("{signal} has no valid value: {status}"),
+        Objection::RangeUnknown { signal } => {
+            format!("the measuring range of {signal} is unknown, so the limit for a zero is unknown too")
+        }
+        Objection::TooFar { signal, reading, limit, percent, .. } => {
+            format!("{signal} is {}, limit {} ({})", quantity(*reading), quantity(*limit), part(percent, "--limit"))
+        }
+        Objection::Unsteady { signal, spread, limit, percent } => format!(
+            "the readings of {signal} vary by {} (limit {}, {}): the pressure is not steady",
+            quantity(*spread),
+            quantity(*limit),
+            part(percent, "half of --limit")
+        ),
+        Objection::TotalOffset { offset, total, limit } => format!(
+            "the offset is already {} and would become {}, limit {}",
+            quantity(*offset),
+            quantity(*total),
+            quantity(*limit)
+        ),
+    }
+}
+
+/// What to do about an objection.
+fn way_out(objection: &Objection, command: &str) -> String {
+    match objection {
+        Objection::Absolute => "apply a vacuum and use --force".to_owned(),
+        Objection::Invalid { .. } => "find the reason, then try again".to_owned(),
+        Objection::RangeUnknown { .. } => "state the largest reading to accept as zero: --limit VALUE".to_owned(),
+        Objection::TooFar { enough, .. } => {
+            format!("vent or isolate the line; if the limit is too low: {command} --limit {enough}")
+        }
+        Objection::Unsteady { .. } => "wait until the pressure is steady, or use --force".to_owned(),
+        Objection::TotalOffset { .. } => {
+            "several small offsets have added up: check the sensor, or use --force".to_owned()
+        }
+    }
+}
+
+/// The text for an effect.
+pub(in crate::output) fn effect(node: &str, effect: &AutozeroEffect) -> Told {
+    let look = |told: Told, offset: &Option<String>, signal: &str| match offset {
+        Some(object) => told.command("show the present offset", format!("cangauge sdo read {node} {object}")),
+        None => told.command("show the present reading", format!("cangauge read {node} {signal}")),
+    };
+    match effect {
+        AutozeroEffect::SignatureSent { object } => {
+            Told::new("signature-sent", format!("the signature was sent to {object} once and is not repeated"))
+        }
+        AutozeroEffect::OffsetBefore { offset, signal } => {
+            let text = match offset {
+                Some((object, number)) => format!("the offset {object} was {number}"),
+                None => "no offset can be read here".to_owned(),
+            };
+            look(Told::new("offset-before", text), &offset.map(|(object, _)| object.to_string()), signal)
+        }
+        AutozeroEffect::NoChangeSeen { offset, signal } => {
+            let text = match offset {
+                Some(_) => "the offset is as before",
+                None => "no offset can be read here, and the reading is not zero",
+            };
+            look(Told::new("no-change-seen", text), &offset.map(|object| object.to_string()), signal)
+        }
+        AutozeroEffect::Moved(Some(shift)) => {
+            Told::new("zero-moved", format!("the zero was moved by {}", quantity(*shift)))
+        }
+        AutozeroEffect::Moved(None) => Told::new("zero-moved", "the zero was set"),
+        AutozeroEffect::Stored => Told::new("stored", "it was stored"),
+        AutozeroEffect::Undo(undo) => undo_text(node, undo),
+    }
+}
+
+/// The text for a note.
+pub(in crate::output) fn fact(node: Option<NodeId>, fact: &AutozeroFact) -> Told {
+    let node = node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
+    match fact {
+        AutozeroFact::Forced(objection) => Told::new("forced", format!("forced: {}", reason(objection))),
+        AutozeroFact::NothingChanged => Told::new("nothing-changed", "nothing was changed"),
+        AutozeroFact::ProvedBy { offset } => {
+            let proof = if *offset { "the offset" } else { "the reading" };
+            Told::new(
+                "no-answer",
+                format!("no answer came to the signature; {proof} proves that the device acted on it"),
+            )
+        }
+        AutozeroFact::Undo(undo) => undo_text(&node, undo),
+        AutozeroFact::NotStored { group } => Told::new("not-stored", "not stored: lost at power off")
+            .command("store it", format!("cangauge store {node} --group {}", group.as_str())),
+        AutozeroFact::Stored { groups } => Told::new("stored", format!("stored: {groups}")),
+    }
+}
+
+fn undo_text(node: &str, undo: &Undo) -> Told {
+    match undo {
+        Undo::Write { object, value, data_type, store } => {
+            let store =
+                store.map_or_else(String::new, |group| format!(" && cangauge store {node} --group {}", group.as_str()));
+            Told::new("undo", "the previous offset is known")
+                .command("undo", format!("cangauge sdo write {node} {object} {value} --type {data_type}{store}"))
+        }
+        Undo::Restore => Told::new("undo", "no offset can be written; the factory defaults undo it")
+            .command("undo", format!("cangauge restore {node} --reset")),
+        Undo::Reset => Told::new("undo", "the zero is not stored, so a reset undoes it")
+            .command("undo", format!("cangauge nmt reset {node}")),
+    }
 }

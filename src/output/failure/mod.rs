@@ -3,7 +3,7 @@
 //! Each area of `tasks` has one file here. A message says what happened and what it means; a hint is a command to
 //! type or one thing to check.
 
-mod autozero;
+pub(super) mod autozero;
 mod below;
 mod check;
 mod detect;

@@ -1,5 +1,6 @@
-//! What a channel's zero is set by: signature, offset, measuring range, from the description or the standard.
+//! The objects that set the zero of a channel: signature, offset, measuring range. From the description or CiA 404.
 
+use super::failure::AutozeroFailure;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::canopen::value::{DataType, Value};
@@ -9,31 +10,31 @@ use crate::master::{Master, Request, SdoError, SdoFailure};
 use crate::measure::layout::Signal;
 use crate::measure::sample::Number;
 use crate::node::Node;
-use crate::tasks::{Failure, Kind};
+use crate::tasks::Failure;
 
 /// A channel whose zero can be set.
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     pub(super) signal: Signal,
-    /// Where the signature goes.
+    /// The object that takes the signature.
     pub(super) object: ObjectId,
     pub(super) signature: Vec<u8>,
-    /// Where the offset may stand: one object of a device that is known, else those of CiA 404.
+    /// The objects that may contain the offset: one if the device is described, else those of CiA 404.
     pub(super) offsets: Vec<ObjectId>,
-    /// Whether a description says where the offset stands.
+    /// Whether a description names the object of the offset.
     pub(super) is_described: bool,
-    /// Whether the sensor measures absolute pressure; `None` where nothing tells.
+    /// Whether the sensor measures absolute pressure; `None` if unknown.
     pub(super) absolute: Option<bool>,
     /// The width of the measuring range in the present unit.
     pub(super) range: Option<f64>,
 }
 
-/// An offset as it stands in the device.
+/// An offset in the device.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Offset {
     pub(super) object: ObjectId,
     pub(super) data_type: DataType,
-    /// As it is written.
+    /// The value of the object.
     pub(super) value: Value,
     /// In the present unit.
     pub(super) number: Number,
@@ -42,25 +43,25 @@ pub(super) struct Offset {
 /// Finds the channel of a number, or the only one there is.
 ///
 /// # Errors
-/// A device without autozero, or without one of this channel; several channels and none chosen; silence.
+/// The device has no autozero, or none of this channel; it has several channels and none was chosen; no answer.
 pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -> Result<Channel, Failure> {
-    let usage = |message: String| Failure::of_node(Kind::Usage, device.id, message);
+    let fail = |cause| Failure::at(device.id, cause);
     let description = device.model.as_ref().map(|model| &model.description);
     let described = description.map_or(&[][..], |description| &description.autozero);
-    let title = description.map_or("it", |description| &description.title);
+    let title = description.map_or_else(String::new, |description| description.title.clone());
     if described.is_empty() {
         let all_known = description.is_some_and(|description| !description.signals.is_empty());
         if all_known && device.model.as_ref().is_some_and(|model| !model.dictionary.has_index(0x6125)) {
-            return Err(usage(format!("{title} has no autozero")));
+            return Err(fail(AutozeroFailure::NoAutozero { title: title.clone() }));
         }
         return by_the_standard(master, device, number);
     }
-    let list = || described.iter().map(|entry| entry.channel.to_string()).collect::<Vec<_>>().join(", ");
+    let available = || described.iter().map(|entry| entry.channel).collect::<Vec<_>>();
     let entry = match (number, described) {
         (None, [only]) => only,
-        (None, _) => return Err(usage("which channel?".to_owned()).hint(format!("--channel one of {}", list()))),
+        (None, _) => return Err(fail(AutozeroFailure::WhichChannel { available: available() })),
         (Some(number), _) => described.iter().find(|entry| entry.channel == number).ok_or_else(|| {
-            usage(format!("{title} has no autozero of channel {number}")).hint(format!("it has one of: {}", list()))
+            fail(AutozeroFailure::NoSuchChannel { title: title.clone(), channel: number, available: available() })
         })?,
     };
     let signal = signal(device, entry.channel)?.clone();
@@ -72,16 +73,15 @@ pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
     Ok(Channel { signal, object: entry.object, signature, offsets, is_described, absolute, range })
 }
 
-/// 6125h:n, where the device has it.
+/// 6125h:n, if the device has it.
 fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -> Result<Channel, Failure> {
     let node = device.id;
     let signal = match (number, device.signals.as_slice()) {
         (Some(number), _) => signal(device, number)?,
         (None, [only]) => only,
-        (None, []) => return Err(Failure::of_node(Kind::Unexpected, node, "it has no measured value of CiA 404")),
+        (None, []) => return Err(Failure::at(node, AutozeroFailure::NoMeasuredValue)),
         (None, _) => {
-            return Err(Failure::of_node(Kind::Usage, node, "which channel? It has several")
-                .hint(format!("cangauge autozero {node} --channel 1")));
+            return Err(Failure::at(node, AutozeroFailure::WhichChannel { available: Vec::new() }));
         }
     }
     .clone();
@@ -90,11 +90,10 @@ fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
         Err(SdoError {
             failure: SdoFailure::Refused(code @ (AbortCode::NO_OBJECT | AbortCode::NO_SUB_INDEX)), ..
         }) => {
-            let message = format!("it has no autozero of channel {} (no {object})", signal.channel);
-            let failure = Failure::of_node(Kind::Refused, node, message);
-            return Err(failure.of_object(object).with_abort(Some(code)));
+            let cause = AutozeroFailure::NoObject { channel: signal.channel, object, code };
+            return Err(Failure::at(node, cause).of_object(object));
         }
-        // Write-only, as it should be.
+        // Write-only, as CiA 404 requires.
         Ok(_) | Err(SdoError { failure: SdoFailure::Refused(_), .. }) => {}
         Err(error) => return Err(error.into()),
     }
@@ -110,7 +109,7 @@ fn signal(device: &Node, channel: u8) -> Result<&Signal, Failure> {
         .signals
         .iter()
         .find(|signal| signal.channel == channel)
-        .ok_or_else(|| Failure::of_node(Kind::Usage, device.id, format!("it measures nothing on channel {channel}")))
+        .ok_or_else(|| Failure::at(device.id, AutozeroFailure::NoMeasuredValueOnChannel { channel }))
 }
 
 fn absolute(master: &mut Master<'_>, device: &Node, entry: &Autozero) -> Result<Option<bool>, Failure> {
@@ -138,7 +137,7 @@ fn of_family(object: ObjectId) -> DataType {
     }
 }
 
-/// A number in the unit of the channel; `None` where the device refuses it.
+/// A number in the unit of the channel; `None` if the device rejects the request.
 fn number(
     master: &mut Master<'_>,
     device: &Node,
@@ -156,7 +155,7 @@ fn number(
     }
 }
 
-/// The width of the measuring range in the present unit: as built, else from span start to span end.
+/// The width of the measuring range in the present unit: of the sensor, else from span start to span end.
 fn range(
     master: &mut Master<'_>,
     device: &Node,
@@ -193,7 +192,7 @@ fn range(
 /// The offsets that can be read.
 ///
 /// # Errors
-/// Silence, and what stops everything.
+/// No answer, a bus error, Ctrl-C.
 pub(super) fn offsets(master: &mut Master<'_>, device: &Node, channel: &Channel) -> Result<Vec<Offset>, Failure> {
     let mut found = Vec::new();
     for &object in &channel.offsets {

@@ -1,21 +1,236 @@
-//! Causes of failures: a channel was not set to zero.
+//! Causes, effects and notes: a channel was not set to zero, and what to report about a zero that was set.
 
+use super::channel::Offset;
+use super::safety::Objection;
+use crate::canopen::object::ObjectId;
+use crate::canopen::sdo::AbortCode;
+use crate::canopen::value::{DataType, Value};
+use crate::device::unit::Unit;
+use crate::measure::sample::Number;
 use crate::tasks::Kind;
 use crate::tasks::failure::Cause;
+use crate::tasks::note::{Effect, Fact};
+use crate::tasks::store::Group;
 
-/// A channel was not set to zero.
+/// A value with its unit and the decimals that are significant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quantity {
+    /// The value.
+    pub value: f64,
+    /// Its unit; `None` if the device reports none.
+    pub unit: Option<Unit>,
+    /// The significant decimals.
+    pub decimals: usize,
+}
+
+/// Why a channel was not set to zero.
 #[derive(Clone, Debug, PartialEq)]
-pub enum AutozeroFailure {}
+pub enum AutozeroFailure {
+    /// The device has no autozero.
+    NoAutozero {
+        /// The title of its description.
+        title: String,
+    },
+    /// The device has no autozero of this channel.
+    NoSuchChannel {
+        /// The title of its description.
+        title: String,
+        /// The channel.
+        channel: u8,
+        /// The channels that have one.
+        available: Vec<u8>,
+    },
+    /// The device has several channels, and none was chosen.
+    WhichChannel {
+        /// The channels that have an autozero; empty if they are unknown.
+        available: Vec<u8>,
+    },
+    /// The device has no measured value of CiA 404.
+    NoMeasuredValue,
+    /// The channel has no measured value.
+    NoMeasuredValueOnChannel {
+        /// The channel.
+        channel: u8,
+    },
+    /// The device rejects access to 6125h of this channel.
+    NoObject {
+        /// The channel.
+        channel: u8,
+        /// The object.
+        object: ObjectId,
+        /// The abort code.
+        code: AbortCode,
+    },
+    /// The limit has a unit that does not convert to the unit of the signal.
+    LimitUnit {
+        /// The signal.
+        signal: String,
+        /// Its unit.
+        unit: Option<Unit>,
+        /// The unit of the limit.
+        limit: Unit,
+    },
+    /// The device restarted before the signature was sent.
+    RestartedBefore,
+    /// A safety check stopped it.
+    Unsafe {
+        /// The reason.
+        objection: Objection,
+        /// The channel, if the user chose one.
+        channel: Option<u8>,
+    },
+    /// The device accepted the signature and restarted.
+    RestartedAfter,
+    /// The device accepted the signature, and the reading is not zero.
+    NotZero {
+        /// The signal.
+        signal: String,
+        /// The mean afterwards; `None` if a reading was invalid.
+        reading: Option<Quantity>,
+        /// Whether the offset or the reading has changed.
+        has_acted: bool,
+        /// The offset.
+        offset: OffsetChange,
+    },
+    /// The offset changed between the signature and the store.
+    OtherOffsetStored,
+}
+
+/// How the offset compares to the offset before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum OffsetChange {
+    /// It changed from the first to the second number.
+    Changed(Number, Number),
+    /// It is as before.
+    Unchanged,
+    /// The device has no offset that can be read.
+    Unreadable,
+}
 
 impl AutozeroFailure {
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
-        match *self {}
+        match self {
+            AutozeroFailure::NoAutozero { .. }
+            | AutozeroFailure::NoSuchChannel { .. }
+            | AutozeroFailure::WhichChannel { .. }
+            | AutozeroFailure::NoMeasuredValueOnChannel { .. }
+            | AutozeroFailure::LimitUnit { .. } => Kind::Usage,
+            AutozeroFailure::NoObject { .. } => Kind::Refused,
+            AutozeroFailure::Unsafe { .. } => Kind::CheckFailed,
+            AutozeroFailure::NoMeasuredValue
+            | AutozeroFailure::RestartedBefore
+            | AutozeroFailure::RestartedAfter
+            | AutozeroFailure::NotZero { .. }
+            | AutozeroFailure::OtherOffsetStored => Kind::Unexpected,
+        }
+    }
+
+    /// The abort code, if the device rejected a request.
+    pub fn abort(&self) -> Option<AbortCode> {
+        match self {
+            AutozeroFailure::NoObject { code, .. } => Some(*code),
+            _ => None,
+        }
     }
 }
 
 impl From<AutozeroFailure> for Cause {
     fn from(cause: AutozeroFailure) -> Cause {
         Cause::Autozero(cause)
+    }
+}
+
+/// What a failed autozero had done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AutozeroEffect {
+    /// The signature was sent once. It is unknown whether the device acted on it.
+    SignatureSent {
+        /// The object.
+        object: ObjectId,
+    },
+    /// The offset before, and where to see it now.
+    OffsetBefore {
+        /// The object and the number; `None` if no offset can be read.
+        offset: Option<(ObjectId, Number)>,
+        /// The signal.
+        signal: String,
+    },
+    /// The offset is as before; if no offset can be read, the reading is not zero.
+    NoChangeSeen {
+        /// The object of the offset; `None` if no offset can be read.
+        offset: Option<ObjectId>,
+        /// The signal.
+        signal: String,
+    },
+    /// The zero was moved by this much, if that is known.
+    Moved(Option<Quantity>),
+    /// The zero was stored.
+    Stored,
+    /// How to undo it.
+    Undo(Undo),
+}
+
+impl From<AutozeroEffect> for Effect {
+    fn from(effect: AutozeroEffect) -> Effect {
+        Effect::Autozero(effect)
+    }
+}
+
+/// How a zero is undone.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Undo {
+    /// By writing the previous offset.
+    Write {
+        /// The object.
+        object: ObjectId,
+        /// The previous value.
+        value: Value,
+        /// Its type.
+        data_type: DataType,
+        /// The group to be stored afterwards, if the zero is stored.
+        store: Option<Group>,
+    },
+    /// By restoring the factory defaults: no offset can be written, and the zero is stored.
+    Restore,
+    /// By a reset: the zero is not stored.
+    Reset,
+}
+
+impl Undo {
+    pub(super) fn write(offset: &Offset, store: Option<Group>) -> Undo {
+        Undo::Write { object: offset.object, value: offset.value.clone(), data_type: offset.data_type, store }
+    }
+}
+
+/// What to report about a zero that was set.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AutozeroFact {
+    /// A safety check failed and was skipped.
+    Forced(Objection),
+    /// Nothing was changed, because it was a dry run.
+    NothingChanged,
+    /// No answer came to the signature. The offset, else the reading, proves that the device acted on it.
+    ProvedBy {
+        /// Whether the offset is the proof.
+        offset: bool,
+    },
+    /// How to undo it.
+    Undo(Undo),
+    /// The zero is not stored.
+    NotStored {
+        /// The group that stores it.
+        group: Group,
+    },
+    /// The zero is stored, with these groups: `comm+app`.
+    Stored {
+        /// The groups.
+        groups: String,
+    },
+}
+
+impl From<AutozeroFact> for Fact {
+    fn from(fact: AutozeroFact) -> Fact {
+        Fact::Autozero(fact)
     }
 }

@@ -1,6 +1,6 @@
 //! Several readings of one signal, one after the other.
 
-use crate::bus::{BusError, Received};
+use crate::bus::Received;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::Life;
 use crate::master::{Error, Happening, Master};
@@ -8,25 +8,27 @@ use crate::measure::decode::Wanted;
 use crate::measure::sample::Status;
 use crate::measure::statistics::Statistics;
 use crate::node::Node;
+use crate::node::wait::{Policy, wait};
 use crate::tasks::Failure;
 use crate::tasks::read::{Target, requests, sample, targets};
+use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The time between two readings: slower than what a transmitter takes to measure anew (DPS: 100 ms).
+/// The time between two readings: at least one measuring cycle of the transmitter (DPS: 100 ms).
 const BETWEEN: Duration = Duration::from_millis(100);
 
-/// What several readings came to.
+/// The statistics of several readings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Samples {
     statistics: Statistics,
-    /// What the device said of the first reading that was not valid.
+    /// The status of the first invalid reading.
     pub(super) bad: Option<Status>,
-    /// Whether the node booted meanwhile.
+    /// Whether the node restarted meanwhile.
     pub(super) booted: bool,
 }
 
 impl Samples {
-    /// The mean; `None` when not every reading was valid.
+    /// The mean; `None` if a reading was invalid.
     pub(super) fn mean(&self) -> Option<f64> {
         self.statistics.mean().filter(|_| self.bad.is_none() && self.statistics.invalid() == 0)
     }
@@ -40,21 +42,15 @@ impl Samples {
         self.booted |= Life::parse(&received.frame) == Some((node, Life::BootUp));
     }
 
-    fn wait(&mut self, master: &mut Master<'_>, node: NodeId) -> Result<(), Error> {
+    fn pause(&mut self, master: &mut Master<'_>, node: NodeId) -> Result<(), Error> {
         let until = master.now() + BETWEEN;
-        loop {
-            match master.next(until)? {
-                Happening::Frame(received) => self.watch(node, &received),
-                Happening::Deadline => return Ok(()),
-                Happening::Interrupted => return Err(Error::Interrupted),
-                Happening::Link(false) => return Err(Error::Bus(BusError::Down(master.bus().name().to_owned()))),
-                Happening::Sdo(..)
-                | Happening::Fault(..)
-                | Happening::Dropped(_)
-                | Happening::Link(true)
-                | Happening::Ended => {}
+        wait(master, until, Policy::Command, |_, event| {
+            if let Happening::Frame(received) = event {
+                self.watch(node, &received);
             }
-        }
+            ControlFlow::<()>::Continue(())
+        })?;
+        Ok(())
     }
 
     fn read(&mut self, master: &mut Master<'_>, target: &Target) -> Result<(), Failure> {
@@ -69,15 +65,15 @@ impl Samples {
     }
 }
 
-/// Reads a signal `count` times; before each reading some time is left, so that all of them are new.
+/// Reads a signal `count` times. A pause before each reading makes sure that it is new.
 ///
 /// # Errors
-/// Refusals, silence, and what stops everything.
+/// An SDO abort, no answer, a bus error, Ctrl-C.
 pub(super) fn take(master: &mut Master<'_>, device: &Node, signal: &str, count: u32) -> Result<Samples, Failure> {
     let mut samples = Samples::default();
     for target in targets(device, &[Wanted::Signal(signal.to_owned())], &mut 0)? {
         for _ in 0..count {
-            samples.wait(master, device.id)?;
+            samples.pause(master, device.id)?;
             samples.read(master, &target)?;
         }
     }
