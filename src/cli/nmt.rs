@@ -2,23 +2,25 @@
 
 use super::args::{Duration, Nodes};
 use super::exit::{IntoFailure, several, stdout};
-use super::{Format, Global, open};
+use super::{Global, open};
 use crate::bus::claim::Claim;
-use crate::bus::time::spoken;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtCommand;
+use crate::master::Master;
+use crate::node::Node;
+use crate::node::survey::identify_each;
 use crate::output::failure::ErrorMessage;
-use crate::output::{csv, json, table};
-use crate::tasks::nmt::{Change, Proof, Seen, Starts, StateReport, command, probe, startup, states, watch};
-use crate::tasks::{Failure, Kind};
+use crate::output::nmt::left_heartbeat;
+use crate::output::notes;
+use crate::tasks::nmt::{NmtFailure, Proof, Seen, Starts, StateReport, command, probe, startup, states, watch};
+use crate::tasks::{Fact, Failure, Note};
 use clap::{Args, Subcommand, ValueEnum};
-use std::io::{self, Write};
 use std::ops::ControlFlow;
 
-/// Send NMT commands and tell states
+/// Send NMT commands and show NMT states
 ///
-/// After a command the state is confirmed: by heartbeat or boot-up, by node guarding where that is
-/// harmless, or by SDO, which proves only stopped. What nothing confirms is said ("none").
+/// After a command the state is confirmed: by heartbeat or boot-up message, by node guarding if it is harmless, or by
+/// SDO, which proves only "stopped". Unconfirmed states are shown as "none".
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim nmt start 1\n  cangauge -b sim nmt reset 127\n  cangauge -b sim nmt state 1-3"
@@ -31,21 +33,21 @@ pub(crate) struct Nmt {
 #[derive(Debug, Subcommand)]
 #[command(defer = true)]
 enum Action {
-    /// To OPERATIONAL: the nodes send their TPDOs
+    /// Set nodes to OPERATIONAL: they send their TPDOs
     Start(Targets),
-    /// To STOPPED: only NMT, heartbeat and LSS
+    /// Set nodes to STOPPED: only NMT, heartbeat and LSS work
     Stop(Targets),
-    /// To PRE-OPERATIONAL: everything but PDOs
+    /// Set nodes to PRE-OPERATIONAL: everything except PDOs works
     Preop(Targets),
     /// Restart the application (reset node)
     Reset(Targets),
     /// Restart the communication
     ResetComm(Targets),
-    /// Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it
+    /// Show states, from the heartbeat or by node guarding if it is harmless; "-" if unknown
     State(StateArgs),
     /// Follow heartbeats, boot-ups and losses until Ctrl-C
     Watch(WatchArgs),
-    /// Tell or set who starts a device after power on: wait for the master, or auto (by itself)
+    /// Show or set how a device starts after power on: wait for the master, or auto (by itself)
     Startup(StartupArgs),
 }
 
@@ -53,10 +55,10 @@ enum Action {
 struct Targets {
     /// Which nodes: 5, 0x7f, 1-16, 1,5; all is one broadcast
     nodes: Nodes,
-    /// Exit 3 where nothing confirms the state
+    /// Exit with 3 if nothing confirms the state
     #[arg(long, conflicts_with = "no_wait")]
     confirm: bool,
-    /// Only send
+    /// Send the command without confirmation
     #[arg(long)]
     no_wait: bool,
 }
@@ -65,14 +67,14 @@ struct Targets {
 struct StateArgs {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
-    /// Where nothing tells the state: set the heartbeat (1017h) for a moment and put it back
+    /// If the state is unknown: set the heartbeat time (1017h) briefly and restore it
     #[arg(long)]
     probe: bool,
 }
 
 #[derive(Debug, Args)]
 struct WatchArgs {
-    /// Which nodes: 5, 0x7f, 1-16, 1,5; named ones are asked for their heartbeat time, else it is learned
+    /// Which nodes: 5, 0x7f, 1-16, 1,5; for named nodes 1017h is read, else it is learned
     #[arg(default_value = "all")]
     nodes: Nodes,
     /// End after this time
@@ -84,7 +86,7 @@ struct WatchArgs {
 struct StartupArgs {
     /// Which node: 5, 0x7f
     node: NodeId,
-    /// wait or auto; not given: only tell
+    /// wait or auto [default: show the setting]
     set: Option<StartupMode>,
 }
 
@@ -97,7 +99,7 @@ enum StartupMode {
 }
 
 impl Nmt {
-    /// What it does not share with another cangauge.
+    /// The nodes that no other cangauge may use at the same time.
     pub(super) fn claim(&self) -> Claim {
         match &self.action {
             Action::Start(targets)
@@ -123,71 +125,53 @@ impl Nmt {
             Action::Watch(args) => return args.run(global),
             Action::Startup(args) => return args.run(global),
         };
+        targets.run(kind, global)
+    }
+}
+
+impl Targets {
+    fn run(&self, kind: NmtCommand, global: &Global) -> anyhow::Result<()> {
         let reports = global.with_master(|master| {
-            let broadcast = targets.nodes == Nodes::All;
-            if targets.no_wait {
-                match &targets.nodes {
+            if self.no_wait {
+                match &self.nodes {
                     Nodes::All => master.send(kind.frame(None)),
                     Nodes::These(nodes) => nodes.iter().for_each(|&node| master.send(kind.frame(Some(node)))),
                 }
                 return Ok(Vec::new());
             }
-            let nodes = match &targets.nodes {
-                Nodes::These(nodes) => nodes.clone(),
-                // The broadcast goes out whoever is there; who is there decides what can be confirmed.
-                Nodes::All => match open::nodes(master, global, &Nodes::All) {
-                    Err(error)
-                        if error.downcast_ref::<Failure>().is_some_and(|failure| failure.kind() == Kind::NoAnswer) =>
-                    {
-                        Vec::new()
-                    }
-                    nodes => nodes?,
-                },
-            };
-            Ok(command(master, kind, &nodes, broadcast).or_fail()?)
+            let nodes = self.confirmable(master, global)?;
+            Ok(command(master, kind, &nodes, self.nodes == Nodes::All).or_fail()?)
         })?;
-        print(&reports, global.format).map_err(stdout)?;
-        let failures = reports.iter().filter_map(|report| targets.judge(kind, report, global)).collect();
+        global.print(&reports)?;
+        let failures = reports.iter().filter_map(|report| self.judge(kind, report, global)).collect();
         Ok(several(reports.len(), failures)?)
     }
-}
 
-impl Targets {
-    /// What is wrong with a node after a command. What cannot be confirmed is a failure only when asked to be.
+    /// The nodes whose state can be confirmed. The broadcast is sent even if no node answers.
+    fn confirmable(&self, master: &mut Master<'_>, global: &Global) -> anyhow::Result<Vec<NodeId>> {
+        match &self.nodes {
+            Nodes::These(nodes) => Ok(nodes.clone()),
+            Nodes::All => open::all(master, global),
+        }
+    }
+
+    /// Why the command failed for a node. An unconfirmed state is a failure only with `--confirm`.
     fn judge(&self, kind: NmtCommand, report: &StateReport, global: &Global) -> Option<Failure> {
         let wanted = kind.target();
-        match (report.state, report.by) {
+        let cause = match report.state {
             // A device that starts by itself leaves PRE-OPERATIONAL at once after a reset.
-            (Some(_), _) if kind.is_reset() => None,
-            (Some(state), _) if state == wanted => None,
-            (Some(state), _) => {
-                let message = format!("it is {state}, not {wanted}");
-                Some(Failure::of_node(Kind::Unexpected, report.node, message))
-            }
-            (None, _) => {
-                let (why, hint) = if !report.is_present {
-                    (
-                        "sent, and nothing came back: no heartbeat, no boot-up, no SDO answer",
-                        "who is there: cangauge scan".to_owned(),
-                    )
-                } else if kind.is_reset() {
-                    ("sent, and no boot-up came", format!("is it there? cangauge nmt state {}", report.node))
-                } else {
-                    (
-                        "sent, and nothing confirms it: no heartbeat (1017h is 0)",
-                        format!("set a heartbeat: cangauge sdo write {} producer-heartbeat-time 1000", report.node),
-                    )
-                };
-                let failure = Failure::of_node(Kind::NoAnswer, report.node, why);
-                // A device that is there tells its boot-up, whatever else it tells: silence after a reset, and
-                // silence of a node that was named, are no success.
-                if self.confirm || !report.is_present || kind.is_reset() {
-                    return Some(failure.hint(hint));
-                }
-                global.console().note(&ErrorMessage::from(&failure).message);
-                None
-            }
+            Some(state) if kind.is_reset() || state == wanted => return None,
+            Some(state) => NmtFailure::OtherState { state, wanted },
+            None if !report.is_present => NmtFailure::NoSign,
+            None if kind.is_reset() => NmtFailure::NoBootUp,
+            None => NmtFailure::NotConfirmed,
+        };
+        let failure = Failure::at(report.node, cause.clone());
+        if cause == NmtFailure::NotConfirmed && !self.confirm {
+            global.console().note(&ErrorMessage::of(&failure).message);
+            return None;
         }
+        Some(failure)
     }
 }
 
@@ -196,27 +180,36 @@ impl StateArgs {
         let reports = global.with_master(|master| {
             let nodes: Vec<NodeId> = open::nodes(master, global, &self.nodes)?;
             let mut reports = states(master, &nodes).or_fail()?;
-            for report in reports.iter_mut().filter(|report| self.probe && report.is_present && report.state.is_none())
-            {
-                let probed = probe(master, report.node).or_fail()?;
-                if let Some(trouble) = probed.trouble {
-                    global.console().warn(&format!("node {}: {trouble}", report.node));
-                }
-                *report = probed.report;
+            if self.probe {
+                probe_unknown(master, global, &mut reports)?;
             }
             Ok(reports)
         })?;
-        print(&reports, global.format).map_err(stdout)?;
-        let failures: Vec<Failure> = reports
-            .iter()
-            .filter(|report| !report.is_present)
-            .map(|report| {
-                Failure::of_node(Kind::NoAnswer, report.node, "no heartbeat and no SDO answer")
-                    .hint("who is there: cangauge scan")
-            })
-            .collect();
+        global.print(&reports)?;
+        let absent = reports.iter().filter(|report| !report.is_present);
+        let failures = absent.map(|report| Failure::at(report.node, NmtFailure::Absent)).collect();
         Ok(several(reports.len(), failures)?)
     }
+}
+
+/// Probes the nodes whose state is unknown.
+fn probe_unknown(master: &mut Master<'_>, global: &Global, reports: &mut [StateReport]) -> anyhow::Result<()> {
+    let is_unknown = |report: &&mut StateReport| report.is_present && report.by == Proof::None;
+    let mut unknown: Vec<&mut StateReport> = reports.iter_mut().filter(is_unknown).collect();
+    let ids: Vec<NodeId> = unknown.iter().map(|report| report.node).collect();
+    let overrides = open::overrides(global, &ids)?;
+    let nodes = identify_each(master, &ids, &overrides).or_fail()?;
+    for (report, node) in unknown.iter_mut().zip(nodes) {
+        let node = node.unwrap_or_else(|_| Node::new(report.node));
+        let probed = probe(master, &node).or_fail()?;
+        let text = probed.failure.map(|failure| ErrorMessage::of(&failure).message);
+        let left = probed.left.map(left_heartbeat);
+        if let Some(text) = text {
+            global.console().warn(&left.map_or(text.clone(), |left| format!("{text}; {left}")));
+        }
+        **report = probed.report;
+    }
+    Ok(())
 }
 
 impl WatchArgs {
@@ -225,17 +218,18 @@ impl WatchArgs {
             Nodes::All => (NodeId::all().collect(), false),
             Nodes::These(nodes) => (nodes.clone(), true),
         };
+        let mut rows = global.stream::<Seen>()?;
         let mut failed = None;
         global.with_master(|master| {
             let until = self.duration.map(|duration| master.now() + duration.0);
-            let mut tell = |seen: &Seen| match print_seen(seen, global.format) {
+            let mut on_change = |seen: &Seen| match rows.push(seen) {
                 Ok(()) => ControlFlow::Continue(()),
                 Err(error) => {
                     failed = Some(error);
                     ControlFlow::Break(())
                 }
             };
-            Ok(watch(master, &nodes, ask, until, &mut tell).or_fail()?)
+            Ok(watch(master, &nodes, ask, until, &mut on_change).or_fail()?)
         })?;
         failed.map_or(Ok(()), |error| Err(stdout(error)))
     }
@@ -249,82 +243,14 @@ impl StartupArgs {
             StartupMode::Auto => Starts::Auto,
         });
         let report = global.with_master(|master| Ok(startup(master, self.node, &overrides, set)?))?;
-        let word = match report.starts {
-            Starts::Wait => "wait".to_owned(),
-            Starts::Auto => "auto".to_owned(),
-            Starts::Other(raw) => format!("0x{raw:X}"),
-        };
-        let mut out = io::stdout().lock();
-        match global.format {
-            Format::Json => json::startup(&mut out, self.node, &word, report.raw),
-            Format::Csv => writeln!(out, "{},{word},{}", self.node, report.raw),
-            Format::Text => writeln!(out, "{word}"),
-        }
-        .and_then(|()| out.flush())
-        .map_err(stdout)?;
-        if !report.doubt.is_empty() {
-            global.console().warn(&format!("node {}: {}", self.node, report.doubt));
+        let doubt = report.doubt.clone();
+        global.print(&[report])?;
+        if !doubt.is_empty() {
+            global.console().warn(&format!("node {}: {doubt}", self.node));
         }
         if set.is_some() {
-            let node = self.node;
-            let note = format!("node {node}: kept after power off only when it is stored: cangauge store {node}");
-            global.console().note(&note);
+            notes::print(&global.console(), &Note::of_node(self.node, Fact::KeptUntilPowerOff));
         }
         Ok(())
     }
-}
-
-fn print_seen(seen: &Seen, format: Format) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    let time = humantime::format_rfc3339_micros(seen.at.wall.system_time()).to_string();
-    let (event, state) = match seen.change {
-        Change::State(state) => ("state", Some(state)),
-        Change::BootUp => ("boot-up", None),
-        Change::Lost(_) => ("lost", None),
-        Change::Back(state) => ("back", Some(state)),
-    };
-    match format {
-        Format::Json => {
-            let state = state.map(|state| state.to_string());
-            json::seen(&mut out, &time, seen.node, event, state.as_deref())?;
-        }
-        Format::Csv => {
-            let state = state.map(|state| state.to_string()).unwrap_or_default();
-            writeln!(out, "{time},{},{event},{state}", seen.node)?;
-        }
-        Format::Text => {
-            let rest = match seen.change {
-                Change::State(state) | Change::Back(state) => format!(" {state}"),
-                Change::Lost(silent) => format!(": silent for {}", spoken(silent)),
-                Change::BootUp => String::new(),
-            };
-            writeln!(out, "{time}  {:>3}  {event}{rest}", seen.node)?;
-        }
-    }
-    out.flush()
-}
-
-fn print(reports: &[StateReport], format: Format) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    match format {
-        Format::Json => reports.iter().try_for_each(|report| json::report(&mut out, report))?,
-        Format::Csv => {
-            csv::write(&mut out, &["node", "state", "by"], reports.iter().map(|report| cells(report, "")))?;
-        }
-        Format::Text => {
-            let rows: Vec<Vec<String>> = reports.iter().map(|report| cells(report, "-")).collect();
-            let align = [table::Align::Right, table::Align::Left, table::Align::Left];
-            table::write(&mut out, &align, &rows)?;
-        }
-    }
-    out.flush()
-}
-
-fn cells(report: &StateReport, missing: &str) -> Vec<String> {
-    let by = match report.by {
-        Proof::None => "none",
-        by => by.as_str(),
-    };
-    let state = report.state.map_or_else(|| missing.to_owned(), |state| state.to_string());
-    vec![report.node.to_string(), state, by.to_owned()]
 }

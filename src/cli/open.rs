@@ -15,6 +15,7 @@ use crate::device::eds;
 use crate::master::Master;
 use crate::node::{Overrides, targets};
 use crate::sim::{Bench, BenchError};
+use crate::tasks::scan::ScanFailure;
 use crate::tasks::{Failure, Kind};
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -202,18 +203,25 @@ fn model(what: &str, eds: bool, global: &Global) -> anyhow::Result<Arc<Model>> {
     Ok(Arc::new(Model::from_toml(&text).map_err(|error| Failure::new(Kind::Usage, error.in_file(what)))?))
 }
 
-/// The nodes meant; for `all` see [`targets`].
+/// The nodes that the user named, or for `all` those of [`all`].
+///
+/// # Errors
+/// No node for `all`; bus errors and Ctrl-C.
 pub(super) fn nodes(master: &mut Master<'_>, global: &Global, nodes: &Nodes) -> anyhow::Result<Vec<NodeId>> {
     match nodes {
         Nodes::These(nodes) => Ok(nodes.clone()),
         Nodes::All => {
-            let timing = global.timing(super::scan::SCAN_TIMEOUT);
-            let nodes = targets::all(master, timing.timeout, 1 + timing.retries).or_fail()?;
-            if nodes.is_empty() {
-                let failure = Failure::new(Kind::NoAnswer, "no node answered");
-                return Err(failure.hint("find the cause: cangauge scan").into());
-            }
-            Ok(nodes)
+            let nodes = all(master, global)?;
+            if nodes.is_empty() { Err(Failure::general(ScanFailure::NoAnswer).into()) } else { Ok(nodes) }
         }
     }
+}
+
+/// The nodes that `all` means, see [`targets`]; may be empty.
+///
+/// # Errors
+/// Bus errors and Ctrl-C.
+pub(super) fn all(master: &mut Master<'_>, global: &Global) -> anyhow::Result<Vec<NodeId>> {
+    let timing = global.timing(super::scan::SCAN_TIMEOUT);
+    Ok(targets::all(master, timing.timeout, 1 + timing.retries).or_fail()?)
 }

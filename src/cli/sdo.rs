@@ -3,17 +3,21 @@
 use super::args::ObjectArg;
 use super::exit::{FileError, IntoFailure, stdout};
 use super::file::OutFile;
-use super::{Format, Global, open};
+use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::value::{DataType, Value, parse_hex};
+use crate::canopen::value::{DataType, parse_hex};
 use crate::master::Master;
 use crate::master::transfer::BlockMode;
+use crate::node::write::is_signature;
+use crate::node::{Form, Node, WriteOptions, names};
+use crate::output::failure::ErrorMessage;
 use crate::output::progress::Transfer;
-use crate::output::{csv, json, text};
-use crate::tasks::sdo::{Knowledge, Options, ReadValue, SizeMode, encode, is_signature, read, write};
-use crate::tasks::{Failure, Kind};
+use crate::output::sdo::ObjectValue;
+use crate::output::text;
+use crate::tasks::Failure;
+use crate::tasks::sdo::{encode, read, write};
 use clap::{Args, Subcommand, ValueEnum};
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -35,7 +39,7 @@ pub(crate) struct Sdo {
 #[derive(Debug, Subcommand)]
 #[command(defer = true)]
 enum Action {
-    /// Read objects: the value as it is, never scaled; several print "OBJECT VALUE" lines
+    /// Read objects: the value is never scaled; several objects print "OBJECT VALUE" lines
     Read(ReadArgs),
     /// Write an object, or several OBJECT=VALUE
     Write(WriteArgs),
@@ -48,7 +52,7 @@ struct ReadArgs {
     /// Which objects
     #[arg(required = true)]
     objects: Vec<ObjectArg>,
-    /// Take the bytes for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
+    /// Decode the bytes as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
     #[arg(long = "type", value_name = "TYPE")]
     data_type: Option<DataType>,
     /// Print the bytes in wire order
@@ -60,7 +64,7 @@ struct ReadArgs {
     /// Overwrite the file
     #[arg(long, requires = "output")]
     force: bool,
-    /// Whether to use block transfer: auto where it pays and the device offers it
+    /// When to use block transfer: auto for long objects if the device supports it
     #[arg(long, value_name = "HOW", default_value = "auto")]
     block: Block,
 }
@@ -72,31 +76,31 @@ struct WriteArgs {
     /// OBJECT VALUE, or several OBJECT=VALUE: decimal, 0x1F, -5, 1.25e3, or text
     #[arg(required = true, allow_negative_numbers = true, value_name = "OBJECT VALUE")]
     items: Vec<String>,
-    /// Take the value for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
+    /// Encode the value as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
     #[arg(long = "type", value_name = "TYPE")]
     data_type: Option<DataType>,
-    /// Whether the write says how many bytes it carries: auto asks the description, and tries the other
-    /// way where the device takes it amiss
+    /// Whether the request contains the size: auto follows the description, and retries with the other form if the
+    /// device rejects it
     #[arg(long, value_name = "HOW", default_value = "auto")]
     sdo_size: SdoSize,
     /// Read back and compare
     #[arg(long)]
     verify: bool,
-    /// Take the bytes from a file; - for stdin
+    /// Write the bytes of a file; - for stdin
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
-    /// Whether to use block transfer: auto where it pays and the device offers it
+    /// When to use block transfer: auto for long objects if the device supports it
     #[arg(long, value_name = "HOW", default_value = "auto")]
     block: Block,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Block {
-    /// For everything
+    /// For every object
     Always,
-    /// For nothing
+    /// Never
     Never,
-    /// Where it pays
+    /// For long objects
     Auto,
 }
 
@@ -112,20 +116,20 @@ impl From<Block> for BlockMode {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum SdoSize {
-    /// 2Fh, 2Bh, 27h, 23h
+    /// With the size: 2Fh, 2Bh, 27h, 23h
     Indicated,
-    /// 22h
+    /// Without the size: 22h
     Omit,
-    /// As the device wants it
+    /// As the description says
     Auto,
 }
 
-impl From<SdoSize> for SizeMode {
-    fn from(size: SdoSize) -> SizeMode {
+impl From<SdoSize> for Form {
+    fn from(size: SdoSize) -> Form {
         match size {
-            SdoSize::Indicated => SizeMode::Indicated,
-            SdoSize::Omit => SizeMode::Omitted,
-            SdoSize::Auto => SizeMode::Auto,
+            SdoSize::Indicated => Form::Indicated,
+            SdoSize::Omit => Form::Omitted,
+            SdoSize::Auto => Form::Auto,
         }
     }
 }
@@ -146,88 +150,55 @@ impl Sdo {
     }
 }
 
-fn resolve(knowledge: &mut Knowledge, master: &mut Master<'_>, object: &ObjectArg) -> Result<ObjectId, Failure> {
+fn resolve(node: &mut Node, master: &mut Master<'_>, object: &ObjectArg) -> Result<ObjectId, Failure> {
     match object {
         ObjectArg::Address(object) => Ok(*object),
-        ObjectArg::Name(name) => knowledge.resolve(master, name),
+        ObjectArg::Name(name) => Ok(names::resolve(master, node, name)?),
     }
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold("0x".to_owned(), |text, byte| text + &format!("{byte:02X}"))
 }
 
 impl ReadArgs {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         if self.output.is_some() && self.objects.len() > 1 {
-            return Err(Failure::new(Kind::Usage, "--output takes one object").into());
+            return Err(ErrorMessage::usage("--output takes one object").into());
         }
-        let overrides = open::overrides(global, &[self.node])?;
-        let mut knowledge = Knowledge::new(self.node, &overrides);
+        let mut node = Node::with_overrides(self.node, &open::overrides(global, &[self.node])?);
         let to_stdout = self.output.as_deref() == Some(Path::new("-"));
         let path = self.output.as_deref().filter(|_| !to_stdout);
         let mut file = path.map(|path| OutFile::create(path, self.force)).transpose()?;
         let bar = Transfer::new(global.shows_progress());
-        let mut progress = |moved| bar.moved(moved);
-        let mut options = Options { blocks: self.block.into(), size: SizeMode::Auto, progress: &mut progress };
-        // Many values are one system call, and not one each.
-        let mut out = io::BufWriter::with_capacity(1 << 16, io::stdout());
+        let mut values = Vec::new();
         let result = global.with_master(|master| {
             master.listen_to(&[self.node]).or_fail()?;
             for object in &self.objects {
-                let at = resolve(&mut knowledge, master, object)?;
-                let value = read(master, &mut knowledge, at, self.data_type, &mut options)?;
+                let at = resolve(&mut node, master, object)?;
+                let mut progress = |moved| bar.moved(moved);
+                let read = read(master, &mut node, at, self.data_type, (self.block.into(), &mut progress))?;
                 bar.finish();
-                if let Some(note) = value.note {
+                if let Some(note) = read.note {
                     global.console().warn(&format!("node {}: {at}: {note}", self.node));
                 }
                 match &mut file {
-                    Some(file) => file.write(&value.raw)?,
-                    None if to_stdout => out.write_all(&value.raw).map_err(stdout)?,
-                    None => self.print(&mut out, &value, object, global.format).map_err(stdout)?,
+                    Some(file) => file.write(&read.raw)?,
+                    None if to_stdout => io::stdout().write_all(&read.raw).map_err(stdout)?,
+                    None => {
+                        let (typed, is_single) = (object.to_string(), self.objects.len() == 1);
+                        values.push(ObjectValue { read, typed, is_single, as_bytes: self.hex });
+                    }
                 }
             }
             Ok(())
         });
-        // What was read before a failure is said before it.
-        let flushed = out.flush().map_err(stdout);
-        result.and(flushed)
-    }
-
-    fn print(&self, out: &mut dyn Write, value: &ReadValue, object: &ObjectArg, format: Format) -> io::Result<()> {
-        let raw = hex(&value.raw);
-        let shown = match &value.value {
-            _ if self.hex => raw.clone(),
-            Value::Text(text) => text::safe(text),
-            Value::Bytes(_) => raw.clone(),
-            value => value.to_string(),
-        };
-        match format {
-            Format::Json => {
-                let line = json::ObjectValue {
-                    node: self.node.get(),
-                    object: value.object.to_string(),
-                    name: value.name.clone(),
-                    data_type: value.data_type.map(|data_type| data_type.to_string()),
-                    value: match &value.value {
-                        Value::Bytes(_) => raw.clone().into(),
-                        value => json::value(value),
-                    },
-                    raw: &raw,
-                };
-                json::object(out, &line)
-            }
-            Format::Csv => csv::write(out, &[], [vec![self.node.to_string(), value.object.to_string(), shown, raw]]),
-            Format::Text if self.objects.len() == 1 => writeln!(out, "{shown}"),
-            Format::Text => writeln!(out, "{object} {shown}"),
-        }
+        // The values that were read before a failure are printed as well.
+        let printed = global.print(&values);
+        result.and(printed)
     }
 }
 
 impl WriteArgs {
     /// The objects and values: `OBJECT VALUE`, or `OBJECT=VALUE` each.
-    fn pairs(&self) -> Result<Vec<(ObjectArg, String)>, Failure> {
-        let usage = |message: String| Failure::new(Kind::Usage, message);
+    fn pairs(&self) -> Result<Vec<(ObjectArg, String)>, ErrorMessage> {
+        let usage = |message: String| ErrorMessage::usage(message);
         let parse = |text: &str| text.parse::<ObjectArg>().map_err(usage);
         match (self.items.as_slice(), &self.input) {
             ([object], Some(_)) => Ok(vec![(parse(object)?, String::new())]),
@@ -245,83 +216,72 @@ impl WriteArgs {
         }
     }
 
-    fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let pairs = self.pairs()?;
-        let overrides = open::overrides(global, &[self.node])?;
-        let mut knowledge = Knowledge::new(self.node, &overrides);
-        let file = match &self.input {
-            None => None,
-            Some(path) => {
-                let what = format!("read {}", path.display());
-                let mut bytes = Vec::new();
-                let result = if path == Path::new("-") {
-                    io::stdin().read_to_end(&mut bytes)
-                } else {
-                    File::open(path).and_then(|mut file| file.read_to_end(&mut bytes))
-                };
-                result.map_err(|source| FileError { what, source })?;
-                Some(bytes)
-            }
+    /// The bytes of `--input`.
+    fn input(&self) -> Result<Option<Vec<u8>>, FileError> {
+        let Some(path) = &self.input else { return Ok(None) };
+        let what = format!("read {}", path.display());
+        let mut bytes = Vec::new();
+        let result = if path == Path::new("-") {
+            io::stdin().read_to_end(&mut bytes)
+        } else {
+            File::open(path).and_then(|mut file| file.read_to_end(&mut bytes))
         };
-        // What can be known to be wrong is known before the bus is opened.
-        for (object, value) in pairs.iter().filter(|_| file.is_none()) {
+        result.map_err(|source| FileError { what, source })?;
+        Ok(Some(bytes))
+    }
+
+    /// Checks values whose type is known before the bus is opened.
+    fn check_values(&self, node: &Node, pairs: &[(ObjectArg, String)]) -> Result<(), ErrorMessage> {
+        for (object, value) in pairs {
             let entry = match object {
-                ObjectArg::Address(object) => knowledge.offline(*object),
-                ObjectArg::Name(name) => knowledge.offline_name(name),
+                ObjectArg::Address(object) => node.entry(*object),
+                ObjectArg::Name(name) => node.entry_by_name(name),
             };
             if let Some(data_type) = self.data_type.or(entry.map(|entry| entry.data_type)) {
-                check(data_type, value).map_err(|error| Failure::new(Kind::Usage, format!("{object}: {error}")))?;
+                check(data_type, value).map_err(|error| ErrorMessage::usage(format!("{object}: {error}")))?;
             }
+        }
+        Ok(())
+    }
+
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let pairs = self.pairs()?;
+        let mut node = Node::with_overrides(self.node, &open::overrides(global, &[self.node])?);
+        let file = self.input()?;
+        if file.is_none() {
+            self.check_values(&node, &pairs)?;
         }
         global.with_master(|master| {
             master.listen_to(&[self.node]).or_fail()?;
             let mut ready = Vec::new();
             for (object, value) in &pairs {
-                let at = resolve(&mut knowledge, master, object)?;
+                let at = resolve(&mut node, master, object)?;
                 ready.push(match &file {
                     Some(bytes) => (at, bytes.clone(), DataType::Domain),
                     None => {
-                        let (bytes, data_type) = encode(master, &mut knowledge, at, self.data_type, value)?;
+                        let (bytes, data_type) = encode(master, &mut node, at, self.data_type, value)?;
                         (at, bytes, data_type)
                     }
                 });
             }
             let bar = Transfer::new(global.shows_progress());
-            let mut progress = |moved| bar.moved(moved);
-            let mut options =
-                Options { blocks: self.block.into(), size: self.sdo_size.into(), progress: &mut progress };
+            let (mut progress, mut watch) = (|moved| bar.moved(moved), |_: &_| {});
+            let (form, blocks) = (self.sdo_size.into(), self.block.into());
+            let mut options = WriteOptions { form, blocks, ..WriteOptions::new(&mut progress, &mut watch) };
             for (at, bytes, data_type) in ready {
-                write(master, &knowledge, at, &bytes, &mut options)?;
-                if self.verify {
-                    self.verify(global, master, &mut knowledge, (at, &bytes, data_type), &mut options)?;
+                let is_verifiable = self.verify && !is_signature(&bytes);
+                write(master, &node, at, &bytes, is_verifiable.then_some(data_type), &mut options)?;
+                if self.verify && !is_verifiable {
+                    let message =
+                        format!("node {}: {at} acknowledged the signature; it cannot be read back", self.node);
+                    global.console().note(&message);
                 }
                 bar.finish();
-                global.console().detail(&format!("node {}: {at} written: {}", self.node, hex(&bytes)));
+                let written = text::wire_bytes(&bytes);
+                global.console().detail(&format!("node {}: {at} written: {written}", self.node));
             }
             Ok(())
         })
-    }
-
-    fn verify(
-        &self,
-        global: &Global,
-        master: &mut Master<'_>,
-        knowledge: &mut Knowledge,
-        (at, bytes, data_type): (ObjectId, &[u8], DataType),
-        options: &mut Options<'_>,
-    ) -> anyhow::Result<()> {
-        if is_signature(bytes) {
-            let message =
-                format!("node {}: {at} acknowledged the signature; what it reads is something else", self.node);
-            global.console().note(&message);
-            return Ok(());
-        }
-        let found = read(master, knowledge, at, Some(data_type), options)?;
-        if found.raw != bytes {
-            let message = format!("{at} was acknowledged and reads {} instead of {}", hex(&found.raw), hex(bytes));
-            return Err(Failure::of_node(Kind::Unexpected, self.node, message).into());
-        }
-        Ok(())
     }
 }
 

@@ -5,8 +5,6 @@ use super::text::steers;
 use crate::canopen::id::NodeId;
 use crate::measure::sample::{Number, Source, Status};
 use crate::tasks::autozero::Zeroed;
-use crate::tasks::nmt::StateReport;
-use crate::tasks::scan::Found;
 use crate::tasks::store::Done;
 use serde::Serialize;
 use serde_json::ser::Formatter;
@@ -34,60 +32,6 @@ impl Formatter for Safe {
         }
         Ok(())
     }
-}
-
-/// A node that a scan found.
-pub fn found(out: &mut dyn Write, found: &Found) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Node<'a> {
-        node: u8,
-        state: Option<String>,
-        device_type: Option<String>,
-        profile: Option<u32>,
-        vendor: Option<u32>,
-        product: Option<u32>,
-        revision: Option<u32>,
-        serial: Option<u32>,
-        name: Option<&'a str>,
-        device: Option<&'a str>,
-    }
-    let identity = &found.instrument.identity;
-    let node = Node {
-        node: found.node.get(),
-        state: found.state.map(|state| state.to_string()),
-        device_type: identity.device_type.map(|device_type| format!("0x{device_type:08X}")),
-        profile: identity.profile(),
-        vendor: identity.vendor,
-        product: identity.product,
-        revision: identity.revision,
-        serial: identity.serial,
-        name: identity.name.as_deref(),
-        device: found.instrument.model.as_ref().map(|model| model.description.name.as_str()),
-    };
-    line(out, &node)
-}
-
-/// A state.
-pub fn report(out: &mut dyn Write, report: &StateReport) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct State<'a> {
-        node: u8,
-        state: Option<String>,
-        by: &'a str,
-    }
-    let state = report.state.map(|state| state.to_string());
-    line(out, &State { node: report.node.get(), state, by: report.by.as_str() })
-}
-
-/// Who starts a device after power on.
-pub fn startup(out: &mut dyn Write, node: NodeId, starts: &str, raw: u64) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Startup<'a> {
-        node: u8,
-        startup: &'a str,
-        raw: u64,
-    }
-    line(out, &Startup { node: node.get(), startup: starts, raw })
 }
 
 /// A zero that was set.
@@ -142,18 +86,6 @@ pub fn restored(out: &mut dyn Write, node: NodeId, done: &Done) -> io::Result<()
     line(out, &Restored { node: node.get(), restored: done.groups(), verified: done.verified.as_str() })
 }
 
-/// Something that `nmt watch` saw.
-pub fn seen(out: &mut dyn Write, time: &str, node: NodeId, event: &str, state: Option<&str>) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Seen<'a> {
-        time: &'a str,
-        node: u8,
-        event: &'a str,
-        state: Option<&'a str>,
-    }
-    line(out, &Seen { time, node: node.get(), event, state })
-}
-
 /// A number as JSON has them: decimals keep their digits, what is not finite is null.
 pub(super) struct JsonNumber(pub(super) Option<Number>);
 
@@ -195,29 +127,6 @@ pub fn reading(
         status: status.map(Status::as_str),
     };
     line(out, &reading)
-}
-
-/// A value of the object dictionary.
-#[derive(Debug, Serialize)]
-pub struct ObjectValue<'a> {
-    /// Of which node.
-    pub node: u8,
-    /// `0x1018:1`.
-    pub object: String,
-    /// Its name, where one is known.
-    pub name: Option<String>,
-    /// Its type, where it is known.
-    #[serde(rename = "type")]
-    pub data_type: Option<String>,
-    /// The value: a number or text.
-    pub value: serde_json::Value,
-    /// The bytes in wire order.
-    pub raw: &'a str,
-}
-
-/// A value that `sdo read` found or `sdo write` wrote.
-pub fn object(out: &mut dyn Write, value: &ObjectValue<'_>) -> io::Result<()> {
-    line(out, value)
 }
 
 /// A value of the object dictionary as JSON has it: numbers as numbers, the rest as text.

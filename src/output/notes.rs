@@ -63,7 +63,11 @@ pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> Told {
 pub fn note(note: &Note) -> Told {
     match &note.fact {
         Fact::KeptUntilPowerOff => {
-            Told::new("kept-until-power-off", "not stored: the node loses the new values at power off")
+            let told = Told::new("kept-until-power-off", "not stored: the node loses the new values at power off");
+            match note.node {
+                Some(node) => told.command("to keep them", format!("cangauge store {node}")),
+                None => told,
+            }
         }
         Fact::OperationalAgain => Told::new("operational-again", "the node was operational and is operational again"),
         Fact::LeftOperational => Told::new(

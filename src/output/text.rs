@@ -63,6 +63,11 @@ pub fn significant(number: f64, digits: usize) -> String {
     format!("{number:.*}", usize::try_from(decimals).unwrap_or(0))
 }
 
+/// Bytes in wire order: `0x47000000`.
+pub fn wire_bytes(bytes: &[u8]) -> String {
+    bytes.iter().fold("0x".to_owned(), |text, byte| text + &format!("{byte:02X}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

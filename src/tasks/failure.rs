@@ -7,7 +7,7 @@ pub use crate::master::{LssError, Operation, SdoError, SdoFailure};
 pub use crate::measure::expression::ExpressionError;
 
 use super::note::Effect;
-use super::{autozero, check, detect, host, log, lss, nmt, pdo, read, scan, sdo, settings, store};
+use super::{autozero, check, detect, host, log, lss, nmt, pdo, read, scan, settings, store};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::Service;
 use crate::canopen::object::ObjectId;
@@ -74,8 +74,6 @@ pub enum Cause {
     Read(read::ReadFailure),
     /// A scan did not find or identify nodes.
     Scan(scan::ScanFailure),
-    /// An object could not be named, read or written.
-    Object(sdo::ObjectFailure),
     /// An NMT state was not reached or not confirmed.
     Nmt(nmt::NmtFailure),
     /// Settings were not stored or restored.
@@ -134,7 +132,6 @@ impl Cause {
             Cause::Expression(_) => Kind::Usage,
             Cause::Read(cause) => cause.kind(),
             Cause::Scan(cause) => cause.kind(),
-            Cause::Object(cause) => cause.kind(),
             Cause::Nmt(cause) => cause.kind(),
             Cause::Store(cause) => cause.kind(),
             Cause::Pdo(cause) => cause.kind(),

@@ -4,7 +4,7 @@ use crate::canopen::object::ObjectId;
 use crate::master::{Master, SdoFailure};
 use crate::node::Node;
 use crate::tasks::kept::{self, Held};
-use crate::tasks::signature::{STORING, may_have_acted, sign};
+use crate::tasks::signature::{STORE_TIMEOUT, may_have_acted, sign};
 use crate::tasks::store::{Done, Group, Verified, answers, check_capability};
 use crate::tasks::{Failure, Kind};
 
@@ -64,7 +64,7 @@ fn load(master: &mut Master<'_>, device: &Node, group: Group) -> Result<(), Fail
     let unknown = format!(
         "\"load\" went to {object} once and is not repeated; whether its next reset brings the defaults is not known"
     );
-    let result = sign(master, device, object, b"load", STORING);
+    let result = sign(master, device, object, b"load", STORE_TIMEOUT);
     let error = match result.map_err(|error| Failure::from(error).knowing(node, &unknown))? {
         Ok(()) => return Ok(()),
         Err(error) => error,

@@ -16,7 +16,7 @@ use crate::node::Overrides;
 use crate::node::read::read_values;
 use crate::node::survey::identify;
 use crate::tasks::kept::{self, Held};
-use crate::tasks::signature::{STORING, may_have_acted, sign};
+use crate::tasks::signature::{STORE_TIMEOUT, may_have_acted, sign};
 use crate::tasks::{Failure, Kind};
 
 /// Settings that are stored and restored together; each is a sub-index of 1010h and 1011h.
@@ -270,7 +270,7 @@ fn save(master: &mut Master<'_>, device: &Node, group: Group) -> Result<(), Fail
     let node = device.id;
     let object = ObjectId::new(STORE, group.sub());
     let unknown = format!("\"save\" went to {object} once and is not repeated; whether it was stored is not known");
-    let result = sign(master, device, object, b"save", STORING);
+    let result = sign(master, device, object, b"save", STORE_TIMEOUT);
     let error = match result.map_err(|error| Failure::from(error).knowing(node, &unknown))? {
         Ok(()) => return Ok(()),
         Err(error) => error,

@@ -27,7 +27,7 @@ fn a_boot_up_confirms_a_reset() {
 }
 
 #[test]
-fn guarding_confirms_where_it_is_harmless() {
+fn guarding_confirms_if_it_is_harmless() {
     // D-20-9 and MC1609 have 100Ch and 100Dh, both 0; DPS and MH-4 have no guarding.
     let done = Bench::of(ALL).run("nmt start 1-3,127").exit(0);
     assert_eq!(
@@ -36,11 +36,11 @@ fn guarding_confirms_where_it_is_harmless() {
     );
     assert_eq!(
         done.stderr,
-        "node 1: sent, and nothing confirms it: no heartbeat (1017h is 0)\n\
-         node 127: sent, and nothing confirms it: no heartbeat (1017h is 0)\n"
+        "node 1: command sent, not confirmed: the node sends no heartbeat (1017h is 0)\n\
+         node 127: command sent, not confirmed: the node sends no heartbeat (1017h is 0)\n"
     );
     assert_eq!(done.frames_of("000"), ["0101", "0102", "0103", "017F"]);
-    // The first RTR arms life guarding where 100Ch and 100Dh say so: then nobody asks.
+    // If 100Ch or 100Dh is not 0, the first RTR would start life guarding: no RTR is sent.
     for (time, factor) in [(100, 3), (100, 0), (0, 3)] {
         let set = format!("{{ \"0x100C\" = {time}, \"0x100D\" = {factor} }}");
         let guarded = format!("[[device]]\nkind = \"d20\"\nnode = 2\nset = {set}\n");
@@ -50,20 +50,20 @@ fn guarding_confirms_where_it_is_harmless() {
 }
 
 #[test]
-fn silence_proves_stopped() {
+fn missing_sdo_answer_proves_stopped() {
     let done = Bench::of(ALL).run("nmt stop 127").prints("127  stopped  sdo\n");
     assert_eq!(done.frames_of("000"), ["027F"]);
 }
 
 #[test]
-fn what_cannot_be_confirmed_is_said_or_is_exit_3() {
+fn unconfirmed_state_is_a_note_or_exit_3() {
     let bench = Bench::of(ALL);
     let done = bench.run("nmt start 127 -f json").prints("{\"node\":127,\"state\":null,\"by\":\"none\"}\n");
-    assert_eq!(done.stderr, "node 127: sent, and nothing confirms it: no heartbeat (1017h is 0)\n");
+    assert_eq!(done.stderr, "node 127: command sent, not confirmed: the node sends no heartbeat (1017h is 0)\n");
     let done = bench.run("nmt start 127 --confirm").exit(3);
     assert_eq!(
         done.stderr,
-        "cangauge: node 127: sent, and nothing confirms it: no heartbeat (1017h is 0)\n\
+        "cangauge: node 127: command sent, not confirmed: the node sends no heartbeat (1017h is 0)\n\
          hint: set a heartbeat: cangauge sdo write 127 producer-heartbeat-time 1000\n"
     );
 }
@@ -87,64 +87,64 @@ fn no_wait_only_sends() {
 }
 
 #[test]
-fn states_are_told_and_never_guessed() {
+fn unknown_states_are_never_guessed() {
     let done = Bench::of(ALL).run("nmt state 1-3,127 -f json").exit(0);
-    let told: Vec<_> = done.json().iter().map(|node| (node["state"].clone(), node["by"].clone())).collect();
+    let shown: Vec<_> = done.json().iter().map(|node| (node["state"].clone(), node["by"].clone())).collect();
     let guarding = ("pre-operational".into(), "guarding".into());
     let none = (serde_json::Value::Null, "none".into());
-    assert_eq!(told, [none.clone(), guarding.clone(), guarding, none]);
+    assert_eq!(shown, [none.clone(), guarding.clone(), guarding, none]);
     assert_eq!(done.frames_of("000"), [""; 0]);
 }
 
 #[test]
-fn a_node_that_is_not_there() {
+fn absent_node_is_exit_3() {
     let bench = Bench::of(ALL);
     let done = bench.run("nmt state 9").exit(3);
-    assert_eq!(done.stderr, "cangauge: node 9: no heartbeat and no SDO answer\nhint: who is there: cangauge scan\n");
+    assert_eq!(done.stderr, "cangauge: node 9: no heartbeat and no SDO answer\nhint: list the nodes: cangauge scan\n");
     let done = bench.run("nmt state 1,9").exit(7);
     assert_eq!(done.stdout, "1  -  none\n9  -  none\n");
     let done = bench.run("nmt start 9 --confirm").exit(3);
     assert_eq!(
         done.stderr,
-        "cangauge: node 9: sent, and nothing came back: no heartbeat, no boot-up, no SDO answer\n\
-         hint: who is there: cangauge scan\n"
+        "cangauge: node 9: command sent, but no heartbeat, no boot-up and no SDO answer came\n\
+         hint: list the nodes: cangauge scan\n"
     );
 }
 
 #[test]
-fn a_stopped_node_is_woken() {
-    // It has no SDO: only its heartbeat tells.
+fn stop_is_confirmed_by_heartbeat_or_missing_sdo() {
+    // A stopped node has no SDO: only its heartbeat shows the state.
     let bench = Bench::described(&format!("{HEARTBEAT}[[device]]\nkind = \"dps\"\nnode = 6\n"));
     let done = bench.run("nmt stop 5,6").exit(0);
     assert_eq!(done.stdout, "5  stopped  heartbeat\n6  stopped  sdo\n");
 }
 
 #[test]
-fn a_probe_sets_the_heartbeat_for_a_moment_and_puts_it_back() {
+fn probe_sets_and_restores_the_heartbeat_time() {
     let done = Bench::of("mh4@5").run("nmt state 5 --probe").prints("5  pre-operational  heartbeat\n");
     let writes: Vec<&str> = done.frames_of("605").into_iter().filter(|request| request.starts_with("2B17")).collect();
     assert_eq!(writes.len(), 2, "{:?}", done.frames);
     assert!(writes[0] != writes[1] && writes[1] == "2B17100000000000", "{writes:?}");
-    // Where something tells the state already, nothing is set.
+    // If the state is known, nothing is set.
     let done = Bench::described(HEARTBEAT).run("nmt state 5 --probe").exit(0);
     assert!(done.frames_of("605").iter().all(|request| request.starts_with('4')), "{:?}", done.frames);
 }
 
 #[test]
-fn what_happens_is_followed() {
+fn watch_shows_boot_ups_and_states() {
     let bench = Bench::described(&format!("{HEARTBEAT}[[device]]\nkind = \"dps\"\nnode = 6\n"));
     let done = bench.run("nmt watch --duration 1s").exit(0);
-    let said: Vec<String> =
+    let lines: Vec<String> =
         done.stdout.lines().map(|line| line.split_whitespace().skip(1).collect::<Vec<_>>().join(" ")).collect();
-    assert_eq!(said, ["5 boot-up", "6 boot-up", "5 state pre-operational"]);
+    assert_eq!(lines, ["5 boot-up", "6 boot-up", "5 state pre-operational"]);
     assert_eq!(done.frames.iter().filter(|frame| !frame.starts_with("70")).count(), 0, "{:?}", done.frames);
 }
 
 #[test]
-fn who_starts_the_device() {
+fn startup_shows_and_sets_how_a_device_starts() {
     let bench = Bench::of("mh4@5,dps@6");
     bench.run("nmt startup 5").prints("wait\n");
     let done = bench.run("nmt startup 5 auto").prints("auto\n");
-    assert!(done.stderr.contains("only when it is stored: cangauge store"), "{}", done.stderr);
+    assert!(done.stderr.contains("to keep them: cangauge store"), "{}", done.stderr);
     assert!(bench.run("nmt startup 6").exit(6).stderr.contains("1F80h"));
 }

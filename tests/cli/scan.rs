@@ -4,7 +4,7 @@ use super::{ALL, Bench};
 use serde_json::json;
 
 #[test]
-fn a_table_of_who_is_there() {
+fn table_lists_every_node() {
     let done = Bench::of(ALL).run("scan").prints(
         "NODE  STATE  DEVICE  NAME      VENDOR     PRODUCT     REVISION    SERIAL\n\
          \u{20}  1  -      mh4     MH-4-CAN  WIKA       0x00000001  0x00010007   10001\n\
@@ -16,7 +16,7 @@ fn a_table_of_who_is_there() {
 }
 
 #[test]
-fn the_silent_nodes_are_asked_once_more_side_by_side() {
+fn nodes_without_answer_are_asked_once_more_in_parallel() {
     let done = Bench::of("mh4@5").run("scan").exit(0);
     for node in 1..=127u8 {
         let asked: Vec<u64> = (done.frames.iter().zip(&done.times))
@@ -32,31 +32,36 @@ fn the_silent_nodes_are_asked_once_more_side_by_side() {
 }
 
 #[test]
-fn json_with_null_where_nothing_is_known() {
+fn unknown_fields_are_null_in_json() {
     let done = Bench::of("mc1609@3,mh4@5").run("scan 1-16 --format json").exit(0);
     assert_eq!(
         done.json(),
         [
-            json!({"node": 3, "state": null, "device_type": "0x00020194", "profile": 404, "vendor": 285,
+            json!({"node": 3, "state": null, "device_type": "0x00020194", "profile": 404, "vendor": 285, "vendor_name": "HBM",
                 "product": 5641, "revision": 131_073, "serial": 40_003, "name": null, "device": "mc1609"}),
-            json!({"node": 5, "state": null, "device_type": "0x00820194", "profile": 404, "vendor": 71,
+            json!({"node": 5, "state": null, "device_type": "0x00820194", "profile": 404, "vendor": 71, "vendor_name": "WIKA",
                 "product": 1, "revision": 65_543, "serial": 10_001, "name": "MH-4-CAN", "device": "mh4"}),
         ]
     );
     let keys = done.stdout.lines().next().expect("a line");
-    assert!(keys.starts_with(r#"{"node":3,"state":null,"device_type":"0x00020194","profile":404,"vendor":"#), "{keys}");
+    assert!(
+        keys.starts_with(
+            r#"{"node":3,"state":null,"device_type":"0x00020194","profile":404,"device":"mc1609","name":null,"vendor":"#
+        ),
+        "{keys}"
+    );
 }
 
 #[test]
 fn csv() {
     Bench::of("mh4@5").run("scan 5 -f csv").prints(
-        "node,state,device,name,vendor,product,revision,serial\n\
-         5,,mh4,MH-4-CAN,WIKA,0x00000001,0x00010007,10001\n",
+        "node,state,device,name,vendor,vendor_name,product,revision,serial\n\
+         5,,mh4,MH-4-CAN,71,WIKA,1,65543,10001\n",
     );
 }
 
 #[test]
-fn a_heartbeat_tells_the_state() {
+fn state_comes_from_the_heartbeat() {
     let bench = Bench::described(
         "[[device]]\nkind = \"mh4\"\nnode = 5\nset = { \"0x1017\" = 50 }\n\
          [[device]]\nkind = \"dps\"\nnode = 6\nstart = true\nset = { \"0x1017\" = 50 }\n",
@@ -73,12 +78,12 @@ fn two_devices_of_a_kind_have_their_own_serial_numbers() {
 }
 
 #[test]
-fn nobody_is_exit_3() {
+fn no_node_is_exit_3() {
     let bench = Bench::of("mh4@5");
     bench.run("scan 6-9").fails(
         3,
         "cangauge: no node answered\n\
-         hint: check the sensor's power, the bit rate, the wiring and the 120 ohm terminators; \
+         hint: check the power of the sensor, the bit rate, the wiring and the 120 ohm terminators; \
          without hardware: --bus sim\n",
     );
     let error = bench.run("scan 6-9 --format json").exit(3).error();
@@ -86,13 +91,13 @@ fn nobody_is_exit_3() {
 }
 
 #[test]
-fn all_is_everybody() {
+fn all_is_every_node() {
     let done = Bench::of("mh4@1,dps@127").run("scan all -f csv -q").exit(0);
     assert_eq!((done.stdout.lines().count(), done.stderr.as_str()), (3, ""));
 }
 
 #[test]
-fn a_timeout_of_the_users_own_is_kept() {
+fn timeout_option_is_used() {
     let done = Bench::of("mh4@5").run("scan 5,6 -t 1s --retries 3").exit(0);
     assert_eq!(done.frames_of("606").len(), 4);
     assert!(done.stderr.starts_with("1 node in 1."), "{}", done.stderr);
@@ -107,7 +112,7 @@ fn passive_sends_nothing() {
     let done = bench.run("scan --passive -f json").exit(0);
     let states: Vec<_> = done.json().iter().map(|node| node["state"].clone()).collect();
     let unknown = serde_json::Value::Null;
-    assert_eq!(states, [json!("pre-operational"), unknown.clone(), unknown], "only a heartbeat tells");
+    assert_eq!(states, [json!("pre-operational"), unknown.clone(), unknown], "only a heartbeat shows a state");
     let foreign =
         done.frames.iter().filter(|frame| !["705#", "706#", "707#", "186#"].iter().any(|id| frame.starts_with(id)));
     assert_eq!(foreign.collect::<Vec<_>>(), [""; 0]);

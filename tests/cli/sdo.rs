@@ -118,8 +118,8 @@ fn an_object_that_only_its_device_has_is_checked_before_it_is_written() {
 fn an_object_without_a_known_type_asks_for_it() {
     Bench::of("mh4@5").run("sdo write 5 0x5000 5").fails(
         2,
-        "cangauge: node 5: write 0x5000:0: its type is not known\n\
-         hint: say it: cangauge sdo write 5 0x5000:0 5 --type u32 (or i16, r32, vs)\n",
+        "cangauge: node 5: write 0x5000:0: its type is unknown\n\
+         hint: state it: cangauge sdo write 5 0x5000:0 VALUE --type u32 (or i16, r32, vs)\n",
     );
 }
 

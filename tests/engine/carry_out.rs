@@ -11,17 +11,16 @@ use cangauge::canopen::nmt::NmtState;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::pdo::TpdoNumber;
 use cangauge::device::unit::Unit;
-use cangauge::master::transfer::Moved;
 use cangauge::master::{Master, Timing};
 use cangauge::measure::expression::Expression;
 use cangauge::measure::expression::verdict::Verdict;
 use cangauge::measure::sample::{Sample, Source};
 use cangauge::node::Overrides;
+use cangauge::node::{Node, WriteOptions};
 use cangauge::tasks::log::{Mode, Note, Observer, Plan, log};
 use cangauge::tasks::lss::{self, Job, LssAddress, LssRange, Rate};
 use cangauge::tasks::nmt::Seen;
 use cangauge::tasks::pdo::{self, Item, Line, Send, Settings, Wish};
-use cangauge::tasks::sdo::{Knowledge, Options, SizeMode};
 use cangauge::tasks::settings::{self, errors, filter, info, limits, minmax, unit};
 use cangauge::tasks::{Failure, autozero, check, detect, nmt, read, restore, scan, sdo, store};
 use std::ops::ControlFlow;
@@ -105,10 +104,6 @@ fn described(spec: &Spec, id: u8, how: How) -> Overrides {
     device.map(|device| (node(id), model(device.kind))).into_iter().collect()
 }
 
-fn options(how: How, progress: &mut dyn FnMut(Moved)) -> Options<'_> {
-    Options { blocks: how.blocks, size: SizeMode::Auto, progress }
-}
-
 fn target(spec: &Spec, target: &Target) -> lss::Target {
     match target {
         Target::Node(id) => lss::Target::Node(node(*id)),
@@ -161,14 +156,15 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             shown.into_iter().next().map_or(Claim::Nothing, |shown| Claim::Mapped(shown.settings))
         }
         Command::SdoRead { node: id, object, how } => {
-            let mut knowledge = Knowledge::new(node(*id), &described(spec, *id, *how));
-            let mut progress = |_| {};
-            let value = sdo::read(master, &mut knowledge, *object, None, &mut options(*how, &mut progress))?;
+            let mut node = Node::with_overrides(node(*id), &described(spec, *id, *how));
+            let value = sdo::read(master, &mut node, *object, None, (how.blocks, &mut |_| {}))?;
             Claim::Values(vec![(*id, *object, value.raw)])
         }
         Command::SdoWrite { node: id, object, bytes, how } => {
-            let knowledge = Knowledge::new(node(*id), &described(spec, *id, *how));
-            sdo::write(master, &knowledge, *object, bytes, &mut options(*how, &mut |_| {}))?;
+            let node = Node::with_overrides(node(*id), &described(spec, *id, *how));
+            let (progress, watch) = (&mut |_| {}, &mut |_: &_| {});
+            let mut options = WriteOptions { blocks: how.blocks, ..WriteOptions::new(progress, watch) };
+            sdo::write(master, &node, *object, bytes, None, &mut options)?;
             Claim::Nothing
         }
         Command::Nmt { what, nodes: ids, all } => {
@@ -188,8 +184,8 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             Claim::Nothing
         }
         Command::NmtProbe { node: id } => {
-            let probed = nmt::probe(master, node(*id))?;
-            Claim::Probed(probed.trouble.is_none())
+            let probed = nmt::probe(master, &Node::new(node(*id)))?;
+            Claim::Probed(probed.failure.is_none())
         }
         Command::Startup { node: id, auto } => {
             let set = if *auto { nmt::Starts::Auto } else { nmt::Starts::Wait };

@@ -35,10 +35,10 @@ use cangauge::bus::Mono;
 use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::nmt::NmtState;
 use cangauge::canopen::object::ObjectId;
+use cangauge::node::write::is_signature;
 use cangauge::sim::State;
 use cangauge::tasks::Kind;
 use cangauge::tasks::pdo::Settings;
-use cangauge::tasks::sdo::is_signature;
 use cangauge::tasks::store::Group;
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -7,8 +7,8 @@ use cangauge::bus::memory::{Outbox, Station, Tuning};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
+use cangauge::node::write::is_signature;
 use cangauge::sim::{Device, State};
-use cangauge::tasks::sdo::is_signature;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 

@@ -7,6 +7,7 @@ use cangauge::canopen::object::ObjectId;
 use cangauge::device::catalog;
 use cangauge::device::scalar::Scalar;
 use cangauge::master::{Error, Master, Timing};
+use cangauge::node::Node;
 use cangauge::sim::{Device, Setup};
 use cangauge::tasks::nmt::probe;
 use std::time::Duration;
@@ -26,7 +27,7 @@ fn left_of(before: i64, interrupts: &[u64]) -> (Vec<u8>, bool) {
     bus.attach(Device::new(setup).expect("a device"));
     interrupts.iter().for_each(|at| bus.interrupt_at(Mono::at(Duration::from_millis(*at))));
     let mut master = Master::new(&mut bus, Timing::default());
-    let result = probe(&mut master, node);
+    let result = probe(&mut master, &Node::new(node));
     master.settle();
     let late = master.now() + Duration::from_millis(500);
     while master.now() < late {

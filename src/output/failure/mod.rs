@@ -15,7 +15,6 @@ mod node;
 mod pdo;
 mod read;
 mod scan;
-mod sdo;
 mod settings;
 mod store;
 
@@ -224,7 +223,6 @@ fn words(failure: &Failure) -> Words {
         Cause::Expression(error) => below::expression(error),
         Cause::Read(cause) => read::words(failure, cause),
         Cause::Scan(cause) => scan::words(failure, cause),
-        Cause::Object(cause) => sdo::words(failure, cause),
         Cause::Nmt(cause) => nmt::words(failure, cause),
         Cause::Store(cause) => store::words(failure, cause),
         Cause::Pdo(cause) => pdo::words(failure, cause),

@@ -5,6 +5,18 @@ use crate::tasks::Failure;
 use crate::tasks::nmt::NmtFailure;
 
 /// The message and the hint for a cause.
-pub(super) fn words(_failure: &Failure, cause: &NmtFailure) -> Words {
-    match *cause {}
+pub(super) fn words(failure: &Failure, cause: &NmtFailure) -> Words {
+    let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
+    match cause {
+        NmtFailure::OtherState { state, wanted } => Words::new(format!("the node is {state}, not {wanted}")),
+        NmtFailure::NoSign => Words::new("command sent, but no heartbeat, no boot-up and no SDO answer came")
+            .hint("list the nodes: cangauge scan"),
+        NmtFailure::NoBootUp => Words::new("command sent, but no boot-up message came")
+            .hint(format!("check whether the node is there: cangauge nmt state {node}")),
+        NmtFailure::NotConfirmed => Words::new("command sent, not confirmed: the node sends no heartbeat (1017h is 0)")
+            .hint(format!("set a heartbeat: cangauge sdo write {node} producer-heartbeat-time 1000")),
+        NmtFailure::Absent => Words::new("no heartbeat and no SDO answer").hint("list the nodes: cangauge scan"),
+        NmtFailure::NoStartupObject => Words::new("the object that decides how this device starts is unknown")
+            .hint(format!("many devices have 1F80h; read it: cangauge sdo read {node} 0x1F80")),
+    }
 }

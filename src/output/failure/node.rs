@@ -1,7 +1,9 @@
 //! Text for causes: reading or writing a node failed.
 
 use super::Words;
+use crate::canopen::value::Value;
 use crate::node::Error;
+use crate::output::text;
 use crate::tasks::Failure;
 
 /// The message and the hint for a cause.
@@ -11,7 +13,10 @@ pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
         Error::Bus(error) => super::below::bus(error),
         Error::Interrupted => Words::new("interrupted"),
         Error::Sdo(error) | Error::Unknown(error) => super::below::sdo(error),
-        Error::NotKept { object, found, .. } => Words::new(format!("{object} was acknowledged and reads {found}")),
+        Error::NotKept { object, written, found, .. } => {
+            let (found, written) = (shown(found), shown(written));
+            Words::new(format!("{object} was acknowledged and reads {found} instead of {written}"))
+        }
         Error::Width { object, width, given, .. } => Words::new(format!(
             "write {object}: the object has {width} bytes, the value {given}, and the device accepts no size"
         )),
@@ -32,5 +37,13 @@ pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
                 .hint(format!("check whether it is there: cangauge nmt state {node}; cangauge scan")),
             None => Words::new("no boot-up message after the reset"),
         },
+    }
+}
+
+/// A value; bytes in wire order.
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Bytes(bytes) => text::wire_bytes(bytes),
+        value => value.to_string(),
     }
 }

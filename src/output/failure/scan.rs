@@ -1,4 +1,4 @@
-//! Text for causes: a scan did not find or identify nodes.
+//! Text for causes: a scan did not find nodes.
 
 use super::Words;
 use crate::tasks::Failure;
@@ -6,5 +6,12 @@ use crate::tasks::scan::ScanFailure;
 
 /// The message and the hint for a cause.
 pub(super) fn words(_failure: &Failure, cause: &ScanFailure) -> Words {
-    match *cause {}
+    match cause {
+        ScanFailure::NoAnswer => Words::new("no node answered").hint(
+            "check the power of the sensor, the bit rate, the wiring and the 120 ohm terminators; without hardware: \
+             --bus sim",
+        ),
+        ScanFailure::NoFrame => Words::new("no node sent anything")
+            .hint("a node without heartbeat and TPDOs sends nothing; ask the nodes: cangauge scan"),
+    }
 }

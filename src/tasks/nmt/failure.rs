@@ -1,16 +1,38 @@
 //! Causes of failures: an NMT state was not reached or not confirmed.
 
+use crate::canopen::nmt::NmtState;
 use crate::tasks::Kind;
 use crate::tasks::failure::Cause;
 
 /// An NMT state was not reached or not confirmed.
 #[derive(Clone, Debug, PartialEq)]
-pub enum NmtFailure {}
+pub enum NmtFailure {
+    /// The node is in another state.
+    OtherState {
+        /// The state of the node.
+        state: NmtState,
+        /// The state that was requested.
+        wanted: NmtState,
+    },
+    /// The node showed no sign of life after the command.
+    NoSign,
+    /// No boot-up message came after a reset.
+    NoBootUp,
+    /// Nothing confirms the state.
+    NotConfirmed,
+    /// The node sends no heartbeat and does not answer SDO requests.
+    Absent,
+    /// The description does not say which object decides how the device starts.
+    NoStartupObject,
+}
 
 impl NmtFailure {
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
-        match *self {}
+        match self {
+            NmtFailure::OtherState { .. } | NmtFailure::NoStartupObject => Kind::Unexpected,
+            NmtFailure::NoSign | NmtFailure::NoBootUp | NmtFailure::NotConfirmed | NmtFailure::Absent => Kind::NoAnswer,
+        }
     }
 }
 

@@ -1,80 +1,97 @@
-//! Finds a state out by switching the heartbeat on for a moment.
+//! Finds out a state by switching on the heartbeat briefly.
 
-use crate::canopen::id::NodeId;
-use crate::canopen::nmt::Life;
-use crate::canopen::sdo::DownloadSize;
 use crate::canopen::value::DataType;
-use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
+use crate::master::{Error as MasterError, Master, SdoError, SdoFailure};
 use crate::node::read::read_values;
 use crate::node::state::{HEARTBEAT_TIME, LifeWatch, Proof, StateReport};
+use crate::node::write::write;
+use crate::node::{Error, Node, Written};
+use crate::tasks::Failure;
 use std::time::Duration;
 
-/// The heartbeat that is set for a moment.
-const PERIOD: Duration = Duration::from_millis(100);
+/// The heartbeat time during the probe.
+const PROBE_PERIOD: Duration = Duration::from_millis(100);
 
-/// How many more requests to stop are passed over until 1017h is put back.
-const DEAF: u32 = 5;
+/// How many further Ctrl-C are ignored until 1017h is restored.
+const MAX_INTERRUPTS: u32 = 5;
 
-/// What became of a probe.
+/// The result of a probe.
 #[derive(Debug)]
 pub struct Probe {
-    /// The state, if it came out.
+    /// The state, if it was found out.
     pub report: StateReport,
-    /// What went wrong with setting 1017h or putting it back, in words.
-    pub trouble: Option<String>,
+    /// Why the probe failed.
+    pub failure: Option<Failure>,
+    /// What 1017h holds after the probe if it was not restored, in milliseconds.
+    pub left: Option<LeftHeartbeat>,
 }
 
-/// Sets 1017h of a node, waits for a heartbeat and puts 1017h back, on every way out.
+/// The heartbeat time of the probe, which was not restored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LeftHeartbeat {
+    /// The heartbeat time in milliseconds.
+    pub milliseconds: u16,
+    /// The time before the probe in milliseconds.
+    pub before: u16,
+    /// Whether the node acknowledged it; otherwise it may hold either time.
+    pub is_certain: bool,
+}
+
+/// Sets 1017h of a node, waits for a heartbeat and restores 1017h in every case.
 ///
 /// # Errors
-/// What stops everything.
-pub fn probe(master: &mut Master<'_>, node: NodeId) -> Result<Probe, Error> {
-    let unknown = StateReport { node, state: None, by: Proof::None, is_present: true };
-    let failed = |trouble: String| Ok(Probe { report: unknown, trouble: Some(trouble) });
-    let before = match read_values(master, &[(node, HEARTBEAT_TIME, DataType::Unsigned(2))])?.pop() {
+/// Bus errors and Ctrl-C. What the node rejects or does not answer is in the result.
+pub fn probe(master: &mut Master<'_>, node: &Node) -> Result<Probe, MasterError> {
+    let unknown = StateReport::unknown(node.id, true);
+    let failed = |error: SdoError| Probe { report: unknown, failure: Some(error.into()), left: None };
+    let before = match read_values(master, &[(node.id, HEARTBEAT_TIME, DataType::Unsigned(2))])?.pop() {
+        Some(Err(error)) => return Ok(failed(error)),
         Some(Ok(value)) => value.as_u64().and_then(|time| u16::try_from(time).ok()).unwrap_or(0),
-        Some(Err(error)) => return failed(error.to_string()),
-        None => return failed("nothing was read".to_owned()),
+        None => 0,
     };
-    let set = |time: u16| Request::write(node, HEARTBEAT_TIME, time.to_le_bytes().to_vec(), DownloadSize::Indicated);
-    let milliseconds = u16::try_from(PERIOD.as_millis()).unwrap_or(u16::MAX);
-    let begun = master.transfer_one(set(milliseconds));
-    if let Ok(Err(error @ SdoError { failure: SdoFailure::Refused(_), .. })) = &begun {
-        return failed(error.to_string());
+    let milliseconds = u16::try_from(PROBE_PERIOD.as_millis()).unwrap_or(u16::MAX);
+    let set = write(master, node, HEARTBEAT_TIME, &milliseconds.to_le_bytes());
+    if let Err(Error::Sdo(error @ SdoError { failure: SdoFailure::Refused(_), .. })) = set {
+        return Ok(failed(error));
     }
     let mut watch = LifeWatch::default();
-    let waited = match &begun {
-        Ok(Ok(_)) => {
-            let until = master.now() + PERIOD + master.timing().timeout;
-            watch.wait(master, until, &|watch| matches!(watch.lives.get(&node), Some(Life::State(_))))
+    let waited = match &set {
+        Ok(_) => {
+            let until = master.now() + PROBE_PERIOD + master.timing().timeout;
+            watch.wait(master, until, &|watch| watch.state(node.id).is_some())
         }
-        // Without an answer it may have been set all the same.
-        Ok(Err(_)) | Err(_) => Ok(()),
+        Err(_) => Ok(()),
     };
-    let restored = put_back(master, &set(before));
-    let begun = begun?;
+    let restored = restore(master, node, before);
+    let is_certain = set.is_ok();
+    let failure = split(set)?;
     waited?;
-    let trouble = match (begun, restored?) {
-        (Ok(_), Ok(_)) => None,
-        (Err(error), Ok(_)) => Some(error.to_string()),
-        (Ok(_), Err(error)) => Some(format!("{error}; 1017h stays at {milliseconds} ms")),
-        (Err(_), Err(error)) => Some(format!("{error}; 1017h may stay at {milliseconds} ms")),
+    let (failure, left) = match split(restored)? {
+        None => (failure, None),
+        Some(error) => (Some(error), Some(LeftHeartbeat { milliseconds, before, is_certain })),
     };
-    let report = match watch.lives.get(&node) {
-        Some(Life::State(state)) => StateReport { state: Some(*state), by: Proof::Heartbeat, ..unknown },
-        _ => unknown,
-    };
-    Ok(Probe { report, trouble })
+    let report = watch.state(node.id).map_or(unknown, |state| StateReport::known(node.id, state, Proof::Heartbeat));
+    Ok(Probe { report, failure, left })
 }
 
-/// Writes what was there before, whatever asks to stop in the meantime.
-fn put_back(master: &mut Master<'_>, write: &Request) -> Result<Result<Answer, SdoError>, Error> {
-    let mut result = master.transfer_one(write.clone());
-    for _ in 0..DEAF {
+/// Writes the old heartbeat time, also after Ctrl-C.
+fn restore(master: &mut Master<'_>, node: &Node, before: u16) -> Result<Written, Error> {
+    let mut result = write(master, node, HEARTBEAT_TIME, &before.to_le_bytes());
+    for _ in 0..MAX_INTERRUPTS {
         if !matches!(result, Err(Error::Interrupted)) {
             break;
         }
-        result = master.transfer_one(write.clone());
+        result = write(master, node, HEARTBEAT_TIME, &before.to_le_bytes());
     }
     result
+}
+
+/// The failure of the node itself; bus errors and Ctrl-C are errors.
+fn split(result: Result<Written, Error>) -> Result<Option<Failure>, MasterError> {
+    match result {
+        Ok(_) => Ok(None),
+        Err(Error::Bus(error)) => Err(MasterError::Bus(error)),
+        Err(Error::Interrupted) => Err(MasterError::Interrupted),
+        Err(error) => Ok(Some(error.into())),
+    }
 }

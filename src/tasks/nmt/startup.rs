@@ -1,30 +1,34 @@
-//! Who starts a device after power on: the master, or the device itself (1F80h, and its like).
+//! How a device starts after power on: by the master, or by itself (1F80h, or an object of the device).
 
+use super::NmtFailure;
 use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
-use crate::device::description::Startup;
-use crate::master::{BlockMode, Master};
-use crate::node::Overrides;
+use crate::master::Master;
 use crate::node::survey::identify;
-use crate::tasks::sdo::{Knowledge, Options, SizeMode, write};
-use crate::tasks::{Failure, Kind};
-use std::sync::Arc;
+use crate::node::write::write_and_verify;
+use crate::node::{Node, Overrides};
+use crate::tasks::Failure;
 
-/// Who starts the device.
+/// How the device starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Starts {
     /// It waits in PRE-OPERATIONAL for the master.
     Wait,
     /// It goes to OPERATIONAL by itself.
     Auto,
-    /// A number whose meaning its description does not tell.
+    /// A number that its description does not explain.
     Other(u64),
 }
 
-/// What a device is set to.
+/// How a device is set to start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StartupReport {
-    /// Who starts it.
+    /// The node.
+    pub node: NodeId,
+    /// The object that was read.
+    pub object: ObjectId,
+    /// How it starts.
     pub starts: Starts,
     /// The number in the object.
     pub raw: u64,
@@ -32,46 +36,29 @@ pub struct StartupReport {
     pub doubt: String,
 }
 
-/// Reads who starts a device, after setting it if `set` says so. It is read back after being set.
+/// Reads how a device starts. With `set` it is set first and read back.
 ///
 /// # Errors
-/// A device whose description names no such object, refusals, and an object that does not keep what was
-/// written.
+/// [`NmtFailure::NoStartupObject`]; a transfer that failed, an object that reads differently, bus errors and Ctrl-C.
 pub fn startup(
     master: &mut Master<'_>,
     node: NodeId,
     overrides: &Overrides,
     set: Option<Starts>,
 ) -> Result<StartupReport, Failure> {
-    let model = identify(master, &[node], overrides)?.pop().and_then(|instrument| instrument.model);
-    let entry = model.as_ref().and_then(|model| model.description.startup.clone()).ok_or_else(|| {
-        let message = "no source at hand says which object of this device decides who starts it";
-        Failure::of_node(Kind::Unexpected, node, message)
-            .hint(format!("many devices have 1F80h; read it raw: cangauge sdo read {node} 0x1F80"))
-    })?;
-    let wanted = match set {
+    let node = identify(master, &[node], overrides)?.pop().unwrap_or_else(|| Node::new(node));
+    let described = node.model.as_ref().and_then(|model| model.description.startup.clone());
+    let entry = described.ok_or_else(|| Failure::at(node.id, NmtFailure::NoStartupObject))?;
+    let number = match set {
         Some(Starts::Wait) => Some(entry.wait),
         Some(Starts::Auto) => Some(entry.auto),
         Some(Starts::Other(_)) | None => None,
     };
-    if let Some(number) = wanted {
-        let data = DataType::Unsigned(4).encode_text(&number.to_string());
-        let data = data.map_err(|error| Failure::of_node(Kind::Usage, node, error))?;
-        let known = model.as_ref().map(|model| (node, Arc::clone(model)));
-        let knowledge = Knowledge::new(node, &known.into_iter().collect());
-        let mut options = Options { blocks: BlockMode::Never, size: SizeMode::Auto, progress: &mut |_| {} };
-        write(master, &knowledge, entry.object, &data, &mut options)?;
+    let data_type = DataType::Unsigned(4);
+    if let Some(number) = number {
+        write_and_verify(master, &node, entry.object, &number.to_le_bytes(), data_type)?;
     }
-    let found = report(&entry, master, node)?;
-    if wanted.is_some_and(|wanted| u64::from(wanted) != found.raw) {
-        let message = format!("{} was acknowledged and reads {}", entry.object, found.raw);
-        return Err(Failure::of_node(Kind::Unexpected, node, message));
-    }
-    Ok(found)
-}
-
-fn report(entry: &Startup, master: &mut Master<'_>, node: NodeId) -> Result<StartupReport, Failure> {
-    let raw = master.read(node, entry.object, DataType::Unsigned(4))??.as_u64().unwrap_or(0);
+    let raw = master.read(node.id, entry.object, data_type)??.as_u64().unwrap_or(0);
     let starts = if raw == u64::from(entry.wait) {
         Starts::Wait
     } else if raw == u64::from(entry.auto) {
@@ -79,5 +66,5 @@ fn report(entry: &Startup, master: &mut Master<'_>, node: NodeId) -> Result<Star
     } else {
         Starts::Other(raw)
     };
-    Ok(StartupReport { starts, raw, doubt: entry.doubt.clone() })
+    Ok(StartupReport { node: node.id, object: entry.object, starts, raw, doubt: entry.doubt.clone() })
 }

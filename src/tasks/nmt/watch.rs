@@ -1,137 +1,153 @@
-//! Follows heartbeats, boot-ups and losses.
+//! Follows heartbeats, boot-up messages and losses.
 
 use crate::bus::{Mono, Stamp};
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtState};
-use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::master::{Error, Happening, Master};
 use crate::node::read::read_values;
+use crate::node::state::HEARTBEAT_TIME;
+use crate::node::wait::{Policy, Until, Waiter, run};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// What happened to a node.
+/// A change of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// It was seen for the first time, or changed its state.
+    /// The first heartbeat, or one with another state.
     State(NmtState),
-    /// It (re)started.
+    /// The node started.
     BootUp,
-    /// Its heartbeat has not come for twice its period.
+    /// No heartbeat came for twice the heartbeat time; the time since the last one.
     Lost(Duration),
-    /// Its heartbeat is back, in this state.
+    /// The heartbeat is back, with this state.
     Back(NmtState),
 }
 
-/// A change and its moment.
+/// A change with its moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
-    /// When.
+    /// The moment.
     pub at: Stamp,
-    /// Whose.
+    /// The node.
     pub node: NodeId,
-    /// What.
+    /// The change.
     pub change: Change,
 }
 
-/// What is known of a node's heartbeat.
-#[derive(Clone, Copy, Debug, Default)]
-struct Pulse {
-    state: Option<NmtState>,
-    last: Option<Mono>,
-    /// 1017h, or learned: the longest interval seen.
-    period: Option<Duration>,
-    lost: bool,
-}
+/// How much later than twice the heartbeat time a heartbeat may come.
+const LATE_TOLERANCE: Duration = Duration::from_millis(50);
 
-/// A heartbeat may come late by this much more than its period again.
-const GRACE: Duration = Duration::from_millis(50);
-
-/// Follows the nodes until `until`, or until the user or `tell` ends it.
+/// Follows nodes until `until`, until Ctrl-C, or until `on_change` breaks.
 ///
-/// The period is that of 1017h where `ask` allows to read it, else it is learned from what is heard.
+/// With `ask` the heartbeat time is read from 1017h; otherwise it is the longest interval that was seen.
 ///
 /// # Errors
-/// What stops everything.
+/// Bus errors.
 pub fn watch(
     master: &mut Master<'_>,
     nodes: &[NodeId],
     ask: bool,
     until: Option<Mono>,
-    tell: &mut dyn FnMut(&Seen) -> ControlFlow<()>,
+    on_change: &mut dyn FnMut(&Seen) -> ControlFlow<()>,
 ) -> Result<(), Error> {
-    let mut pulses: BTreeMap<NodeId, Pulse> = nodes.iter().map(|&node| (node, Pulse::default())).collect();
+    let mut heartbeats: BTreeMap<NodeId, Heartbeat> = nodes.iter().map(|&node| (node, Heartbeat::default())).collect();
     if ask {
-        let items: Vec<_> = nodes.iter().map(|&node| (node, ObjectId::new(0x1017, 0), DataType::Unsigned(2))).collect();
+        let items: Vec<_> = nodes.iter().map(|&node| (node, HEARTBEAT_TIME, DataType::Unsigned(2))).collect();
         for (node, value) in nodes.iter().zip(read_values(master, &items)?) {
             let period = value.ok().and_then(|value| value.as_u64()).filter(|&time| time > 0);
-            if let Some(pulse) = pulses.get_mut(node) {
-                pulse.period = period.map(Duration::from_millis);
+            if let Some(heartbeat) = heartbeats.get_mut(node) {
+                heartbeat.period = period.map(Duration::from_millis);
             }
         }
     }
-    let far = Mono::at(Duration::MAX);
-    loop {
-        let end = until.unwrap_or(far);
-        let next = pulses.values().filter_map(Pulse::lost_at).min().unwrap_or(far).min(end);
-        let seen = match master.next(next)? {
-            Happening::Frame(received) => {
-                let Some((node, life)) = Life::parse(&received.frame) else { continue };
-                let Some(pulse) = pulses.get_mut(&node) else { continue };
-                pulse.take(life, received.at.mono).map(|change| Seen { at: received.at, node, change })
-            }
-            Happening::Deadline if next >= end => return Ok(()),
-            Happening::Deadline => {
-                let at = master.bus().now();
-                pulses.iter_mut().find(|(_, pulse)| pulse.lost_at().is_some_and(|due| due <= next)).map(
-                    |(&node, pulse)| {
-                        pulse.lost = true;
-                        let silent = pulse.last.map_or(Duration::ZERO, |last| next.since(last));
-                        Seen { at, node, change: Change::Lost(silent) }
-                    },
-                )
-            }
-            Happening::Interrupted | Happening::Ended => return Ok(()),
-            Happening::Link(false) => {
-                return Err(Error::Bus(crate::bus::BusError::Down(master.bus().name().to_owned())));
-            }
-            Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => None,
-        };
-        if let Some(seen) = seen
-            && tell(&seen).is_break()
-        {
-            return Ok(());
-        }
+    let end = until.unwrap_or(Mono::at(Duration::MAX));
+    run(master, Policy::Observe, &mut Watcher { heartbeats, end, on_change })
+}
+
+struct Watcher<'a> {
+    heartbeats: BTreeMap<NodeId, Heartbeat>,
+    end: Mono,
+    on_change: &'a mut dyn FnMut(&Seen) -> ControlFlow<()>,
+}
+
+impl Watcher<'_> {
+    /// The end, or the moment at which the next node is lost.
+    fn deadline(&self) -> Mono {
+        self.heartbeats.values().filter_map(Heartbeat::lost_at).min().map_or(self.end, |at| at.min(self.end))
+    }
+
+    /// The node whose heartbeat is overdue.
+    fn lost(&mut self, at: Stamp) -> Option<Seen> {
+        let now = self.deadline();
+        let is_overdue = |heartbeat: &Heartbeat| heartbeat.lost_at().is_some_and(|due| due <= now);
+        let (&node, heartbeat) = self.heartbeats.iter_mut().find(|(_, heartbeat)| is_overdue(heartbeat))?;
+        heartbeat.is_lost = true;
+        let silence = heartbeat.last.map_or(Duration::ZERO, |last| now.since(last));
+        Some(Seen { at, node, change: Change::Lost(silence) })
     }
 }
 
-impl Pulse {
-    /// When the node counts as lost, if nothing comes.
+impl Waiter for Watcher<'_> {
+    type Output = ();
+    type Error = Error;
+
+    fn until(&self) -> Until {
+        Until::Deadline(self.deadline())
+    }
+
+    fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Error> {
+        let seen = match event {
+            Happening::Frame(received) => Life::parse(&received.frame).and_then(|(node, life)| {
+                let change = self.heartbeats.get_mut(&node)?.on_life(life, received.at.mono)?;
+                Some(Seen { at: received.at, node, change })
+            }),
+            Happening::Deadline if self.deadline() >= self.end => return Ok(ControlFlow::Break(())),
+            Happening::Deadline => self.lost(master.bus().now()),
+            Happening::Interrupted | Happening::Ended => return Ok(ControlFlow::Break(())),
+            _ => None,
+        };
+        Ok(seen.map_or(ControlFlow::Continue(()), |seen| (self.on_change)(&seen)))
+    }
+}
+
+/// The heartbeat of a node.
+#[derive(Clone, Copy, Debug, Default)]
+struct Heartbeat {
+    state: Option<NmtState>,
+    last: Option<Mono>,
+    /// From 1017h, or the longest interval seen.
+    period: Option<Duration>,
+    is_lost: bool,
+}
+
+impl Heartbeat {
+    /// The moment at which the node counts as lost if no heartbeat comes.
     fn lost_at(&self) -> Option<Mono> {
-        match (self.last, self.period, self.lost) {
-            (Some(last), Some(period), false) => Some(last + period * 2 + GRACE),
+        match (self.last, self.period, self.is_lost) {
+            (Some(last), Some(period), false) => Some(last + period * 2 + LATE_TOLERANCE),
             _ => None,
         }
     }
 
-    fn take(&mut self, life: Life, at: Mono) -> Option<Change> {
+    fn on_life(&mut self, life: Life, at: Mono) -> Option<Change> {
         let state = match life {
             Life::BootUp => {
-                // The rhythm begins anew.
-                *self = Pulse { period: self.period, ..Pulse::default() };
+                // The time from the last heartbeat to the first one after a restart is no interval.
+                *self = Heartbeat { period: self.period, ..Heartbeat::default() };
                 return Some(Change::BootUp);
             }
             Life::State(state) => state,
         };
-        if let (Some(last), false) = (self.last, self.lost) {
+        if let (Some(last), false) = (self.last, self.is_lost) {
             let interval = at.since(last);
             self.period = Some(self.period.map_or(interval, |known| known.max(interval)));
         }
-        let was_lost = std::mem::take(&mut self.lost);
-        let changed = self.state != Some(state);
+        let was_lost = std::mem::take(&mut self.is_lost);
+        let has_changed = self.state != Some(state);
         (self.state, self.last) = (Some(state), Some(at));
-        match (was_lost, changed) {
+        match (was_lost, has_changed) {
             (true, _) => Some(Change::Back(state)),
             (false, true) => Some(Change::State(state)),
             (false, false) => None,
@@ -148,20 +164,20 @@ mod tests {
     }
 
     #[test]
-    fn a_period_is_learned_and_a_loss_comes_after_two_of_them() {
-        let mut pulse = Pulse::default();
+    fn a_node_is_lost_after_twice_the_learned_period() {
+        let mut heartbeat = Heartbeat::default();
         let operational = Life::State(NmtState::Operational);
-        assert_eq!(pulse.take(operational, at(0)), Some(Change::State(NmtState::Operational)));
-        assert_eq!(pulse.lost_at(), None);
-        assert_eq!(pulse.take(operational, at(1000)), None);
-        assert_eq!(pulse.lost_at(), Some(at(3050)));
-        pulse.lost = true;
-        // The silence is no interval to learn from.
-        assert_eq!(pulse.take(operational, at(60_000)), Some(Change::Back(NmtState::Operational)));
-        assert_eq!(pulse.lost_at(), Some(at(62_050)));
-        assert_eq!(pulse.take(Life::BootUp, at(61_000)), Some(Change::BootUp));
-        assert_eq!(pulse.lost_at(), None);
+        assert_eq!(heartbeat.on_life(operational, at(0)), Some(Change::State(NmtState::Operational)));
+        assert_eq!(heartbeat.lost_at(), None);
+        assert_eq!(heartbeat.on_life(operational, at(1000)), None);
+        assert_eq!(heartbeat.lost_at(), Some(at(3050)));
+        heartbeat.is_lost = true;
+        // The silence of a lost node is no interval.
+        assert_eq!(heartbeat.on_life(operational, at(60_000)), Some(Change::Back(NmtState::Operational)));
+        assert_eq!(heartbeat.lost_at(), Some(at(62_050)));
+        assert_eq!(heartbeat.on_life(Life::BootUp, at(61_000)), Some(Change::BootUp));
+        assert_eq!(heartbeat.lost_at(), None);
         let stopped = Life::State(NmtState::Stopped);
-        assert_eq!(pulse.take(stopped, at(61_500)), Some(Change::State(NmtState::Stopped)));
+        assert_eq!(heartbeat.on_life(stopped, at(61_500)), Some(Change::State(NmtState::Stopped)));
     }
 }

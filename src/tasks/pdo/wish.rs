@@ -10,7 +10,7 @@ use crate::device::standard;
 use crate::master::Request;
 use crate::measure::layout::{PROCESS_VALUES, Signal};
 use crate::node::Node;
-use crate::tasks::sdo::nearest;
+use crate::node::names::nearest;
 use crate::tasks::{Failure, Kind};
 
 /// The transmission type by which the event timer sends, where no description tells another one.

@@ -1,16 +1,23 @@
-//! Causes of failures: a scan did not find or identify nodes.
+//! Causes of failures: a scan did not find nodes.
 
 use crate::tasks::Kind;
 use crate::tasks::failure::Cause;
 
-/// A scan did not find or identify nodes.
+/// A scan did not find nodes.
 #[derive(Clone, Debug, PartialEq)]
-pub enum ScanFailure {}
+pub enum ScanFailure {
+    /// No node answered or showed another sign of life.
+    NoAnswer,
+    /// No node sent anything while the program only listened.
+    NoFrame,
+}
 
 impl ScanFailure {
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
-        match *self {}
+        match self {
+            ScanFailure::NoAnswer | ScanFailure::NoFrame => Kind::NoAnswer,
+        }
     }
 }
 

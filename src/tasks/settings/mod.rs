@@ -20,7 +20,7 @@ use crate::device::description::ObjectEntry;
 use crate::device::dictionary::Entry;
 use crate::device::standard;
 use crate::device::unit::Unit;
-use crate::master::{BlockMode, Master, Request, SdoError, SdoFailure};
+use crate::master::{Master, Request, SdoError, SdoFailure};
 use crate::measure::decode::is_smallest;
 use crate::measure::layout::{PROCESS_VALUES, Signal};
 use crate::measure::sample::Number;
@@ -28,7 +28,7 @@ use crate::node::Node;
 use crate::node::Overrides;
 use crate::node::read::read_values;
 use crate::node::survey::survey_nodes;
-use crate::tasks::sdo::{Knowledge, Options, SizeMode, write};
+use crate::node::write::write;
 use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
 
@@ -37,7 +37,6 @@ use std::sync::Arc;
 pub struct Device {
     /// What it is and how it is set up.
     pub instrument: Node,
-    knowledge: Knowledge,
 }
 
 /// A number in the unit of a signal.
@@ -58,9 +57,7 @@ impl Device {
         master.listen_to(&[node])?;
         let instrument = survey_nodes(master, &[node], overrides)?.pop();
         let instrument = instrument.unwrap_or_else(|| Node::new(node));
-        let model = instrument.model.as_ref().map(|model| (node, Arc::clone(model)));
-        let knowledge = Knowledge::new(node, &model.into_iter().collect());
-        Ok(Device { instrument, knowledge })
+        Ok(Device { instrument })
     }
 
     /// Its node-ID.
@@ -168,8 +165,8 @@ impl Device {
     /// # Errors
     /// The device's refusal, silence or breach of the protocol.
     pub fn write(&self, master: &mut Master<'_>, object: ObjectId, data: &[u8]) -> Result<(), Failure> {
-        let mut options = Options { blocks: BlockMode::Never, size: SizeMode::Auto, progress: &mut |_| {} };
-        write(master, &self.knowledge, object, data, &mut options)
+        write(master, &self.instrument, object, data)?;
+        Ok(())
     }
 
     /// Writes a value and reads it back.
