@@ -45,7 +45,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('scan', 'scan', [CompletionResultType]::ParameterValue, 'List every node that answers, with its state, identity and recognised device')
             [CompletionResult]::new('ls', 'ls', [CompletionResultType]::ParameterValue, 'List every node that answers, with its state, identity and recognised device')
             [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read measured values now, scaled, with unit and status')
-            [CompletionResult]::new('nmt', 'nmt', [CompletionResultType]::ParameterValue, 'Send NMT commands and tell states')
+            [CompletionResult]::new('nmt', 'nmt', [CompletionResultType]::ParameterValue, 'Send NMT commands and show NMT states')
             [CompletionResult]::new('sdo', 'sdo', [CompletionResultType]::ParameterValue, 'Read and write objects of the object dictionary')
             [CompletionResult]::new('log', 'log', [CompletionResultType]::ParameterValue, 'Record measurements as CSV or JSON Lines')
             [CompletionResult]::new('check', 'check', [CompletionResultType]::ParameterValue, 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)')
@@ -57,7 +57,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('limits', 'limits', [CompletionResultType]::ParameterValue, 'Tell or set what makes a TPDO of a signal go out by itself: delta, limits, hysteresis (x133h to x136h)')
             [CompletionResult]::new('minmax', 'minmax', [CompletionResultType]::ParameterValue, 'Show the lowest and highest value that the device has measured, or reset them')
             [CompletionResult]::new('errors', 'errors', [CompletionResultType]::ParameterValue, 'Tell the errors of a device: register (1001h) and history (1003h) in words, or clear the history')
-            [CompletionResult]::new('bus', 'bus', [CompletionResultType]::ParameterValue, 'List CAN interfaces, switch them on and off, find the bit rate of a bus')
+            [CompletionResult]::new('bus', 'bus', [CompletionResultType]::ParameterValue, 'List CAN interfaces, bring them up and down, find the bit rate of a bus')
             [CompletionResult]::new('pdo', 'pdo', [CompletionResultType]::ParameterValue, 'Show, change and watch what the nodes'' transmit PDOs carry')
             [CompletionResult]::new('autozero', 'autozero', [CompletionResultType]::ParameterValue, 'Make the present reading of a channel zero (6125h), with checks before and after')
             [CompletionResult]::new('zero', 'zero', [CompletionResultType]::ParameterValue, 'Make the present reading of a channel zero (6125h), with checks before and after')
@@ -81,7 +81,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
             [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
             [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
-            [CompletionResult]::new('--passive', '--passive', [CompletionResultType]::ParameterName, 'Send nothing: list who shows itself within 3 s')
+            [CompletionResult]::new('--passive', '--passive', [CompletionResultType]::ParameterName, 'Send nothing: list the nodes that send something within 3 s')
             [CompletionResult]::new('--ignore-lock', '--ignore-lock', [CompletionResultType]::ParameterName, 'Continue although another program uses the same nodes')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
@@ -106,7 +106,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
             [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
             [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
-            [CompletionResult]::new('--passive', '--passive', [CompletionResultType]::ParameterName, 'Send nothing: list who shows itself within 3 s')
+            [CompletionResult]::new('--passive', '--passive', [CompletionResultType]::ParameterName, 'Send nothing: list the nodes that send something within 3 s')
             [CompletionResult]::new('--ignore-lock', '--ignore-lock', [CompletionResultType]::ParameterName, 'Continue although another program uses the same nodes')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
@@ -165,14 +165,14 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
-            [CompletionResult]::new('start', 'start', [CompletionResultType]::ParameterValue, 'To OPERATIONAL: the nodes send their TPDOs')
-            [CompletionResult]::new('stop', 'stop', [CompletionResultType]::ParameterValue, 'To STOPPED: only NMT, heartbeat and LSS')
-            [CompletionResult]::new('preop', 'preop', [CompletionResultType]::ParameterValue, 'To PRE-OPERATIONAL: everything but PDOs')
+            [CompletionResult]::new('start', 'start', [CompletionResultType]::ParameterValue, 'Set nodes to OPERATIONAL: they send their TPDOs')
+            [CompletionResult]::new('stop', 'stop', [CompletionResultType]::ParameterValue, 'Set nodes to STOPPED: only NMT, heartbeat and LSS work')
+            [CompletionResult]::new('preop', 'preop', [CompletionResultType]::ParameterValue, 'Set nodes to PRE-OPERATIONAL: everything except PDOs works')
             [CompletionResult]::new('reset', 'reset', [CompletionResultType]::ParameterValue, 'Restart the application (reset node)')
             [CompletionResult]::new('reset-comm', 'reset-comm', [CompletionResultType]::ParameterValue, 'Restart the communication')
-            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it')
+            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Show states, from the heartbeat or by node guarding if it is harmless; "-" if unknown')
             [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Follow heartbeats, boot-ups and losses until Ctrl-C')
-            [CompletionResult]::new('startup', 'startup', [CompletionResultType]::ParameterValue, 'Tell or set who starts a device after power on: wait for the master, or auto (by itself)')
+            [CompletionResult]::new('startup', 'startup', [CompletionResultType]::ParameterValue, 'Show or set how a device starts after power on: wait for the master, or auto (by itself)')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
         }
@@ -194,8 +194,8 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
-            [CompletionResult]::new('--confirm', '--confirm', [CompletionResultType]::ParameterName, 'Exit 3 where nothing confirms the state')
-            [CompletionResult]::new('--no-wait', '--no-wait', [CompletionResultType]::ParameterName, 'Only send')
+            [CompletionResult]::new('--confirm', '--confirm', [CompletionResultType]::ParameterName, 'Exit with 3 if nothing confirms the state')
+            [CompletionResult]::new('--no-wait', '--no-wait', [CompletionResultType]::ParameterName, 'Send the command without confirmation')
             [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
@@ -220,8 +220,8 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
-            [CompletionResult]::new('--confirm', '--confirm', [CompletionResultType]::ParameterName, 'Exit 3 where nothing confirms the state')
-            [CompletionResult]::new('--no-wait', '--no-wait', [CompletionResultType]::ParameterName, 'Only send')
+            [CompletionResult]::new('--confirm', '--confirm', [CompletionResultType]::ParameterName, 'Exit with 3 if nothing confirms the state')
+            [CompletionResult]::new('--no-wait', '--no-wait', [CompletionResultType]::ParameterName, 'Send the command without confirmation')
             [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
@@ -246,8 +246,8 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
-            [CompletionResult]::new('--confirm', '--confirm', [CompletionResultType]::ParameterName, 'Exit 3 where nothing confirms the state')
-            [CompletionResult]::new('--no-wait', '--no-wait', [CompletionResultType]::ParameterName, 'Only send')
+            [CompletionResult]::new('--confirm', '--confirm', [CompletionResultType]::ParameterName, 'Exit with 3 if nothing confirms the state')
+            [CompletionResult]::new('--no-wait', '--no-wait', [CompletionResultType]::ParameterName, 'Send the command without confirmation')
             [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
@@ -272,8 +272,8 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
-            [CompletionResult]::new('--confirm', '--confirm', [CompletionResultType]::ParameterName, 'Exit 3 where nothing confirms the state')
-            [CompletionResult]::new('--no-wait', '--no-wait', [CompletionResultType]::ParameterName, 'Only send')
+            [CompletionResult]::new('--confirm', '--confirm', [CompletionResultType]::ParameterName, 'Exit with 3 if nothing confirms the state')
+            [CompletionResult]::new('--no-wait', '--no-wait', [CompletionResultType]::ParameterName, 'Send the command without confirmation')
             [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
@@ -298,8 +298,8 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
-            [CompletionResult]::new('--confirm', '--confirm', [CompletionResultType]::ParameterName, 'Exit 3 where nothing confirms the state')
-            [CompletionResult]::new('--no-wait', '--no-wait', [CompletionResultType]::ParameterName, 'Only send')
+            [CompletionResult]::new('--confirm', '--confirm', [CompletionResultType]::ParameterName, 'Exit with 3 if nothing confirms the state')
+            [CompletionResult]::new('--no-wait', '--no-wait', [CompletionResultType]::ParameterName, 'Send the command without confirmation')
             [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
@@ -324,7 +324,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Say more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Say more on stderr')
-            [CompletionResult]::new('--probe', '--probe', [CompletionResultType]::ParameterName, 'Where nothing tells the state: set the heartbeat (1017h) for a moment and put it back')
+            [CompletionResult]::new('--probe', '--probe', [CompletionResultType]::ParameterName, 'If the state is unknown: set the heartbeat time (1017h) briefly and restore it')
             [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
@@ -382,14 +382,14 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;nmt;help' {
-            [CompletionResult]::new('start', 'start', [CompletionResultType]::ParameterValue, 'To OPERATIONAL: the nodes send their TPDOs')
-            [CompletionResult]::new('stop', 'stop', [CompletionResultType]::ParameterValue, 'To STOPPED: only NMT, heartbeat and LSS')
-            [CompletionResult]::new('preop', 'preop', [CompletionResultType]::ParameterValue, 'To PRE-OPERATIONAL: everything but PDOs')
+            [CompletionResult]::new('start', 'start', [CompletionResultType]::ParameterValue, 'Set nodes to OPERATIONAL: they send their TPDOs')
+            [CompletionResult]::new('stop', 'stop', [CompletionResultType]::ParameterValue, 'Set nodes to STOPPED: only NMT, heartbeat and LSS work')
+            [CompletionResult]::new('preop', 'preop', [CompletionResultType]::ParameterValue, 'Set nodes to PRE-OPERATIONAL: everything except PDOs works')
             [CompletionResult]::new('reset', 'reset', [CompletionResultType]::ParameterValue, 'Restart the application (reset node)')
             [CompletionResult]::new('reset-comm', 'reset-comm', [CompletionResultType]::ParameterValue, 'Restart the communication')
-            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it')
+            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Show states, from the heartbeat or by node guarding if it is harmless; "-" if unknown')
             [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Follow heartbeats, boot-ups and losses until Ctrl-C')
-            [CompletionResult]::new('startup', 'startup', [CompletionResultType]::ParameterValue, 'Tell or set who starts a device after power on: wait for the master, or auto (by itself)')
+            [CompletionResult]::new('startup', 'startup', [CompletionResultType]::ParameterValue, 'Show or set how a device starts after power on: wait for the master, or auto (by itself)')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
         }
@@ -442,7 +442,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
-            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects: the value as it is, never scaled; several print "OBJECT VALUE" lines')
+            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects: the value is never scaled; several objects print "OBJECT VALUE" lines')
             [CompletionResult]::new('write', 'write', [CompletionResultType]::ParameterValue, 'Write an object, or several OBJECT=VALUE')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
@@ -460,9 +460,9 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
             [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
             [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
-            [CompletionResult]::new('--type', '--type', [CompletionResultType]::ParameterName, 'Take the bytes for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex')
+            [CompletionResult]::new('--type', '--type', [CompletionResultType]::ParameterName, 'Decode the bytes as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex')
             [CompletionResult]::new('--output', '--output', [CompletionResultType]::ParameterName, 'Write the bytes to a file; - for stdout')
-            [CompletionResult]::new('--block', '--block', [CompletionResultType]::ParameterName, 'Whether to use block transfer: auto where it pays and the device offers it')
+            [CompletionResult]::new('--block', '--block', [CompletionResultType]::ParameterName, 'When to use block transfer: auto for long objects if the device supports it')
             [CompletionResult]::new('--ignore-lock', '--ignore-lock', [CompletionResultType]::ParameterName, 'Continue although another program uses the same nodes')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
@@ -489,10 +489,10 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
             [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
             [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
-            [CompletionResult]::new('--type', '--type', [CompletionResultType]::ParameterName, 'Take the value for this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex')
-            [CompletionResult]::new('--sdo-size', '--sdo-size', [CompletionResultType]::ParameterName, 'Whether the write says how many bytes it carries: auto asks the description, and tries the other way where the device takes it amiss')
-            [CompletionResult]::new('--input', '--input', [CompletionResultType]::ParameterName, 'Take the bytes from a file; - for stdin')
-            [CompletionResult]::new('--block', '--block', [CompletionResultType]::ParameterName, 'Whether to use block transfer: auto where it pays and the device offers it')
+            [CompletionResult]::new('--type', '--type', [CompletionResultType]::ParameterName, 'Encode the value as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex')
+            [CompletionResult]::new('--sdo-size', '--sdo-size', [CompletionResultType]::ParameterName, 'Whether the request contains the size: auto follows the description, and retries with the other form if the device rejects it')
+            [CompletionResult]::new('--input', '--input', [CompletionResultType]::ParameterName, 'Write the bytes of a file; - for stdin')
+            [CompletionResult]::new('--block', '--block', [CompletionResultType]::ParameterName, 'When to use block transfer: auto for long objects if the device supports it')
             [CompletionResult]::new('--ignore-lock', '--ignore-lock', [CompletionResultType]::ParameterName, 'Continue although another program uses the same nodes')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
@@ -506,7 +506,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;sdo;help' {
-            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects: the value as it is, never scaled; several print "OBJECT VALUE" lines')
+            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects: the value is never scaled; several objects print "OBJECT VALUE" lines')
             [CompletionResult]::new('write', 'write', [CompletionResultType]::ParameterValue, 'Write an object, or several OBJECT=VALUE')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
@@ -1075,10 +1075,10 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
-            [CompletionResult]::new('list', 'list', [CompletionResultType]::ParameterValue, 'List the CAN interfaces of this machine with bit rate, state and error counters')
-            [CompletionResult]::new('up', 'up', [CompletionResultType]::ParameterValue, 'Switch an interface on, at a bit rate')
-            [CompletionResult]::new('down', 'down', [CompletionResultType]::ParameterValue, 'Switch an interface off')
-            [CompletionResult]::new('detect', 'detect', [CompletionResultType]::ParameterValue, 'Find the bit rate of a running bus by listening only; prints it in bit/s')
+            [CompletionResult]::new('list', 'list', [CompletionResultType]::ParameterValue, 'List the CAN interfaces of this computer with bit rate, state and error counters')
+            [CompletionResult]::new('up', 'up', [CompletionResultType]::ParameterValue, 'Bring an interface up at a bit rate')
+            [CompletionResult]::new('down', 'down', [CompletionResultType]::ParameterValue, 'Bring an interface down')
+            [CompletionResult]::new('detect', 'detect', [CompletionResultType]::ParameterValue, 'Find the bit rate of a running bus by listening; print it in bit/s')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
         }
@@ -1119,7 +1119,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
             [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
             [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
-            [CompletionResult]::new('--listen-only', '--listen-only', [CompletionResultType]::ParameterName, 'Only listen: no frame, no acknowledge, no error flag')
+            [CompletionResult]::new('--listen-only', '--listen-only', [CompletionResultType]::ParameterName, 'Listen only: send no frame, no acknowledge and no error flag')
             [CompletionResult]::new('--ignore-lock', '--ignore-lock', [CompletionResultType]::ParameterName, 'Continue although another program uses the same nodes')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
@@ -1156,7 +1156,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;bus;detect' {
-            [CompletionResult]::new('--for', '--for', [CompletionResultType]::ParameterName, 'How long each bit rate is tried; the default hears a heartbeat of once a second')
+            [CompletionResult]::new('--for', '--for', [CompletionResultType]::ParameterName, 'Time per bit rate; the default is longer than a heartbeat interval of 1 s')
             [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
             [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a candump -L log; receives only). Not given: the only CAN interface that is up')
             [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
@@ -1169,7 +1169,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--trace', '--trace', [CompletionResultType]::ParameterName, 'Write every frame sent and received to FILE, as candump -L does; - for stderr')
             [CompletionResult]::new('--progress', '--progress', [CompletionResultType]::ParameterName, 'Show live values and progress on stderr; auto: on a terminal')
             [CompletionResult]::new('--color', '--color', [CompletionResultType]::ParameterName, 'Colour on stderr; auto: on a terminal, and without NO_COLOR')
-            [CompletionResult]::new('--active', '--active', [CompletionResultType]::ParameterName, 'Where nothing is heard, ask: every node-ID for its device type, at one rate after the other. Only for a bench with one device: at a wrong rate this disturbs every frame on the bus')
+            [CompletionResult]::new('--active', '--active', [CompletionResultType]::ParameterName, 'If nothing is received, ask each node-ID for its device type at each bit rate. Only for a bench with one device: at a wrong bit rate this disturbs every frame on the bus')
             [CompletionResult]::new('--ignore-lock', '--ignore-lock', [CompletionResultType]::ParameterName, 'Continue although another program uses the same nodes')
             [CompletionResult]::new('-q', '-q', [CompletionResultType]::ParameterName, 'Say less on stderr')
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Say less on stderr')
@@ -1182,10 +1182,10 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;bus;help' {
-            [CompletionResult]::new('list', 'list', [CompletionResultType]::ParameterValue, 'List the CAN interfaces of this machine with bit rate, state and error counters')
-            [CompletionResult]::new('up', 'up', [CompletionResultType]::ParameterValue, 'Switch an interface on, at a bit rate')
-            [CompletionResult]::new('down', 'down', [CompletionResultType]::ParameterValue, 'Switch an interface off')
-            [CompletionResult]::new('detect', 'detect', [CompletionResultType]::ParameterValue, 'Find the bit rate of a running bus by listening only; prints it in bit/s')
+            [CompletionResult]::new('list', 'list', [CompletionResultType]::ParameterValue, 'List the CAN interfaces of this computer with bit rate, state and error counters')
+            [CompletionResult]::new('up', 'up', [CompletionResultType]::ParameterValue, 'Bring an interface up at a bit rate')
+            [CompletionResult]::new('down', 'down', [CompletionResultType]::ParameterValue, 'Bring an interface down')
+            [CompletionResult]::new('detect', 'detect', [CompletionResultType]::ParameterValue, 'Find the bit rate of a running bus by listening; print it in bit/s')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
         }
@@ -1493,7 +1493,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
         'cangauge;help' {
             [CompletionResult]::new('scan', 'scan', [CompletionResultType]::ParameterValue, 'List every node that answers, with its state, identity and recognised device')
             [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read measured values now, scaled, with unit and status')
-            [CompletionResult]::new('nmt', 'nmt', [CompletionResultType]::ParameterValue, 'Send NMT commands and tell states')
+            [CompletionResult]::new('nmt', 'nmt', [CompletionResultType]::ParameterValue, 'Send NMT commands and show NMT states')
             [CompletionResult]::new('sdo', 'sdo', [CompletionResultType]::ParameterValue, 'Read and write objects of the object dictionary')
             [CompletionResult]::new('log', 'log', [CompletionResultType]::ParameterValue, 'Record measurements as CSV or JSON Lines')
             [CompletionResult]::new('check', 'check', [CompletionResultType]::ParameterValue, 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)')
@@ -1504,7 +1504,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('limits', 'limits', [CompletionResultType]::ParameterValue, 'Tell or set what makes a TPDO of a signal go out by itself: delta, limits, hysteresis (x133h to x136h)')
             [CompletionResult]::new('minmax', 'minmax', [CompletionResultType]::ParameterValue, 'Show the lowest and highest value that the device has measured, or reset them')
             [CompletionResult]::new('errors', 'errors', [CompletionResultType]::ParameterValue, 'Tell the errors of a device: register (1001h) and history (1003h) in words, or clear the history')
-            [CompletionResult]::new('bus', 'bus', [CompletionResultType]::ParameterValue, 'List CAN interfaces, switch them on and off, find the bit rate of a bus')
+            [CompletionResult]::new('bus', 'bus', [CompletionResultType]::ParameterValue, 'List CAN interfaces, bring them up and down, find the bit rate of a bus')
             [CompletionResult]::new('pdo', 'pdo', [CompletionResultType]::ParameterValue, 'Show, change and watch what the nodes'' transmit PDOs carry')
             [CompletionResult]::new('autozero', 'autozero', [CompletionResultType]::ParameterValue, 'Make the present reading of a channel zero (6125h), with checks before and after')
             [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Let devices keep their settings beyond power off (1010h)')
@@ -1521,14 +1521,14 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;help;nmt' {
-            [CompletionResult]::new('start', 'start', [CompletionResultType]::ParameterValue, 'To OPERATIONAL: the nodes send their TPDOs')
-            [CompletionResult]::new('stop', 'stop', [CompletionResultType]::ParameterValue, 'To STOPPED: only NMT, heartbeat and LSS')
-            [CompletionResult]::new('preop', 'preop', [CompletionResultType]::ParameterValue, 'To PRE-OPERATIONAL: everything but PDOs')
+            [CompletionResult]::new('start', 'start', [CompletionResultType]::ParameterValue, 'Set nodes to OPERATIONAL: they send their TPDOs')
+            [CompletionResult]::new('stop', 'stop', [CompletionResultType]::ParameterValue, 'Set nodes to STOPPED: only NMT, heartbeat and LSS work')
+            [CompletionResult]::new('preop', 'preop', [CompletionResultType]::ParameterValue, 'Set nodes to PRE-OPERATIONAL: everything except PDOs works')
             [CompletionResult]::new('reset', 'reset', [CompletionResultType]::ParameterValue, 'Restart the application (reset node)')
             [CompletionResult]::new('reset-comm', 'reset-comm', [CompletionResultType]::ParameterValue, 'Restart the communication')
-            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Tell the states: by heartbeat, or node guarding where that is harmless; "-" where nothing tells it')
+            [CompletionResult]::new('state', 'state', [CompletionResultType]::ParameterValue, 'Show states, from the heartbeat or by node guarding if it is harmless; "-" if unknown')
             [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Follow heartbeats, boot-ups and losses until Ctrl-C')
-            [CompletionResult]::new('startup', 'startup', [CompletionResultType]::ParameterValue, 'Tell or set who starts a device after power on: wait for the master, or auto (by itself)')
+            [CompletionResult]::new('startup', 'startup', [CompletionResultType]::ParameterValue, 'Show or set how a device starts after power on: wait for the master, or auto (by itself)')
             break
         }
         'cangauge;help;nmt;start' {
@@ -1556,7 +1556,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;help;sdo' {
-            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects: the value as it is, never scaled; several print "OBJECT VALUE" lines')
+            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects: the value is never scaled; several objects print "OBJECT VALUE" lines')
             [CompletionResult]::new('write', 'write', [CompletionResultType]::ParameterValue, 'Write an object, or several OBJECT=VALUE')
             break
         }
@@ -1626,10 +1626,10 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;help;bus' {
-            [CompletionResult]::new('list', 'list', [CompletionResultType]::ParameterValue, 'List the CAN interfaces of this machine with bit rate, state and error counters')
-            [CompletionResult]::new('up', 'up', [CompletionResultType]::ParameterValue, 'Switch an interface on, at a bit rate')
-            [CompletionResult]::new('down', 'down', [CompletionResultType]::ParameterValue, 'Switch an interface off')
-            [CompletionResult]::new('detect', 'detect', [CompletionResultType]::ParameterValue, 'Find the bit rate of a running bus by listening only; prints it in bit/s')
+            [CompletionResult]::new('list', 'list', [CompletionResultType]::ParameterValue, 'List the CAN interfaces of this computer with bit rate, state and error counters')
+            [CompletionResult]::new('up', 'up', [CompletionResultType]::ParameterValue, 'Bring an interface up at a bit rate')
+            [CompletionResult]::new('down', 'down', [CompletionResultType]::ParameterValue, 'Bring an interface down')
+            [CompletionResult]::new('detect', 'detect', [CompletionResultType]::ParameterValue, 'Find the bit rate of a running bus by listening; print it in bit/s')
             break
         }
         'cangauge;help;bus;list' {
