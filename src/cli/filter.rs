@@ -1,41 +1,38 @@
 //! `cangauge filter`.
 
 use super::args::Duration;
-use super::exit::stdout;
-use super::{Format, Global, open};
+use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
-use crate::output::{csv, settings as json, table};
 use crate::tasks::settings::Device;
-use crate::tasks::settings::filter::{FilterOf, FilterType, Wanted, set, show};
+use crate::tasks::settings::filter::{FilterReport, FilterType, Wanted, set, show};
 use clap::{Args, ValueEnum};
-use std::io::{self, Write};
 
-/// Tell or set the filter of a signal: type (61A0h) and constant (61A1h)
+/// Show or set the filter of a signal: type (61A0h) and constant (61A1h)
 ///
-/// What a type does is told as the device's manual has it: not everywhere is 0 no filter. What is set is
-/// read back; a damping, which cannot be read, by the constant that the device makes of it.
+/// Filter types are named as in the manual of the device: 0 does not mean "no filter" on every device. After a change
+/// the filter is read back. A damping cannot be read back; the filter constant shows its effect.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim filter 1\n  cangauge -b sim filter 1 pressure --type moving --constant 8\n  cangauge -b sim filter 1 --type moving --damping 100ms"
 )]
 pub(crate) struct Filter {
-    /// Which node: 5, 0x7f
+    /// Node-ID: 5, 0x7f
     node: NodeId,
-    /// pressure, temperature, ch1 to ch16 [default: every signal; to set: the only one with a filter]
+    /// Signal: pressure, temperature, ch1 to ch16 [default: all; to set: the only one with a filter]
     signal: Option<String>,
-    /// What the filter does
+    /// Filter type
     #[arg(long = "type", value_name = "TYPE")]
     kind: Option<Type>,
-    /// How many steps it takes
+    /// Filter constant: number of values
     #[arg(long, value_name = "N")]
     constant: Option<u16>,
-    /// Within which time the value follows a step; the device works out the constant
+    /// Time in which the value follows a step; the device calculates the constant
     #[arg(long, value_name = "DUR", conflicts_with = "constant")]
     damping: Option<Duration>,
 }
 
-// No doc comments on the variants: clap would spread each over lines of its own.
+// No doc comments on the variants: clap would print each on its own lines.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Type {
     None,
@@ -44,7 +41,7 @@ enum Type {
 }
 
 impl Filter {
-    /// What it does not share with another cangauge.
+    /// The node, for this command alone.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nodes(vec![self.node])
     }
@@ -66,52 +63,25 @@ impl Filter {
                 let device = Device::open(master, self.node, &overrides)?;
                 Ok(show(master, &device, signal)?)
             })?;
-            return self.print(&filters, None, global.format).map_err(stdout);
+            let filters = filters.into_iter().map(|filter| FilterReport { filter, damping_shown: None });
+            return global.print(&filters.collect::<Vec<_>>());
         }
         let change = global.with_master(|master| {
             let device = Device::open(master, self.node, &overrides)?;
             Ok(set(master, &device, signal, wanted)?)
         })?;
-        self.print(std::slice::from_ref(&change.now), change.damping_shown, global.format).map_err(stdout)?;
         let (console, node) = (global.console(), self.node);
+        let constant = change.now.constant.map_or_else(|| "unknown".to_owned(), |constant| constant.to_string());
+        let changed = change.before != change.now;
+        global.print(&[FilterReport { filter: change.now, damping_shown: change.damping_shown }])?;
         if change.damping_shown == Some(false) {
-            let constant = change.now.constant.map_or_else(|| "nothing".to_owned(), |constant| constant.to_string());
             console.warn(&format!(
-                "node {node}: the damping was acknowledged; the filter constant reads {constant} as before, so nothing shows it"
+                "node {node}: the damping was acknowledged, but the filter constant did not change ({constant})"
             ));
         }
-        if change.before != change.now {
+        if changed {
             console.note(&format!("node {node}: lost at power-off unless stored: cangauge store {node}"));
         }
         Ok(())
-    }
-
-    fn print(&self, filters: &[FilterOf], damping_shown: Option<bool>, format: Format) -> io::Result<()> {
-        let mut out = io::stdout().lock();
-        let node = self.node.to_string();
-        let number = |number: Option<u64>| number.map(|number| number.to_string()).unwrap_or_default();
-        match format {
-            Format::Json => {
-                filters.iter().try_for_each(|filter| json::filter(&mut out, self.node, filter, damping_shown))?;
-            }
-            Format::Csv => {
-                let row = |filter: &FilterOf| {
-                    let (code, constant) = (number(filter.code), number(filter.constant));
-                    vec![node.clone(), filter.signal.clone(), code, filter.kind.clone(), constant]
-                };
-                csv::write(&mut out, &["node", "signal", "code", "type", "constant"], filters.iter().map(row))?;
-            }
-            Format::Text => {
-                let row = |filter: &FilterOf| {
-                    let kind = format!("{} ({})", filter.kind, number(filter.code));
-                    let constant = filter.constant.map(|constant| format!("constant {constant}"));
-                    let kind = if filter.code.is_some() { kind } else { "-".to_owned() };
-                    vec![filter.signal.clone(), kind, constant.unwrap_or_default()]
-                };
-                let rows: Vec<Vec<String>> = filters.iter().map(row).collect();
-                table::write(&mut out, &[table::Align::Left; 3], &rows)?;
-            }
-        }
-        out.flush()
     }
 }

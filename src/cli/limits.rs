@@ -1,38 +1,35 @@
 //! `cangauge limits`.
 
-use super::exit::stdout;
-use super::{Format, Global, open};
+use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
-use crate::output::{csv, settings as json, table};
 use crate::tasks::settings::Device;
-use crate::tasks::settings::limits::{Limit, Limits as Report, set, show};
+use crate::tasks::settings::limits::{Limit, set, show};
 use clap::Args;
-use std::io::{self, Write};
 
-/// Tell or set what makes a TPDO of a signal go out by itself: delta, limits, hysteresis (x133h to x136h)
+/// Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)
 ///
-/// In the unit of the signal. They count for transmission types 254 and 255; a PDO of these types whose
-/// event timer and delta are both 0 may never be sent, and that is said.
+/// Values are in the unit of the signal. They apply to transmission types 254 and 255. A TPDO of these types whose event
+/// timer and delta are both 0 may never be sent; a warning names it.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim limits 1 pressure\n  cangauge -b sim limits 1 temperature --delta 0.5\n  cangauge -b sim limits 1 pressure --lower 0.5 --upper 8 --hysteresis 0.1"
 )]
 pub(crate) struct Limits {
-    /// Which node: 5, 0x7f
+    /// Node-ID: 5, 0x7f
     node: NodeId,
-    /// pressure, temperature, ch1 to ch16
+    /// Signal: pressure, temperature, ch1 to ch16
     signal: String,
-    /// A change of at least this sends; 0 is off
+    /// Send if the value changes by at least this; 0: off
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = finite)]
     delta: Option<f64>,
-    /// Below it, it sends
+    /// Lower limit: send if the value falls below it
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = finite)]
     lower: Option<f64>,
-    /// Above it, it sends
+    /// Upper limit: send if the value rises above it
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = finite)]
     upper: Option<f64>,
-    /// How far back behind a limit before it counts again
+    /// Hysteresis before a limit triggers again
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = finite)]
     hysteresis: Option<f64>,
 }
@@ -43,7 +40,7 @@ fn finite(text: &str) -> Result<f64, String> {
 }
 
 impl Limits {
-    /// What it does not share with another cangauge.
+    /// The node, for this command alone.
     pub(super) fn claim(&self) -> Claim {
         Claim::Nodes(vec![self.node])
     }
@@ -54,7 +51,7 @@ impl Limits {
             Limit::ALL.into_iter().zip(given).filter_map(|(limit, number)| Some((limit, number?))).collect();
         for (limit, number) in wanted.iter().filter(|(limit, _)| matches!(limit, Limit::Delta | Limit::Hysteresis)) {
             if *number < 0.0 {
-                let message = format!("{} cannot be less than 0: {number}", limit.as_str());
+                let message = format!("{} must not be negative: {number}", limit.as_str());
                 return Err(crate::tasks::Failure::new(crate::tasks::Kind::Usage, message).into());
             }
         }
@@ -66,11 +63,11 @@ impl Limits {
                 false => set(master, &device, &self.signal, &wanted)?,
             })
         })?;
-        self.print(&report, global.format).map_err(stdout)?;
+        global.print(std::slice::from_ref(&report))?;
         let console = global.console();
         for tpdo in &report.silent {
             console.warn(&format!(
-                "node {}: {tpdo} goes out by event, without a timer, and delta is 0: it may never be sent",
+                "node {}: {tpdo} is sent on events, its event timer and delta are 0: it may never be sent",
                 self.node
             ));
         }
@@ -78,27 +75,5 @@ impl Limits {
             console.note(&format!("node {0}: lost at power-off unless stored: cangauge store {0}", self.node));
         }
         Ok(())
-    }
-
-    fn print(&self, report: &Report, format: Format) -> io::Result<()> {
-        let mut out = io::stdout().lock();
-        match format {
-            Format::Json => json::limits(&mut out, self.node, report)?,
-            Format::Csv => {
-                let rows = report.values.iter().map(|(limit, _, quantity)| {
-                    let unit = quantity.unit.map(|unit| unit.to_string()).unwrap_or_default();
-                    let (node, limit) = (self.node.to_string(), limit.as_str().to_owned());
-                    vec![node, report.signal.clone(), limit, quantity.number.to_string(), unit]
-                });
-                csv::write(&mut out, &["node", "signal", "limit", "value", "unit"], rows)?;
-            }
-            Format::Text => {
-                let rows = report.values.iter().map(|(limit, object, quantity)| {
-                    vec![limit.as_str().to_owned(), quantity.to_string(), format!("({object})")]
-                });
-                table::write(&mut out, &[table::Align::Left; 3], &rows.collect::<Vec<_>>())?;
-            }
-        }
-        out.flush()
     }
 }

@@ -1,5 +1,4 @@
-//! The command line: one file a subcommand, with its arguments, its help, the task it runs and the output
-//! it gets.
+//! The command line: one file per subcommand, with its arguments, its help text, and the task that it runs.
 
 pub mod args;
 mod autozero;
@@ -44,23 +43,23 @@ use std::path::PathBuf;
 const GLOBAL_OPTIONS: &str = "Global options: see cangauge --help";
 
 const EXAMPLES: &str = "\
-Examples, on the simulated bus; leave `-b sim` out where one CAN interface is up:
-  cangauge -b sim scan                                   who is there
-  cangauge -b sim read 1                                 its measured values now
-  cangauge -b sim log 1 --sync 100ms --count 20          its measurements as CSV
+Examples on the simulated bus (omit `-b sim` if one CAN interface is up):
+  cangauge -b sim scan                                   find the nodes
+  cangauge -b sim read 1                                 read measured values
+  cangauge -b sim log 1 --sync 100ms --count 20          record measurements as CSV
   cangauge -b sim log 1-3,127 --sync 10ms --duration 1h -o run.csv
-  cangauge -b sim info 1                                 all of one device on one page
-  cangauge -b sim unit 127 bar                           its unit, and what that rescales
-  cangauge -b sim sdo read 1 0x1018:1                    one object, bare
-  cangauge -b sim nmt reset 1                            restart it, wait for the boot-up
-  cangauge -b sim lss set-id 127 12                      give it a node-ID, and see it come back
+  cangauge -b sim info 1                                 show everything about a device
+  cangauge -b sim unit 127 bar                           set the unit; show the rescaled values
+  cangauge -b sim sdo read 1 0x1018:1                    read one object
+  cangauge -b sim nmt reset 1                            reset a node and wait for its boot-up
+  cangauge -b sim lss set-id 127 12                      set the node-ID and verify it
 
 Exit codes:
-  0  done                                    5  the bus fails: interface missing, down, bus-off
-  1  the answer is no                        6  an unexpected answer or state
-  2  usage: nothing was sent                 7  some nodes succeeded and some failed
-  3  no answer in time                       8  a file or a stream fails
-  4  refused by the device                 130  interrupted before there was a result";
+  0  success                                 5  bus error: interface missing, down, bus-off
+  1  check failed, or stopped for safety     6  unexpected answer or state
+  2  usage error: nothing was changed        7  some nodes succeeded and some failed
+  3  no answer in time                       8  file or stream error
+  4  rejected by the device                130  interrupted before there was a result";
 
 /// Find, configure and log CANopen measuring devices (CiA 404): pressure and temperature transmitters,
 /// thermocouple modules
@@ -78,8 +77,8 @@ pub struct Cli {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
-    /// Which bus: can0 (SocketCAN), sim, sim:mh4@5,dps@unconfigured, sim:FILE.toml, replay:FILE (a
-    /// candump -L log; receives only). Not given: the only CAN interface that is up
+    /// Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default:
+    /// the only CAN interface that is up]
     #[arg(short, long, global = true, env = "CANGAUGE_BUS", value_name = "BUS")]
     pub(crate) bus: Option<BusSpec>,
 
@@ -87,24 +86,24 @@ pub struct Global {
     #[arg(short, long, global = true, value_name = "DUR")]
     pub(crate) timeout: Option<Duration>,
 
-    /// How often a request that got no answer is repeated [default: 1]
+    /// Number of times to repeat a request without an answer [default: 1]
     #[arg(long, global = true, value_name = "N")]
     pub(crate) retries: Option<u32>,
 
-    /// Take a device for this one instead of recognising it: mh4, d20, dps, mc1609, hydac, jumo, or a description in
-    /// TOML; NODE=NAME for one node of several
+    /// Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several
+    /// nodes
     #[arg(long, global = true, value_name = "[NODE=]NAME|FILE")]
     pub(crate) device: Vec<Override>,
 
-    /// Take objects, names and types from an EDS or DCF file; NODE=FILE for one node of several
+    /// Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes
     #[arg(long, global = true, value_name = "[NODE=]FILE")]
     pub(crate) eds: Vec<Override>,
 
-    /// Form of the output: for people, one object a line, or comma-separated; for log, text means csv
+    /// Output format: text, JSON Lines or CSV; for log, text means csv
     #[arg(short, long, global = true, value_name = "FORM", default_value = "text")]
     pub(crate) format: Format,
 
-    /// Write every frame sent and received to FILE, as candump -L does; - for stderr
+    /// Write every frame sent and received to FILE in candump -L format; - for stderr
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) trace: Option<PathBuf>,
 
@@ -112,23 +111,23 @@ pub struct Global {
     #[arg(long, global = true)]
     pub(crate) ignore_lock: bool,
 
-    /// Say less on stderr
+    /// Print less on stderr
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub(crate) quiet: bool,
 
-    /// Say more on stderr
+    /// Print more on stderr
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub(crate) verbose: u8,
 
-    /// Show live values and progress on stderr; auto: on a terminal
+    /// Show live values and progress on stderr; auto: only on a terminal
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
     pub(crate) progress: When,
 
-    /// Colour on stderr; auto: on a terminal, and without NO_COLOR
+    /// Use colour on stderr; auto: only on a terminal without NO_COLOR
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
     pub(crate) color: When,
 
-    /// What the command keeps other cangauges from.
+    /// The nodes that the command keeps other cangauges from using.
     #[arg(skip)]
     pub(crate) claim: Claim,
 }
@@ -204,7 +203,7 @@ commands! {
 type Augment = fn(clap::Command) -> clap::Command;
 
 impl Global {
-    /// stderr as these options want it.
+    /// The output on stderr, as these options set it.
     pub(crate) fn console(&self) -> Console {
         Console {
             quiet: self.quiet,
@@ -228,7 +227,7 @@ impl Global {
         }
     }
 
-    /// The time-outs; `timeout` where the command has another default.
+    /// The time-outs; `timeout` is the default of the command.
     pub(crate) fn timing(&self, timeout: std::time::Duration) -> Timing {
         Timing {
             timeout: self.timeout.map_or(timeout, |timeout| timeout.0),
@@ -252,7 +251,6 @@ impl Global {
     }
 
     /// Prints reports one by one as they arrive.
-    #[allow(dead_code)]
     pub(crate) fn stream<R: Report>(&self) -> anyhow::Result<Stream<R, io::Stdout>> {
         Stream::new(self.format, io::stdout()).map_err(exit::stdout)
     }
@@ -262,7 +260,7 @@ impl Global {
         self.with_claims(|master, _| work(master))
     }
 
-    /// The same for work that need not keep others away to its end: what it takes of the claims is its own.
+    /// The same for work that can release its claims before it ends.
     pub(crate) fn with_claims<T>(
         &self,
         work: impl FnOnce(&mut Master<'_>, &mut Claims) -> anyhow::Result<T>,
@@ -272,7 +270,7 @@ impl Global {
         let mut bus = open::open_as(self, &spec, false)?;
         let mut master = Master::new(&mut *bus, self.timing(Timing::default().timeout));
         let result = work(&mut master, &mut claims);
-        // What a command leaves behind at its end still goes out: an abort, a node's state.
+        // The last frames of a command are still sent: an abort, an NMT state to restore.
         master.settle();
         let finished = bus.finish().or_fail();
         let result = result?;
@@ -284,7 +282,7 @@ impl Global {
 /// Runs a command line.
 ///
 /// # Errors
-/// Why it was not done; [`exit::report`] turns it into words and an exit code.
+/// Why the command failed; [`exit::report`] turns it into text and an exit code.
 pub fn run(cli: &Cli) -> anyhow::Result<()> {
     let global = Global { claim: cli.command.claim(), ..cli.global.clone() };
     cli.command.run(&global)

@@ -2,23 +2,22 @@
 
 use super::args::{Duration, Nodes, ObjectArg};
 use super::exit::stdout;
-use super::{Format, Global, open};
+use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::TpdoNumber;
-use crate::output::pdo as output;
-use crate::tasks::pdo::{Item, Line, Send, Shown, Wish, map, show, watch};
+use crate::output::pdo::ReceivedTpdo;
+use crate::tasks::pdo::{Item, Line, Send, Wish, map, show, watch};
 use crate::tasks::{Failure, Kind};
 use clap::{Args, Subcommand};
-use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::str::FromStr;
 
-/// Show, change and watch what the nodes' transmit PDOs carry
+/// Show, change and watch the transmit PDOs of nodes
 ///
-/// PDO 1 is TPDO1 (1800h, 1A00h). A mapping is changed as a transaction: what was asked for is reached and
-/// read back, or the old settings are put back and the refused write is named.
+/// PDO 1 is TPDO1 (1800h, 1A00h). A mapping is changed as a transaction: either the new settings are written and read
+/// back, or the old settings are restored and the rejected write is named.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim pdo show 1\n  cangauge -b sim pdo map 1 1 pressure pressure.status --transmission timer --event-timer 100ms\n  cangauge -b sim pdo map 2 1 0x6130:1/32\n  cangauge pdo watch 127 --duration 10s"
@@ -31,55 +30,55 @@ pub(crate) struct Pdo {
 #[derive(Debug, Subcommand)]
 #[command(defer = true)]
 enum Action {
-    /// Show how the TPDOs are set up
+    /// Show the settings of TPDOs
     Show(ShowArgs),
-    /// Set what a TPDO carries, and when it is sent
+    /// Set the mapping of a TPDO, and when it is sent
     Map(MapArgs),
-    /// Show the TPDOs as they come, decoded, until Ctrl-C
+    /// Show received TPDOs, decoded, until Ctrl-C
     Watch(WatchArgs),
 }
 
 #[derive(Debug, Args)]
 struct ShowArgs {
-    /// Which node: 5, 0x7f
+    /// Node-ID: 5, 0x7f
     node: NodeId,
-    /// Which TPDO: 1 to 512; not given: all
+    /// TPDO: 1 to 512 [default: all]
     #[arg(value_parser = tpdo)]
     pdo: Option<TpdoNumber>,
 }
 
 #[derive(Debug, Args)]
 struct MapArgs {
-    /// Which node: 5, 0x7f
+    /// Node-ID: 5, 0x7f
     node: NodeId,
-    /// Which TPDO: 1 to 512
+    /// TPDO: 1 to 512
     #[arg(value_parser = tpdo)]
     pdo: TpdoNumber,
-    /// What it carries, in this order: pressure, pressure.status, ai-input-pv:1, 0x6130:1, 0x9130:1/32; not
-    /// given: the mapping stays as it is
+    /// Mapped signals or objects, in order: pressure, pressure.status, ai-input-pv:1, 0x6130:1, 0x9130:1/32 [default:
+    /// keep the mapping]
     #[arg(value_name = "SIGNAL|OBJECT")]
     signals: Vec<MapItem>,
-    /// When it is sent: acyclic (on SYNC after a change), sync:N (on every N-th SYNC), event (255), timer
-    /// (by the event timer), or a number
+    /// Transmission type: acyclic (on SYNC after a change), sync:N (on every N-th SYNC), event (255), timer (event timer),
+    /// or a number
     #[arg(long, value_name = "HOW", value_parser = transmission)]
     transmission: Option<Send>,
-    /// The event timer, in whole milliseconds; 0 is off
+    /// Event timer, in whole milliseconds; 0: off
     #[arg(long, value_name = "DUR", value_parser = event_timer)]
     event_timer: Option<u16>,
-    /// The shortest time between two transmissions, in steps of 100us; 0 is none
+    /// Inhibit time: shortest time between two transmissions, in steps of 100us; 0: none
     #[arg(long, value_name = "DUR", value_parser = inhibit)]
     inhibit: Option<u16>,
-    /// The identifier, 11 bits: 0x1A5
+    /// CAN identifier, 11 bits: 0x1A5
     #[arg(long, value_name = "ID", value_parser = identifier)]
     cob_id: Option<u16>,
-    /// Store it then (1010h, the communication settings alone where the device has them apart)
+    /// Store the change (1010h; only the communication settings if the device can store them separately)
     #[arg(long)]
     store: bool,
 }
 
 #[derive(Debug, Args)]
 struct WatchArgs {
-    /// Which nodes: 5, 0x7f, 1-16, 1,5, all
+    /// Nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
     /// End after this time
     #[arg(short, long, value_name = "DUR")]
@@ -91,7 +90,7 @@ fn tpdo(text: &str) -> Result<TpdoNumber, String> {
     number.ok_or_else(|| format!("\"{text}\" is not the number of a TPDO (1 to 512)"))
 }
 
-/// Something to be mapped, with its bits where they are fixed.
+/// A signal or object to map, with its number of bits if it was given.
 #[derive(Clone, Debug)]
 struct MapItem(Item);
 
@@ -103,7 +102,7 @@ impl FromStr for MapItem {
             None => (text, None),
             Some((what, bits)) => {
                 let number = bits.parse().ok().filter(|bits| (1..=64).contains(bits));
-                (what, Some(number.ok_or_else(|| format!("\"{text}\": \"{bits}\" is no number of bits (1 to 64)"))?))
+                (what, Some(number.ok_or_else(|| format!("\"{text}\": \"{bits}\" is not a number of bits (1 to 64)"))?))
             }
         };
         if what.starts_with(|first: char| first.is_ascii_digit()) {
@@ -158,12 +157,12 @@ fn inhibit(text: &str) -> Result<u16, String> {
 fn identifier(text: &str) -> Result<u16, String> {
     let number = crate::canopen::id::parse_u32(text);
     number.and_then(|number| u16::try_from(number).ok()).filter(|&number| number <= 0x7ff).ok_or_else(|| {
-        format!("\"{text}\" is not an identifier of 11 bits (0x181 to 0x57F; without the flags of the COB-ID)")
+        format!("\"{text}\" is not an 11-bit identifier (0x181 to 0x57F, without the flags of the COB-ID)")
     })
 }
 
 impl Pdo {
-    /// What it does not share with another cangauge.
+    /// The nodes, for this command alone.
     pub(super) fn claim(&self) -> Claim {
         match &self.action {
             Action::Show(args) => Claim::Nodes(vec![args.node]),
@@ -185,7 +184,7 @@ impl ShowArgs {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let overrides = open::overrides(global, &[self.node])?;
         let shown = global.with_master(|master| Ok(show(master, self.node, self.pdo, &overrides)?))?;
-        print(&shown, global.format).map_err(stdout)
+        global.print(&shown)
     }
 }
 
@@ -202,10 +201,12 @@ impl MapArgs {
         };
         let parameters = [wish.event_timer_ms, wish.inhibit_100us, wish.cob_id];
         if wish.items.is_empty() && wish.send.is_none() && parameters.iter().all(Option::is_none) {
-            let hint = format!("how it is set: cangauge pdo show {} {}", self.node, self.pdo.get());
-            return Err(
-                Failure::new(Kind::Usage, "nothing to set: name signals, or --transmission and its like").hint(hint)
-            );
+            let hint = format!("show its settings: cangauge pdo show {} {}", self.node, self.pdo.get());
+            return Err(Failure::new(
+                Kind::Usage,
+                "nothing to set: name signals, or give --transmission, --event-timer, --inhibit or --cob-id",
+            )
+            .hint(hint));
         }
         wish.check()?;
         Ok(wish)
@@ -219,7 +220,7 @@ impl MapArgs {
         mapped.warnings.iter().for_each(|warning| console.warn(warning));
         let node = self.node;
         match mapped.writes {
-            0 => console.note(&format!("node {node}: {} is already as wanted: nothing was written", self.pdo)),
+            0 => console.note(&format!("node {node}: {} has these settings already: nothing was written", self.pdo)),
             1 => console.detail(&format!("node {node}: 1 write, read back")),
             writes => console.detail(&format!("node {node}: {writes} writes, read back")),
         }
@@ -228,62 +229,46 @@ impl MapArgs {
             stored.notes.iter().for_each(|note| console.note(&format!("node {node}: {note}")));
         }
         mapped.remarks.iter().for_each(|remark| console.note(remark));
-        print(&[mapped.shown], global.format).map_err(stdout)
+        global.print(&[mapped.shown])
     }
-}
-
-fn print(shown: &[Shown], format: Format) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    match format {
-        Format::Json => shown.iter().try_for_each(|shown| output::json(&mut out, shown))?,
-        Format::Csv => output::csv(&mut out, shown)?,
-        Format::Text => output::text(&mut out, shown)?,
-    }
-    out.flush()
 }
 
 impl WatchArgs {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let console = global.console();
         let mut failed = None;
-        let mut out = io::stdout().lock();
-        if global.format == Format::Csv {
-            output::watched_head(&mut out).map_err(stdout)?;
-        }
+        let mut rows = global.stream::<ReceivedTpdo>()?;
         global.with_claims(|master, claims| {
             let nodes = open::nodes(master, global, &self.nodes)?;
             let overrides = open::overrides(global, &nodes)?;
             let mut claims = Some(std::mem::take(claims));
-            let mut tell = |seen: &Line<'_>| {
-                // The nodes have been asked for their mapping; from here on it only listens.
+            let mut report = |line: &Line<'_>| {
+                // The mappings are read; from now on the command only listens.
                 claims.take();
-                match seen {
+                match *line {
                     Line::Restarted(node) => {
-                        console.warn(&format!("node {node} restarted: its mapping is taken for the same"));
+                        console.warn(&format!("node {node} restarted; its mapping is assumed to be unchanged"));
                     }
                     Line::Nothing => {
-                        console.note("nothing yet: are the nodes started, and does somebody send SYNC?");
+                        console.note("no TPDO yet: are the nodes operational, and does a node send SYNC?");
                     }
-                    Line::WrongLength { node, number, length, .. } if global.format != Format::Text => {
-                        console.warn(&format!("node {node}: {number} has {length} bytes, not those of its mapping"));
+                    Line::WrongLength { node, number, length, .. } => {
+                        console.warn(&format!(
+                            "node {node}: {number} has {length} bytes, which is not the length of its mapping"
+                        ));
                     }
-                    _ => {}
-                }
-                let written = match global.format {
-                    Format::Json => output::watched_json(&mut out, seen),
-                    Format::Csv => output::watched_csv(&mut out, seen),
-                    Format::Text => output::watched_text(&mut out, seen),
-                };
-                match written.and_then(|()| out.flush()) {
-                    Ok(()) => ControlFlow::Continue(()),
-                    Err(error) => {
-                        failed = Some(error);
-                        ControlFlow::Break(())
+                    Line::Pdo { at, node, number, samples, sources } => {
+                        let tpdo = ReceivedTpdo::new(at, node, number, samples, sources);
+                        if let Err(error) = rows.push(&tpdo) {
+                            failed = Some(error);
+                            return ControlFlow::Break(());
+                        }
                     }
                 }
+                ControlFlow::Continue(())
             };
             let duration = self.duration.map(|duration| duration.0);
-            Ok(watch(master, &nodes, &overrides, duration, &mut tell)?)
+            Ok(watch(master, &nodes, &overrides, duration, &mut report)?)
         })?;
         failed.map_or(Ok(()), |error| Err(stdout(error)))
     }

@@ -11,12 +11,11 @@ use clap::Args;
 
 /// Simulate devices on a bus until Ctrl-C
 ///
-/// The devices answer, send and fail as their manuals say, so that other programs can be tried against
-/// them.
+/// The devices answer, send and fail as their manuals describe. Other programs can be tested with them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b vcan0 sim mh4@5 dps@127\n  cangauge -b vcan0 sim bench.toml")]
 pub(crate) struct Sim {
-    /// mh4@5 d20@2 dps@127 mc1609@3, mh4@unconfigured for one without a node-ID, or a bench description in TOML
+    /// Devices: mh4@5 dps@127, mh4@unconfigured for one without a node-ID; or a bench file in TOML
     #[arg(required = true, value_name = "DEVICE@NODE|FILE.toml")]
     devices: Vec<String>,
 }
@@ -32,15 +31,15 @@ impl Sim {
         if let Some(BusSpec::Sim(_)) = global.bus {
             return Err(Failure::new(
                 Kind::Usage,
-                "nobody else can reach the simulated bus: it is inside this program",
+                "no other program can reach the simulated bus: it is inside this program",
             )
-            .hint("name an interface, say a virtual one: cangauge -b vcan0 sim mh4@5")
+            .hint("name an interface, for example a virtual one: cangauge -b vcan0 sim mh4@5")
             .into());
         }
         let mut bus = open::open(global)?;
         let devices = bench.into_devices().map_err(open::bench_error)?;
         let stations = devices.into_iter().map(|device| Box::new(device) as Box<dyn Station>).collect();
-        global.console().note("simulating; Ctrl-C ends");
+        global.console().note("simulation is running; press Ctrl-C to end");
         sim::host::run(&mut *bus, stations, None).or_fail()?;
         Ok(bus.finish().or_fail()?)
     }

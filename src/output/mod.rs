@@ -8,7 +8,7 @@ pub mod events;
 pub mod failure;
 pub mod identity;
 pub mod info;
-pub mod info_json;
+mod info_report;
 pub mod interfaces;
 pub mod json;
 pub mod json_lss;

@@ -1,25 +1,16 @@
 //! The settings of a device.
 
-use super::json::{JsonNumber, line};
+use super::info;
 use super::report::{Cell, Column, Report};
 use super::table::{self, Align};
-use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
 use crate::tasks::settings::Quantity;
-use crate::tasks::settings::errors::{Errors, PastError};
-use crate::tasks::settings::filter::FilterOf;
+use crate::tasks::settings::errors::{ErrorReport, Errors, PastError};
+use crate::tasks::settings::filter::{FilterOf, FilterReport};
 use crate::tasks::settings::limits::{Limit, Limits};
 use crate::tasks::settings::minmax::{Extremes, MinMax};
 use crate::tasks::settings::unit::{UnitChange, UnitOf, list};
-use serde::Serialize;
 use std::io::{self, Write};
-
-fn number(quantity: Option<Quantity>) -> JsonNumber {
-    JsonNumber(quantity.map(|quantity| quantity.number))
-}
-
-fn unit_name(quantity: Option<Quantity>) -> Option<String> {
-    quantity?.unit.map(|unit| unit.to_string()).filter(|unit| !unit.is_empty())
-}
 
 impl Report for UnitOf {
     const COLUMNS: &'static [Column] = &[
@@ -114,51 +105,69 @@ fn shown(quantity: Option<Quantity>) -> String {
     quantity.map_or_else(|| "-".to_owned(), |quantity| quantity.to_string())
 }
 
-/// The filter of a signal; after a change with whether the damping showed.
-pub fn filter(out: &mut dyn Write, node: NodeId, filter: &FilterOf, damping_shown: Option<bool>) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Filter<'a> {
-        node: u8,
-        signal: &'a str,
-        code: Option<u64>,
-        #[serde(rename = "type")]
-        kind: &'a str,
-        constant: Option<u64>,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        damping_shown: Option<bool>,
+impl Report for FilterReport {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("node"),
+        Column::new("signal"),
+        Column::new("code"),
+        Column::new("type"),
+        Column::new("constant"),
+        Column::new("damping_shown").json_only(),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let FilterOf { node, signal, code, kind, constant } = &self.filter;
+        let damping_shown = self.damping_shown.into();
+        vec![(*node).into(), signal.into(), (*code).into(), kind.into(), (*constant).into(), damping_shown]
     }
-    let (signal, kind) = (filter.signal.as_str(), filter.kind.as_str());
-    let (node, code, constant) = (node.get(), filter.code, filter.constant);
-    line(out, &Filter { node, signal, code, kind, constant, damping_shown })
+
+    /// `pressure  moving average (1)  constant 8`.
+    fn text(filters: &[FilterReport], out: &mut dyn Write) -> io::Result<()> {
+        let row = |FilterReport { filter, .. }: &FilterReport| {
+            let kind = filter.code.map_or_else(|| "-".to_owned(), |code| format!("{} ({code})", filter.kind));
+            let constant = filter.constant.map(|constant| format!("constant {constant}"));
+            vec![filter.signal.clone(), kind, constant.unwrap_or_default()]
+        };
+        table::write(out, &[Align::Left; 3], &filters.iter().map(row).collect::<Vec<_>>())
+    }
 }
 
-/// The limits of a signal; `null` for those that the device has not.
-pub fn limits(out: &mut dyn Write, node: NodeId, limits: &Limits) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Json<'a> {
-        node: u8,
-        signal: &'a str,
-        delta: JsonNumber,
-        lower: JsonNumber,
-        upper: JsonNumber,
-        hysteresis: JsonNumber,
-        unit: Option<String>,
-        silent: &'a [String],
+impl Report for Limits {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("node"),
+        Column::new("signal"),
+        Column::new("delta").json_only(),
+        Column::new("lower").json_only(),
+        Column::new("upper").json_only(),
+        Column::new("hysteresis").json_only(),
+        Column::new("unit").json_only(),
+        Column::new("silent").json_only(),
+        Column::nested("values", &[Column::new("limit"), Column::new("value"), Column::new("unit")]).csv_only(),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let all = Limit::ALL.map(|limit| {
+            let value = self.values.iter().find(|(other, ..)| *other == limit);
+            Cell::from(value.map(|(_, _, quantity)| quantity.number))
+        });
+        let unit = self.values.first().and_then(|(_, _, quantity)| quantity.unit);
+        let row = |(limit, _, quantity): &(Limit, ObjectId, Quantity)| {
+            vec![limit.as_str().into(), quantity.number.into(), quantity.unit.into()]
+        };
+        let mut cells = vec![self.node.into(), self.signal.as_str().into()];
+        cells.extend(all);
+        cells.extend([unit.into(), Cell::list(&self.silent), Cell::Rows(self.values.iter().map(row).collect())]);
+        cells
     }
-    let of = |limit: Limit| limits.values.iter().find(|(other, ..)| *other == limit).map(|&(_, _, quantity)| quantity);
-    line(
-        out,
-        &Json {
-            node: node.get(),
-            signal: &limits.signal,
-            delta: number(of(Limit::Delta)),
-            lower: number(of(Limit::Lower)),
-            upper: number(of(Limit::Upper)),
-            hysteresis: number(of(Limit::Hysteresis)),
-            unit: unit_name(limits.values.first().map(|&(_, _, quantity)| quantity)),
-            silent: &limits.silent,
-        },
-    )
+
+    /// `delta  0.5 bar  (0x6133:1)`.
+    fn text(all: &[Limits], out: &mut dyn Write) -> io::Result<()> {
+        let row = |(limit, object, quantity): &(Limit, ObjectId, Quantity)| {
+            vec![limit.as_str().to_owned(), quantity.to_string(), format!("({object})")]
+        };
+        let rows: Vec<Vec<String>> = all.iter().flat_map(|limits| &limits.values).map(row).collect();
+        table::write(out, &[Align::Left; 3], &rows)
+    }
 }
 
 impl Report for MinMax {
@@ -196,47 +205,44 @@ impl Report for MinMax {
     }
 }
 
-/// An entry of the error history.
-#[derive(Serialize)]
-pub(super) struct Past<'a> {
-    code: String,
-    text: &'a str,
-    detail: Option<&'a str>,
-    raw: String,
-}
+/// The columns of an entry of the error history.
+const HISTORY: &[Column] = &[
+    Column::new("number").csv_only(),
+    Column::new("code"),
+    Column::new("text"),
+    Column::new("detail"),
+    Column::new("raw"),
+];
 
-impl<'a> Past<'a> {
-    pub(super) fn new(error: &'a PastError) -> Past<'a> {
-        Past {
-            code: format!("0x{:04X}", error.code),
-            text: &error.text,
-            detail: Some(error.detail.as_str()).filter(|detail| !detail.is_empty()),
-            raw: format!("0x{:08X}", error.raw),
-        }
+impl Report for ErrorReport {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("node"),
+        Column::new("register").json_only(),
+        Column::new("register_text").json_only(),
+        Column::new("count").json_only(),
+        Column::nested("history", HISTORY),
+        Column::new("cleared").json_only(),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let errors = &self.errors;
+        let row = |(error, number): (&PastError, u32)| {
+            let (code, raw) = (Cell::hex(error.code, 4), Cell::hex(error.raw, 8));
+            vec![number.into(), code, error.text.as_str().into(), error.detail.as_str().into(), raw]
+        };
+        let [register, register_text, count] = error_cells(errors);
+        let history = Cell::Rows(errors.history.iter().zip(1..).map(row).collect());
+        vec![self.node.into(), register, register_text, count, history, self.cleared.into()]
+    }
+
+    fn text(reports: &[ErrorReport], out: &mut dyn Write) -> io::Result<()> {
+        let rows: Vec<Vec<String>> = reports.iter().flat_map(|report| info::errors(&report.errors)).collect();
+        table::write(out, &[Align::Left; 2], &rows)
     }
 }
 
-/// Register and history; after they were cleared with how many errors there were.
-pub fn errors(out: &mut dyn Write, node: NodeId, errors: &Errors, cleared: Option<u64>) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Json<'a> {
-        node: u8,
-        register: Option<String>,
-        register_text: Option<&'a str>,
-        count: Option<u64>,
-        history: Vec<Past<'a>>,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        cleared: Option<u64>,
-    }
-    line(
-        out,
-        &Json {
-            node: node.get(),
-            register: errors.register.map(|bits| format!("0x{bits:02X}")),
-            register_text: errors.register.map(|_| errors.register_text.as_str()),
-            count: errors.count,
-            history: errors.history.iter().map(Past::new).collect(),
-            cleared,
-        },
-    )
+/// Register, its meaning, and the number of errors in the history.
+pub(super) fn error_cells(errors: &Errors) -> [Cell; 3] {
+    let register = errors.register.map(|bits| Cell::hex(bits, 2));
+    [register.into(), errors.register_text.as_str().into(), errors.count.into()]
 }

@@ -128,7 +128,7 @@ fn buses_that_are_none() {
 
 #[test]
 fn simulated_devices_are_for_others() {
-    Bench::of(ALL).run("sim mh4@5").refuses("nobody else can reach the simulated bus: it is inside this program");
+    Bench::of(ALL).run("sim mh4@5").refuses("no other program can reach the simulated bus: it is inside this program");
     Bench::of(ALL)
         .run("sim mh5@5")
         .refuses("no device \"mh5\" (baumer, d20, dps, hydac, hydac-old, jumo, mc1609, mh4, or FILE.toml)");

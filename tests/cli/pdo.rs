@@ -127,7 +127,11 @@ fn the_d20_is_remapped_as_its_manual_says() {
     // Back to the integer, in PRE-OPERATIONAL already: no NMT command.
     let done = Bench::of("d20@2").run("pdo map 2 1 0x2090/32").exit(0);
     assert_eq!(steps(&done, 2), [""; 0]);
-    assert!(done.stderr.starts_with("node 2: TPDO1 is already as wanted: nothing was written\n"), "{}", done.stderr);
+    assert!(
+        done.stderr.starts_with("node 2: TPDO1 has these settings already: nothing was written\n"),
+        "{}",
+        done.stderr
+    );
 }
 
 #[test]
@@ -308,6 +312,6 @@ fn watch() {
     assert_eq!(csv.lines().next(), Some("time,node,pdo,signal,value,unit,status,raw"));
     assert!(csv.lines().nth(1).is_some_and(|line| line.ends_with(",127,1,pressure,50.000,psi,,0x50C30000")), "{csv}");
     let silent = Bench::of("dps@127").run("pdo watch 127 --duration 8s").exit(3);
-    let said = "nothing yet: are the nodes started, and does somebody send SYNC?\ncangauge: not one TPDO came\n";
+    let said = "no TPDO yet: are the nodes operational, and does a node send SYNC?\ncangauge: not one TPDO came\n";
     assert!(silent.stderr.starts_with(said), "{}", silent.stderr);
 }

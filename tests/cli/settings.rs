@@ -177,7 +177,7 @@ fn limits() {
     let done = bench.run("limits 5 temperature").exit(0);
     assert_eq!(
         done.stderr,
-        "warning: node 5: TPDO2 goes out by event, without a timer, and delta is 0: it may never be sent\n"
+        "warning: node 5: TPDO2 is sent on events, its event timer and delta are 0: it may never be sent\n"
     );
     let done = bench.run("limits 5 temperature --delta 0.5 --lower -20 --upper 80 --hysteresis 1 -f json").exit(0);
     assert_eq!(
@@ -189,7 +189,7 @@ fn limits() {
     bench
         .run("limits 5 pressure --lower 11")
         .fails(2, "cangauge: node 5: pressure: the lower limit 11 is above the upper one, 10\n");
-    bench.run("limits 5 pressure --delta -1").refuses("delta cannot be less than 0: -1");
+    bench.run("limits 5 pressure --delta -1").refuses("delta must not be negative: -1");
     bench.run("limits 5 pressure --delta x").refuses("\"x\" is not a number (0.5, -20)");
     bench.run("limits 5 pressure --delta inf").exit(2);
     // What rises begins with the upper one.

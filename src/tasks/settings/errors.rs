@@ -3,6 +3,7 @@
 
 use super::Device;
 use crate::canopen::emcy::{Emergency, ErrorRegister};
+use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::device::description::{EmergencyEntry, ErrorHistory};
@@ -12,7 +13,18 @@ use crate::tasks::{Failure, Kind};
 const REGISTER: ObjectId = ObjectId::new(0x1001, 0);
 const HISTORY: ObjectId = ObjectId::new(0x1003, 0);
 
-/// What a device says of its errors.
+/// The errors of a node, and how many were deleted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ErrorReport {
+    /// The node.
+    pub node: NodeId,
+    /// Register and history, after a deletion.
+    pub errors: Errors,
+    /// How many errors the history held before it was deleted; `None` if it was not deleted.
+    pub cleared: Option<u64>,
+}
+
+/// The error register and the error history of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Errors {
     /// 1001h, where the device tells it.

@@ -2,6 +2,7 @@
 //! of (MH-4 2023h).
 
 use super::Device;
+use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::master::Master;
@@ -9,9 +10,20 @@ use crate::measure::layout::Signal;
 use crate::tasks::{Failure, Kind};
 use std::time::Duration;
 
+/// A filter as it is reported.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FilterReport {
+    /// The filter, read from the device.
+    pub filter: FilterOf,
+    /// Whether 61A1h shows the new damping; `None` if no damping was set.
+    pub damping_shown: Option<bool>,
+}
+
 /// The filter of a signal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FilterOf {
+    /// The node.
+    pub node: NodeId,
     /// `pressure`, `ch1` …
     pub signal: String,
     /// 61A0h, where the device tells it.
@@ -128,7 +140,7 @@ fn filter_of(master: &mut Master<'_>, device: &Device, signal: &Signal) -> Resul
     let [code, constant] = [0, 1].map(|at| values.get(at).and_then(Option::as_ref).and_then(Value::as_u64));
     let kind = code.map(|code| meaning(device, signal, code)).unwrap_or_default();
     let told = code.is_some() || constant.is_some();
-    Ok(told.then(|| FilterOf { signal: signal.name.clone(), code, kind, constant }))
+    Ok(told.then(|| FilterOf { node: device.node(), signal: signal.name.clone(), code, kind, constant }))
 }
 
 /// Sets the filter of a signal, or of the only one that has one, and reads it back.

@@ -2,6 +2,7 @@
 //! to x136h, in the family of the process value).
 
 use super::{Device, Quantity, encode_quantity};
+use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::Transmission;
 use crate::master::Master;
@@ -50,6 +51,8 @@ impl Limit {
 /// The limits of a signal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
+    /// The node.
+    pub node: NodeId,
     /// `pressure`, `ch1` …
     pub signal: String,
     /// What the device has of the four, with where it stands.
@@ -81,7 +84,7 @@ pub fn show(master: &mut Master<'_>, device: &Device, signal: &str) -> Result<Li
         return Err(Failure::of_node(Kind::Unexpected, device.node(), message));
     }
     let silent = silent(device, signal, &values);
-    Ok(Limits { signal: signal.name.clone(), values, silent })
+    Ok(Limits { node: device.node(), signal: signal.name.clone(), values, silent })
 }
 
 /// Sets limits of a signal, in its unit, and reads them back. What was set is put back where a later one is

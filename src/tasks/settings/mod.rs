@@ -18,17 +18,16 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::catalog::Model;
 use crate::device::description::ObjectEntry;
 use crate::device::dictionary::Entry;
-use crate::device::standard;
 use crate::device::unit::Unit;
-use crate::master::{Master, Request, SdoError, SdoFailure};
+use crate::master::{Master, SdoError, SdoFailure};
 use crate::measure::decode::is_smallest;
-use crate::measure::layout::{PROCESS_VALUES, Signal};
+use crate::measure::layout::Signal;
 use crate::measure::sample::Number;
 use crate::node::Node;
 use crate::node::Overrides;
 use crate::node::read::read_values;
 use crate::node::survey::survey_nodes;
-use crate::node::write::write;
+use crate::node::write::{write, write_and_verify};
 use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
 
@@ -60,65 +59,54 @@ impl Device {
         Ok(Device { instrument })
     }
 
-    /// Its node-ID.
+    /// The node-ID.
     pub fn node(&self) -> NodeId {
         self.instrument.id
     }
 
-    /// Its description, where one was recognised or given.
+    /// The description, recognised or given.
     pub fn model(&self) -> Option<&Arc<Model>> {
         self.instrument.model.as_ref()
     }
 
-    /// What the description says of an object beyond its type.
+    /// What the description says about an object beyond its type.
     pub fn described(&self, object: ObjectId) -> Option<&ObjectEntry> {
-        self.model()?.description.object(object)
+        self.instrument.described(object)
     }
 
     /// The entry of an object, from the description or the standard.
     pub fn entry(&self, object: ObjectId) -> Option<Entry> {
-        let described = self.model().and_then(|model| model.dictionary.get(object).cloned());
-        described.or_else(|| standard::entry(object))
+        self.instrument.entry(object)
     }
 
-    /// The name of an object, its address where it has none.
+    /// The name of an object; its address if it has none.
     pub fn name(&self, object: ObjectId) -> String {
-        self.entry(object).map_or_else(|| object.to_string(), |entry| entry.full_name())
+        self.instrument.name_of(object)
     }
 
-    /// Whether the device can have an object: what is not described it has not, and where nothing is
-    /// described it must be asked.
+    /// Whether the device can have an object. Without a description every object is possible.
     pub fn may_have(&self, object: ObjectId) -> bool {
-        self.model().is_none_or(|model| model.dictionary.is_empty() || model.dictionary.get(object).is_some())
+        self.instrument.may_have(object)
     }
 
     /// Whether the description says that an object cannot be written.
     pub fn is_fixed(&self, object: ObjectId) -> bool {
-        let described = self.model().and_then(|model| model.dictionary.get(object));
-        described.is_some_and(|entry| !entry.access.is_writable())
+        self.instrument.is_read_only(object)
     }
 
     /// The type of an object: from the description, from the standard, or by the first digit of its index.
     pub fn data_type(&self, object: ObjectId) -> DataType {
-        if let Some(entry) = self.entry(object) {
-            return entry.data_type;
-        }
-        let family = PROCESS_VALUES.iter().find(|(index, _)| index >> 12 == object.index >> 12);
-        family.map_or(DataType::Unsigned(4), |&(_, data_type)| data_type)
+        self.instrument.data_type(object)
     }
 
-    /// An object of a signal in the family of its process value: `low` is the index without its first digit.
+    /// An object of a signal in the family of its process value; `low` is the index without its first digit.
     pub fn in_family(&self, signal: &Signal, low: u16) -> ObjectId {
-        ObjectId::new(signal.value.0.index & 0xf000 | low, signal.channel)
+        self.instrument.in_family(signal, low)
     }
 
-    /// The object of a name that belongs to a signal: with its channel as sub-index, or alone on a device
-    /// that measures one thing.
+    /// The object with this name that belongs to a signal.
     pub fn of_signal(&self, signal: &Signal, name: &str) -> Option<ObjectId> {
-        let dictionary = &self.model()?.dictionary;
-        let numbered = dictionary.find(&format!("{name}:{}", signal.channel));
-        let alone = || dictionary.find(name).filter(|_| self.instrument.signals.len() == 1);
-        numbered.or_else(alone).map(|entry| entry.object)
+        self.instrument.object_of(signal, name)
     }
 
     /// The signal of a name, or the only one.
@@ -160,10 +148,10 @@ impl Device {
         Ok(master.read(self.node(), object, self.data_type(object))??)
     }
 
-    /// Writes bytes as the device wants them written.
+    /// Writes an object in the form that the device expects.
     ///
     /// # Errors
-    /// The device's refusal, silence or breach of the protocol.
+    /// Refusal, no answer, protocol error, and whatever ends the command.
     pub fn write(&self, master: &mut Master<'_>, object: ObjectId, data: &[u8]) -> Result<(), Failure> {
         write(master, &self.instrument, object, data)?;
         Ok(())
@@ -172,17 +160,10 @@ impl Device {
     /// Writes a value and reads it back.
     ///
     /// # Errors
-    /// Refusal and silence; an object that acknowledges and keeps something else.
+    /// As [`Device::write`]; an object that acknowledges the write and keeps another value.
     pub fn set(&self, master: &mut Master<'_>, object: ObjectId, data: &[u8]) -> Result<(), Failure> {
-        self.write(master, object, data)?;
-        let data_type = self.data_type(object);
-        let answer = master.transfer_one(Request::read(self.node(), object))??;
-        let (found, _) = answer.value(self.node(), object, Some(data_type))?;
-        if data_type.decode(data).as_ref() == Ok(&found) {
-            return Ok(());
-        }
-        let message = format!("{object} was acknowledged and reads {found}");
-        Err(Failure { object: Some(object), ..Failure::of_node(Kind::Unexpected, self.node(), message) })
+        write_and_verify(master, &self.instrument, object, data, self.data_type(object))?;
+        Ok(())
     }
 
     /// A value of an object in the unit of its signal.
