@@ -184,7 +184,10 @@ fn what_is_refused_is_named_and_the_old_mapping_is_back() {
 fn what_is_wrong_is_known_before_anything_is_written() {
     let bench = Bench::of(ALL);
     let refuses = |line: &str, message: &str| bench.run(line).refuses(message);
-    refuses("pdo map 1 1", "nothing to set: name signals, or --transmission and its like");
+    refuses(
+        "pdo map 1 1",
+        "nothing to set: name signals, or give --transmission, --event-timer, --inhibit or --cob-id",
+    );
     refuses("pdo map 1 1 0x1:1/64 0x2:1/8", "node 1: that makes 9 bytes; a PDO carries 8 bytes at most");
     refuses("pdo map 1 1 pressure/65", "\"pressure/65\": \"65\" is no number of bits (1 to 64)");
     refuses(

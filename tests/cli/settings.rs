@@ -137,7 +137,8 @@ fn filters() {
     let done = bench.run("filter 5 --type moving --constant 8 -f json").exit(0);
     assert_eq!(
         done.json(),
-        [json!({"node": 5, "signal": "pressure", "code": 1, "type": "moving average", "constant": 8})]
+        [json!({"node": 5, "signal": "pressure", "code": 1, "type": "moving average", "constant": 8,
+            "damping_shown": null})]
     );
     // A damping is written, and shown by the constant that comes of it.
     let done = bench.run("filter 5 --type moving --damping 100ms -f json").exit(0);
