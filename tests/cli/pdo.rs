@@ -189,7 +189,7 @@ fn what_is_wrong_is_known_before_anything_is_written() {
         "nothing to set: name signals, or give --transmission, --event-timer, --inhibit or --cob-id",
     );
     refuses("pdo map 1 1 0x1:1/64 0x2:1/8", "node 1: that makes 9 bytes; a PDO carries 8 bytes at most");
-    refuses("pdo map 1 1 pressure/65", "\"pressure/65\": \"65\" is no number of bits (1 to 64)");
+    refuses("pdo map 1 1 pressure/65", "\"pressure/65\": \"65\" is not a number of bits (1 to 64)");
     refuses(
         "pdo map 1 1 6130:300",
         "\"6130:300\" is not an object (0x6130:1, 6130:1, 6130h:1 or 6130.1; the index is hexadecimal)",
@@ -208,7 +208,7 @@ fn what_is_wrong_is_known_before_anything_is_written() {
         assert!(done.frames.is_empty() && done.stderr.contains("is not for PDOs"), "{restricted}: {}", done.stderr);
     }
     // MH-4, 3.4.1 prints the mapping at 1800h: as a COB-ID it is none.
-    let word = "is not an identifier of 11 bits (0x181 to 0x57F; without the flags of the COB-ID)";
+    let word = "is not an 11-bit identifier (0x181 to 0x57F, without the flags of the COB-ID)";
     refuses("pdo map 1 1 --cob-id 0x61300120", &format!("\"0x61300120\" {word}"));
     refuses("pdo map 1 1 --cob-id 0x40000181", &format!("\"0x40000181\" {word}"));
     // What only the device's description tells: nothing is written either.
