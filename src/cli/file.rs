@@ -1,69 +1,71 @@
-//! Files that a command writes: opened before the bus, and none overwritten unasked.
+//! Files that a command writes. They are opened before the bus, so that a wrong name has no effect on it.
 
 use super::exit::FileError;
+use crate::output::failure::ErrorMessage;
 use crate::output::rows::{ExistingLines, Target, existing_lines};
-use crate::tasks::{Failure, Kind};
-use std::fs::{File, OpenOptions};
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// What is done with a file that exists.
+/// What happens to an existing file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Existing {
-    /// It is not touched.
+    /// It is an error.
     Refuse,
-    /// What stands in it goes.
+    /// Its content is replaced.
     Overwrite,
-    /// It is continued behind its last whole line.
+    /// It is continued after its last whole line.
     Continue,
 }
 
-/// A file to be written. What stood in it stays until there is something to write; a new one in which
-/// nothing came to stand goes away again.
+/// A file for data. An existing file is changed only when there is something to write. A new file that stays empty is
+/// removed.
 #[derive(Debug)]
 pub(super) struct OutFile {
     path: PathBuf,
     file: File,
-    new: bool,
+    is_new: bool,
     existing: Existing,
-    /// How many bytes stay.
+    /// How many bytes of the existing file are kept.
     keep: u64,
-    /// A stream that we have been given: nothing of it is taken away.
-    own: bool,
+    /// One of our own standard streams: nothing in it is removed.
+    is_own_stream: bool,
 }
 
 impl OutFile {
+    /// Opens a file. With `force` an existing one is overwritten.
     pub(super) fn create(path: &Path, force: bool) -> anyhow::Result<OutFile> {
         OutFile::open(path, if force { Existing::Overwrite } else { Existing::Refuse })
     }
 
+    /// Opens a file.
     pub(super) fn open(path: &Path, existing: Existing) -> anyhow::Result<OutFile> {
         let mut options = OpenOptions::new();
-        if is_own(path) {
-            // A file on our own standard output was chosen by whoever started us, and may hold more already.
-            let file = options.append(true).open(path);
-            let file = file.map_err(|source| FileError { what: format!("open {}", path.display()), source })?;
-            return Ok(OutFile { path: path.to_owned(), file, new: false, existing, keep: 0, own: true });
+        if is_own_stream(path) {
+            // The shell opened it, and it may already contain other data.
+            let file = options.append(true).open(path).map_err(|source| file_error("open", path, source))?;
+            return Ok(OutFile { path: path.to_owned(), file, is_new: false, existing, keep: 0, is_own_stream: true });
         }
         options.write(true);
-        let there = path.metadata().ok();
-        // A link that leads nowhere yet leads to the new file.
-        let leads = there.is_none() && path.symlink_metadata().is_ok();
-        let new = there.is_none() && !leads;
-        let regular = there.is_some_and(|metadata| metadata.is_file());
-        // A FIFO and a device are opened as they are, as other programs do.
-        if new || existing == Existing::Refuse && regular {
+        let metadata = path.metadata().ok();
+        // The target of a dangling link is created.
+        let is_dangling_link = metadata.is_none() && path.symlink_metadata().is_ok();
+        let is_new = metadata.is_none() && !is_dangling_link;
+        let is_regular = metadata.is_some_and(|metadata| metadata.is_file());
+        // A FIFO and a device are used as they are.
+        if is_new || existing == Existing::Refuse && is_regular {
             options.create_new(true);
         }
-        options.create(leads);
-        options.read(existing == Existing::Continue && regular);
+        options.create(is_dangling_link);
+        options.read(existing == Existing::Continue && is_regular);
         match options.open(path) {
-            Ok(file) => Ok(OutFile { path: path.to_owned(), file, new, existing, keep: 0, own: false }),
+            Ok(file) => Ok(OutFile { path: path.to_owned(), file, is_new, existing, keep: 0, is_own_stream: false }),
             Err(source) if source.kind() == io::ErrorKind::AlreadyExists => {
-                let failure = Failure::new(Kind::Usage, format!("{} exists", path.display()));
-                Err(failure.hint("overwrite it with --force, or name another file").into())
+                let error = ErrorMessage::usage(format!("{} exists", path.display()));
+                Err(error.hint("overwrite it with --force, or choose another file").into())
             }
-            Err(source) => Err(FileError { what: format!("create {}", path.display()), source }.into()),
+            Err(source) => Err(file_error("create", path, source)),
         }
     }
 
@@ -72,58 +74,121 @@ impl OutFile {
     }
 
     pub(super) fn is_regular(&self) -> bool {
-        !self.own && self.file.metadata().is_ok_and(|metadata| metadata.is_file())
+        !self.is_own_stream && self.file.metadata().is_ok_and(|metadata| metadata.is_file())
     }
 
-    /// What stays of a file that is continued.
-    pub(super) fn look(&mut self) -> anyhow::Result<Option<ExistingLines>> {
-        if self.existing != Existing::Continue || self.new || !self.is_regular() {
+    /// The lines of a file to be continued; `None` if there are none.
+    pub(super) fn existing_lines(&mut self) -> anyhow::Result<Option<ExistingLines>> {
+        if self.existing != Existing::Continue || self.is_new || !self.is_regular() {
             return Ok(None);
         }
-        let what = || format!("read {}", self.path.display());
-        let kept = existing_lines(&mut self.file).map_err(|source| FileError { what: what(), source })?;
-        self.keep = kept.as_ref().map_or(0, |kept| kept.length);
-        Ok(kept)
+        let lines = existing_lines(&mut self.file).map_err(|source| file_error("read", &self.path, source))?;
+        self.keep = lines.as_ref().map_or(0, |lines| lines.length);
+        Ok(lines)
     }
 
-    /// The file, for somebody else to empty but for its first `keep` bytes and to write to.
+    /// The file for a writer that keeps its first `keep` bytes and replaces the rest.
     pub(super) fn target(&self, keep: u64) -> anyhow::Result<Target> {
         let file = self.file.try_clone().map_err(|source| self.error(source))?;
-        Ok(if self.own { Target::Stream(Box::new(file)) } else { Target::File { file, keep } })
+        Ok(if self.is_own_stream { Target::Stream(Box::new(file)) } else { Target::File { file, keep } })
     }
 
-    /// Writes all there is to write, behind what stays.
+    /// Writes the whole content, after the bytes that are kept.
     pub(super) fn write(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
         let emptied = if self.is_regular() {
             self.file.set_len(self.keep).and_then(|()| self.file.seek(io::SeekFrom::End(0)).map(drop))
         } else {
             Ok(())
         };
-        // An object of no bytes makes a file of no bytes, which stays.
-        self.new = false;
+        // Also an object of 0 bytes is content: its file stays.
+        self.is_new = false;
         emptied.and_then(|()| self.file.write_all(bytes)).map_err(|source| self.error(source))
     }
 
-    /// What the operating system says, with the file's name.
+    /// The error of the operating system, with the name of the file.
     pub(super) fn error(&self, source: io::Error) -> anyhow::Error {
-        FileError { what: format!("write {}", self.path.display()), source }.into()
+        file_error("write", &self.path, source)
     }
-}
-
-/// Whether a path names a stream that we have been given.
-fn is_own(path: &Path) -> bool {
-    let folders = ["/dev/fd", "/proc/self/fd"];
-    path == Path::new("/dev/stdout")
-        || path == Path::new("/dev/stderr")
-        || folders.iter().any(|folder| path.starts_with(folder))
 }
 
 impl Drop for OutFile {
     fn drop(&mut self) {
-        let empty = self.file.metadata().is_ok_and(|metadata| metadata.is_file() && metadata.len() == 0);
-        if self.new && empty {
-            // What cannot be removed stays: an empty file is no loss.
-            let _ = std::fs::remove_file(&self.path);
+        let is_empty = self.file.metadata().is_ok_and(|metadata| metadata.is_file() && metadata.len() == 0);
+        if self.is_new && is_empty {
+            // An empty file that cannot be removed does no harm.
+            let _ = fs::remove_file(&self.path);
         }
     }
+}
+
+/// A file for a report. It is written under a temporary name and then renamed, so that a reader never finds half of it.
+/// An existing report is replaced.
+#[derive(Debug)]
+pub(super) struct ReportFile {
+    path: PathBuf,
+    file: File,
+    /// The name until the file is complete; `None` for a FIFO, a device and our own standard streams.
+    temporary: Option<PathBuf>,
+    /// The whole lines of the existing report, if it is continued.
+    before: Vec<u8>,
+}
+
+impl ReportFile {
+    /// Opens the file under its temporary name. With `append` the new report follows the existing one.
+    pub(super) fn create(path: &Path, append: bool) -> anyhow::Result<ReportFile> {
+        let is_regular = path.metadata().map_or(true, |metadata| metadata.is_file());
+        let mut options = OpenOptions::new();
+        if is_own_stream(path) || !is_regular {
+            let file = options.append(true).open(path).map_err(|source| file_error("open", path, source))?;
+            return Ok(ReportFile { path: path.to_owned(), file, temporary: None, before: Vec::new() });
+        }
+        // A link is kept, and its target replaced.
+        let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let mut before = Vec::new();
+        if append && path.exists() {
+            before = fs::read(&path).map_err(|source| file_error("read", &path, source))?;
+            let lines = before.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
+            before.truncate(lines);
+        }
+        let mut name = OsString::from(".");
+        name.push(path.file_name().unwrap_or_default());
+        name.push(format!(".{}", std::process::id()));
+        let temporary = path.with_file_name(name);
+        let file = options.write(true).create(true).truncate(true).open(&temporary);
+        let file = file.map_err(|source| file_error("create", &path, source))?;
+        Ok(ReportFile { path, file, temporary: Some(temporary), before })
+    }
+
+    /// Writes the whole report.
+    pub(super) fn write(mut self, bytes: &[u8]) -> anyhow::Result<()> {
+        let mut result = self.file.write_all(&self.before).and_then(|()| self.file.write_all(bytes));
+        if let (Ok(()), Some(temporary)) = (&result, &self.temporary) {
+            result = fs::rename(temporary, &self.path);
+        }
+        if result.is_ok() {
+            self.temporary = None;
+        }
+        result.map_err(|source| file_error("write", &self.path, source))
+    }
+}
+
+impl Drop for ReportFile {
+    fn drop(&mut self) {
+        if let Some(temporary) = &self.temporary {
+            // A file that cannot be removed stays under its temporary name.
+            let _ = fs::remove_file(temporary);
+        }
+    }
+}
+
+fn file_error(verb: &str, path: &Path, source: io::Error) -> anyhow::Error {
+    FileError { what: format!("{verb} {}", path.display()), source }.into()
+}
+
+/// Whether a path is one of our own standard streams.
+fn is_own_stream(path: &Path) -> bool {
+    let folders = ["/dev/fd", "/proc/self/fd"];
+    path == Path::new("/dev/stdout")
+        || path == Path::new("/dev/stderr")
+        || folders.iter().any(|folder| path.starts_with(folder))
 }

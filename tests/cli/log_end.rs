@@ -126,7 +126,10 @@ fn summary_has_the_statistics_of_the_rows() {
     );
     let done = bench.run("log 127 --count 2 -q --summary - -o run.csv").exit(0);
     assert_eq!(done.json()[0]["rows"], 2);
-    bench.run("log 127 --count 2 --summary sum.json").refuses("sum.json exists");
+    bench.run("log 127 --count 2 -q --summary sum.json").exit(0);
+    let summary: serde_json::Value = serde_json::from_str(&bench.text("sum.json")).expect("JSON");
+    assert_eq!(summary["rows"], 2, "an existing report is replaced");
+    assert_eq!(bench.files(), ["run.csv", "sum.json"], "no temporary file is left");
     bench
         .run("log 127 --count 2 --summary no/folder.json")
         .fails(8, "cangauge: create no/folder.json: No such file or directory (os error 2)\n");

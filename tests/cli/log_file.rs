@@ -9,7 +9,7 @@ fn existing_file_is_refused() {
     let bench = Bench::of("mh4@1");
     fs::write(bench.path("run.csv"), "old\n").expect("written");
     let done = bench.run("log 1 --sync 10ms --count 5 -o run.csv");
-    assert_eq!(done.stderr, "cangauge: run.csv exists\nhint: overwrite it with --force, or name another file\n");
+    assert_eq!(done.stderr, "cangauge: run.csv exists\nhint: overwrite it with --force, or choose another file\n");
     done.refuses("run.csv exists");
     assert_eq!(bench.text("run.csv"), "old\n");
     // Asked to overwrite: only once there is something to write.

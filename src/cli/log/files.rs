@@ -1,7 +1,7 @@
 //! The output files of `cangauge log`, and their format.
 
 use super::super::exit::FileError;
-use super::super::file::{Existing, OutFile};
+use super::super::file::{Existing, OutFile, ReportFile};
 use crate::output::events::Events;
 use crate::output::failure::ErrorMessage;
 use crate::output::rows::{
@@ -39,7 +39,7 @@ pub(super) struct Files {
     /// Write events as CSV: emergencies, gaps, node losses, reboots
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
-    /// Write the summary as JSON to a file; - for stdout
+    /// Write the summary as JSON to a file, which is replaced unless --append; - for stdout
     #[arg(long, value_name = "FILE")]
     pub(super) summary: Option<PathBuf>,
     /// Delimiter of CSV: , ; | or tab [default: ,]
@@ -141,7 +141,7 @@ impl FromStr for RotationArg {
 pub(super) struct OpenFiles {
     pub(super) rows: Option<OutFile>,
     pub(super) events: Option<OutFile>,
-    pub(super) summary: Option<OutFile>,
+    pub(super) summary: Option<ReportFile>,
     series: Option<Series>,
     setup: Setup,
     /// How many bytes of the existing file are kept.
@@ -225,7 +225,7 @@ impl Files {
             Some(base) if self.rotate.is_some() => self.open_first(base, &mut opened)?,
             Some(path) => {
                 let mut file = open(path)?;
-                if let Some(kept) = file.look()? {
+                if let Some(kept) = file.existing_lines()? {
                     opened.keep = kept.length;
                     opened.setup.continues = true;
                     opened.setup.existing_header = Some(kept.header);
@@ -243,7 +243,7 @@ impl Files {
         }
         opened.events = self.events.as_ref().map(open).transpose()?;
         if let Some(file) = &mut opened.events {
-            opened.existing_events = file.look()?;
+            opened.existing_events = file.existing_lines()?;
             let expected = Events::header(self.dialect());
             if let Some(kept) = opened.existing_events.as_ref().filter(|kept| kept.header != expected) {
                 return Err(
@@ -252,10 +252,7 @@ impl Files {
             }
         }
         let summary = self.summary.as_ref().filter(|path| path.as_path() != Path::new("-"));
-        opened.summary = summary.map(open).transpose()?;
-        if let Some(file) = &mut opened.summary {
-            file.look()?;
-        }
+        opened.summary = summary.map(|path| ReportFile::create(path, self.append)).transpose()?;
         Ok(opened)
     }
 

@@ -87,7 +87,7 @@ impl Finished {
         }
         let mut text = Vec::new();
         write_json(&self.summary(), &mut text)?;
-        match &mut files.summary {
+        match files.summary.take() {
             Some(file) => file.write(&text),
             None if self.is_closed => Ok(()),
             None => io::stdout().lock().write_all(&text).map_err(stdout),
