@@ -534,7 +534,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--layout', '--layout', [CompletionResultType]::ParameterName, 'One row per value, or one per cycle of --sync or --poll')
             [CompletionResult]::new('--rotate', '--rotate', [CompletionResultType]::ParameterName, 'Start a new file after this time or at this size: 10m, 1h, 100MB, 1GiB. The files for run.csv are run-0001.csv and so on')
             [CompletionResult]::new('--events', '--events', [CompletionResultType]::ParameterName, 'Write events as CSV: emergencies, gaps, node losses, reboots')
-            [CompletionResult]::new('--summary', '--summary', [CompletionResultType]::ParameterName, 'Write the summary as JSON to a file; - for stdout')
+            [CompletionResult]::new('--summary', '--summary', [CompletionResultType]::ParameterName, 'Write the summary as JSON to a file, which is replaced unless --append; - for stdout')
             [CompletionResult]::new('--delimiter', '--delimiter', [CompletionResultType]::ParameterName, 'Delimiter of CSV: , ; | or tab [default: ,]')
             [CompletionResult]::new('--decimal', '--decimal', [CompletionResultType]::ParameterName, 'Decimal sign of CSV: . or , [default: .]')
             [CompletionResult]::new('--time', '--time', [CompletionResultType]::ParameterName, 'Format of times: text (RFC 3339), seconds since 1970, or days as in spreadsheets; all UTC')

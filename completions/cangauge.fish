@@ -434,7 +434,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l layout -d 'One
 wide\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l rotate -d 'Start a new file after this time or at this size: 10m, 1h, 100MB, 1GiB. The files for run.csv are run-0001.csv and so on' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l events -d 'Write events as CSV: emergencies, gaps, node losses, reboots' -r -F
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l summary -d 'Write the summary as JSON to a file; - for stdout' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l summary -d 'Write the summary as JSON to a file, which is replaced unless --append; - for stdout' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l delimiter -d 'Delimiter of CSV: , ; | or tab [default: ,]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l decimal -d 'Decimal sign of CSV: . or , [default: .]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l time -d 'Format of times: text (RFC 3339), seconds since 1970, or days as in spreadsheets; all UTC' -r -f -a "rfc3339\t''

@@ -12,11 +12,11 @@ use crate::measure::expression::evaluator::Evaluator;
 use crate::measure::sample::{Sample, Source};
 use crate::output::check_progress::CheckProgress;
 use crate::output::console::Console;
-use crate::output::events::{remark_text, words};
+use crate::output::events::{event_text, remark_text};
 use crate::output::failure::ErrorMessage;
 use crate::output::{junit, verdict};
 use crate::tasks::check::{CheckOptions, CheckReport, all_satisfied, check};
-use crate::tasks::log::{Mode, Note, Observer};
+use crate::tasks::log::{LogEvent, Mode, Observer};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
 use std::ops::ControlFlow;
@@ -167,8 +167,8 @@ impl Observer for View {
         ControlFlow::Continue(())
     }
 
-    fn note(&mut self, note: &Note, _at: Stamp) {
-        print_event(&self.console, &words(note));
+    fn event(&mut self, event: &LogEvent, _at: Stamp) {
+        print_event(&self.console, &event_text(event));
     }
 
     fn evaluated(&mut self, evaluator: &Evaluator, at: Stamp) {

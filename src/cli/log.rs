@@ -15,7 +15,7 @@ use crate::output::console::Console;
 use crate::output::progress::Progress;
 use crate::output::rows::FileFormat;
 use crate::tasks::check::Checker;
-use crate::tasks::log::{Mode, Plan, log};
+use crate::tasks::log::{LogOptions, Mode, log};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
 use files::{Files, OpenFiles};
@@ -127,14 +127,14 @@ impl Log {
                 (Nodes::All, true) => NodeId::all().collect(),
                 _ => open::nodes(master, global, &self.nodes)?,
             };
-            let plan = self.plan(global, nodes, is_live)?;
+            let options = self.options(global, nodes, is_live)?;
             let waits = master.bus().waits();
             let mut recorder =
                 Recorder::new(files.rows(waits)?, files.rows_name(), files.events(waits)?, progress, console);
             // Without --poll the nodes are free for others as soon as the recording runs.
             recorder.claims = self.poll.is_none().then(|| std::mem::take(claims));
-            let mut checker = Checker::new(&self.expect, &plan.nodes, true, &mut recorder);
-            let report = log(master, &plan, &mut checker);
+            let mut checker = Checker::new(&self.expect, &options.nodes, true, &mut recorder);
+            let report = log(master, &options, &mut checker);
             let verdicts = match &report {
                 Ok(report) => checker.verdicts(report),
                 Err(_) => Ok(Vec::new()),
@@ -165,8 +165,8 @@ impl Log {
         Ok(finished)
     }
 
-    fn plan(&self, global: &Global, nodes: Vec<NodeId>, is_live: bool) -> anyhow::Result<Plan> {
-        Ok(Plan {
+    fn options(&self, global: &Global, nodes: Vec<NodeId>, is_live: bool) -> anyhow::Result<LogOptions> {
+        Ok(LogOptions {
             overrides: open::overrides(global, &nodes)?,
             nodes,
             wanted: self.signals.iter().map(|signal| signal.0.clone()).collect(),

@@ -7,7 +7,7 @@ use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
 use std::io;
 use std::time::Duration;
-pub use text::{remark_text, words};
+pub use text::{event_text, remark_text};
 
 /// The columns.
 pub const COLUMNS: [&str; 5] = ["time", "elapsed_s", "node", "event", "text"];
@@ -25,7 +25,7 @@ pub enum Weight {
 
 /// An event as text.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Words {
+pub struct EventText {
     /// The word in the column `event`; `None` if it is not written to the file.
     pub event: Option<&'static str>,
     /// The node it concerns.
@@ -36,10 +36,10 @@ pub struct Words {
     pub weight: Weight,
 }
 
-impl Words {
+impl EventText {
     /// An event that concerns no single node.
-    pub fn of_all(event: &'static str, weight: Weight, text: String) -> Words {
-        Words { event: Some(event), node: None, text, weight }
+    pub fn of_all(event: &'static str, weight: Weight, text: String) -> EventText {
+        EventText { event: Some(event), node: None, text, weight }
     }
 }
 
@@ -82,8 +82,8 @@ impl Events {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn add(&mut self, at: Stamp, elapsed: Option<Duration>, words: &Words) -> io::Result<()> {
-        let Some(event) = words.event else { return Ok(()) };
+    pub fn add(&mut self, at: Stamp, elapsed: Option<Duration>, event: &EventText) -> io::Result<()> {
+        let Some(word) = event.event else { return Ok(()) };
         self.write_header()?;
         let Dialect { delimiter, decimal, .. } = self.dialect;
         let mut line = Vec::new();
@@ -93,13 +93,13 @@ impl Events {
             push_seconds(&mut line, elapsed, decimal);
         }
         line.push(delimiter);
-        if let Some(node) = words.node {
+        if let Some(node) = event.node {
             push_number(&mut line, u64::from(node.get()));
         }
         line.push(delimiter);
-        line.extend_from_slice(event.as_bytes());
+        line.extend_from_slice(word.as_bytes());
         line.push(delimiter);
-        push_text(&mut line, &words.text, delimiter);
+        push_text(&mut line, &event.text, delimiter);
         line.push(b'\n');
         self.writer.put_rows(&mut line, 1)
     }

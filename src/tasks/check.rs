@@ -15,7 +15,7 @@ use crate::measure::sample::{Sample, Source};
 use crate::node::survey::survey_each;
 use crate::node::{Node, Overrides};
 use crate::tasks::Failure;
-use crate::tasks::log::{self, Mode, Note, Observer, RecordingReport, Remark, log};
+use crate::tasks::log::{self, LogEvent, Mode, Observer, RecordingReport, Remark, log};
 use crate::tasks::read::{Target, requests, sample, targets};
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
@@ -174,7 +174,7 @@ fn check_recording(
             wanted.push(item);
         }
     }
-    let recording = log::Plan {
+    let recording = log::LogOptions {
         nodes: options.nodes.clone(),
         wanted,
         mode,
@@ -295,8 +295,8 @@ impl Observer for Checker<'_> {
         self.observer.samples(samples, sources)
     }
 
-    fn note(&mut self, note: &Note, at: Stamp) {
-        self.observer.note(note, at);
+    fn event(&mut self, event: &LogEvent, at: Stamp) {
+        self.observer.event(event, at);
     }
 
     fn tick(&mut self, at: Stamp, rows: u64) -> ControlFlow<()> {

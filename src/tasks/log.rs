@@ -47,7 +47,7 @@ use std::time::Duration;
 
 /// What to record, and how.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct LogOptions {
     /// The nodes.
     pub nodes: Vec<NodeId>,
     /// The signals; none means all.
@@ -81,7 +81,7 @@ pub enum Mode {
 
 /// An event during a recording.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Note {
+pub enum LogEvent {
     /// Something to know about the recording.
     Remark(Remark),
     /// A node sent an emergency message with this meaning.
@@ -100,7 +100,7 @@ pub enum Note {
     HeartbeatBack(NodeId),
     /// By its heartbeat, a node is no longer operational.
     State(NodeId, NmtState),
-    /// A TPDO or polled value of the node came after this interval, longer than [`Plan::max_gap`].
+    /// A TPDO or polled value of the node came after this interval, longer than [`LogOptions::max_gap`].
     Gap(NodeId, Duration),
     /// The node has sent no samples for this time.
     Silent(NodeId, Duration),
@@ -151,7 +151,7 @@ pub trait Observer {
     fn samples(&mut self, samples: &[Sample], sources: &[Source]) -> ControlFlow<()>;
 
     /// An event.
-    fn note(&mut self, note: &Note, at: Stamp);
+    fn event(&mut self, event: &LogEvent, at: Stamp);
 
     /// The present state of the expressions, as often as [`Observer::tick`].
     fn evaluated(&mut self, _evaluator: &Evaluator, _at: Stamp) {}
@@ -177,7 +177,7 @@ pub struct RecordingReport {
     pub dropped: u64,
     /// Emergency messages.
     pub emergencies: u64,
-    /// Intervals longer than [`Plan::max_gap`].
+    /// Intervals longer than [`LogOptions::max_gap`].
     pub gaps: u64,
     /// Polls that were not sent because the previous one was not finished.
     pub skipped: u64,
@@ -205,21 +205,25 @@ const TICK: Duration = Duration::from_millis(100);
 ///
 /// # Errors
 /// What stops it before the first value. Later every end is an [`RecordingReport`].
-pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) -> Result<RecordingReport, Failure> {
-    if plan.mode == Mode::Passive {
-        return record_passively(master, plan, observer);
+pub fn log(
+    master: &mut Master<'_>,
+    options: &LogOptions,
+    observer: &mut dyn Observer,
+) -> Result<RecordingReport, Failure> {
+    if options.mode == Mode::Passive {
+        return record_passively(master, options, observer);
     }
-    master.listen_to(&plan.nodes)?;
-    let nodes = survey_nodes(master, &plan.nodes, &plan.overrides)?;
+    master.listen_to(&options.nodes)?;
+    let nodes = survey_nodes(master, &options.nodes, &options.overrides)?;
     observer.begin(&nodes)?;
-    check_wanted(&nodes, plan)?;
-    let mut recording = Recording::new(nodes, plan, master.bus());
-    match plan.mode {
+    check_wanted(&nodes, options)?;
+    let mut recording = Recording::new(nodes, options, master.bus());
+    match options.mode {
         Mode::Poll(period) => {
-            let poll = Poll::new(&recording.nodes, &plan.wanted, &mut recording.decoder, period)?;
+            let poll = Poll::new(&recording.nodes, &options.wanted, &mut recording.decoder, period)?;
             recording.poll = Some(poll);
         }
-        _ => recording.nodes.iter().for_each(|node| recording.decoder.add(node.layout(), &plan.wanted)),
+        _ => recording.nodes.iter().for_each(|node| recording.decoder.add(node.layout(), &options.wanted)),
     }
     recording.update_sources();
     recording.excuse_nodes_without_signals();
@@ -228,13 +232,13 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
     master.listen(&recording.filters())?;
     // Nodes may restart between their survey and the recording.
     let mut restarted = BTreeSet::new();
-    if let Mode::Sync(period) = plan.mode {
+    if let Mode::Sync(period) = options.mode {
         refuse_second_sync(master, &recording.nodes, period, &mut restarted)?;
         if let Some(share) = sync_share(master, &recording.nodes, period) {
-            observer.note(&Note::Share(period, share), master.bus().now());
+            observer.event(&LogEvent::Share(period, share), master.bus().now());
         }
     }
-    let started = recording.states.start(master, &recording.nodes, plan, &mut restarted);
+    let started = recording.states.start(master, &recording.nodes, options, &mut restarted);
     let result = started.and_then(|()| {
         master.set_tolerates_outages(true);
         recording.restarted_before_start(&restarted, master, observer);
@@ -251,11 +255,11 @@ pub fn log(master: &mut Master<'_>, plan: &Plan, observer: &mut dyn Observer) ->
 
 fn record_passively(
     master: &mut Master<'_>,
-    plan: &Plan,
+    options: &LogOptions,
     observer: &mut dyn Observer,
 ) -> Result<RecordingReport, Failure> {
-    let mut recording = Recording::new(Vec::new(), plan, master.bus());
-    let mut listener = SetupListener::new(&plan.nodes, &plan.overrides, &plan.wanted);
+    let mut recording = Recording::new(Vec::new(), options, master.bus());
+    let mut listener = SetupListener::new(&options.nodes, &options.overrides, &options.wanted);
     listener.apply_overrides(&mut recording.decoder);
     recording.listener = Some(listener);
     recording.update_sources();

@@ -17,7 +17,7 @@ use cangauge::measure::expression::verdict::Verdict;
 use cangauge::measure::sample::{Sample, Source};
 use cangauge::node::Overrides;
 use cangauge::node::{Node, WriteOptions};
-use cangauge::tasks::log::{Mode, Note, Observer, Plan, log};
+use cangauge::tasks::log::{LogEvent, LogOptions, Mode, Observer, log};
 use cangauge::tasks::lss::{self, Job, LssAddress, LssRange, Rate};
 use cangauge::tasks::nmt::Seen;
 use cangauge::tasks::pdo::{self, Item, Line, Send, Settings, Wish};
@@ -83,7 +83,7 @@ impl Observer for Observations {
         ControlFlow::Continue(())
     }
 
-    fn note(&mut self, _: &Note, _: Stamp) {}
+    fn event(&mut self, _: &LogEvent, _: Stamp) {}
 
     fn tick(&mut self, _: Stamp, _: u64) -> ControlFlow<()> {
         ControlFlow::Continue(())
@@ -353,7 +353,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
                 (None, Some(period)) => Mode::Poll(Duration::from_millis(*period)),
                 (None, None) => Mode::AsSent,
             };
-            let plan = Plan {
+            let plan = LogOptions {
                 nodes: nodes(ids),
                 wanted: Vec::new(),
                 mode,

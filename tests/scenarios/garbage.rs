@@ -7,7 +7,7 @@ use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::master::{Master, Timing};
 use cangauge::sim::Bench;
-use cangauge::tasks::log::{Mode, Plan, log};
+use cangauge::tasks::log::{LogOptions, Mode, log};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -90,7 +90,7 @@ fn garbage_changes_no_row_and_ends_no_recording() {
         let folder = tempfile::tempdir().expect("a folder");
         let mut bus = Bench::from_toml(BENCH, folder.path()).expect("a bench").open().expect("a bus");
         bus.attach(Babbler::new());
-        let plan = Plan {
+        let plan = LogOptions {
             nodes: NODES.iter().map(|&id| NodeId::new(id).expect("a node-ID")).collect(),
             wanted: Vec::new(),
             mode,

@@ -14,7 +14,7 @@ use cangauge::device::catalog;
 use cangauge::device::unit::Unit;
 use cangauge::master::{Master, Request, Timing};
 use cangauge::sim::Bench;
-use cangauge::tasks::log::{Change, Mode, Note, Plan, RecordingReport, Remark, TpdoChange, log};
+use cangauge::tasks::log::{Change, LogEvent, LogOptions, Mode, RecordingReport, Remark, TpdoChange, log};
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
 use std::path::Path;
@@ -81,14 +81,14 @@ impl Run {
         self.sent.len() - self.kept.rows.len()
     }
 
-    fn has(&self, note: &Note) -> bool {
+    fn has(&self, note: &LogEvent) -> bool {
         self.kept.notes.contains(note)
     }
 
     /// The reported changes of the node.
     fn changes(&self) -> Vec<&[Change]> {
         let changes = self.kept.notes.iter().filter_map(|note| match note {
-            Note::ReadAgain(_, changes) => Some(changes.as_slice()),
+            LogEvent::ReadAgain(_, changes) => Some(changes.as_slice()),
             _ => None,
         });
         changes.collect()
@@ -123,8 +123,8 @@ fn record(devices: &str, mode: Mode, others: &[(u64, &str)], before: &dyn Fn(&mu
     Run { sent: sent.map(str::to_owned).collect(), kept, outcome, commands }
 }
 
-fn plan(mode: Mode) -> Plan {
-    Plan {
+fn plan(mode: Mode) -> LogOptions {
+    LogOptions {
         nodes: vec![node(5)],
         wanted: Vec::new(),
         mode,
@@ -179,7 +179,7 @@ fn nothing(_: &mut Master<'_>) {}
 fn restarted_node_is_started_again() {
     let run = record(DPS, Mode::AsSent, &[(2000, "000#8105")], &nothing);
     assert_eq!(run.missing(), 0);
-    assert!(run.has(&Note::Restarted(node(5))));
+    assert!(run.has(&LogEvent::Restarted(node(5))));
     assert_eq!(run.changes(), [[] as [Change; 0]], "the setup is unchanged");
     assert_eq!(run.commands, ["000#0105", "000#8105", "000#0105"]);
     assert_eq!((run.outcome.events.restarts, run.outcome.events.changes), (1, 0));
@@ -273,7 +273,7 @@ fn passive_recording_uses_no_old_mapping() {
     let unit = "605#2331610100004E00";
     bus.attach(Other::new(&[(100, "000#0105"), (1000, unit), (2000, "000#8105"), (2500, "000#0105")]));
     let dps = catalog::by_name("dps").expect("a description");
-    let plan = Plan { overrides: [(node(5), dps)].into(), ..plan(Mode::Passive) };
+    let plan = LogOptions { overrides: [(node(5), dps)].into(), ..plan(Mode::Passive) };
     let mut kept = Kept::default();
     log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
     drop(bus);
@@ -282,25 +282,27 @@ fn passive_recording_uses_no_old_mapping() {
     let mut units: Vec<&str> = kept.rows.iter().filter_map(|row| row.split(',').nth(4)).collect();
     units.dedup();
     assert_eq!(units, ["psi", "bar", "psi"]);
-    assert!(kept.notes.contains(&Note::Restarted(node(5))));
+    assert!(kept.notes.contains(&LogEvent::Restarted(node(5))));
 }
 
 #[test]
 fn lost_heartbeat_and_changed_state_are_reported() {
     let devices = format!("{MH4}set = {{ \"0x1017\" = 100 }}\n");
     let run = record(&devices, SYNC, &[(2000, "000#8005"), (2600, "000#0105")], &nothing);
-    assert!(run.has(&Note::State(node(5), NmtState::PreOperational)), "{:?}", run.kept.notes);
+    assert!(run.has(&LogEvent::State(node(5), NmtState::PreOperational)), "{:?}", run.kept.notes);
     assert_eq!((run.missing(), run.outcome.events.heartbeat_losses), (0, 0));
     let text = format!("clock = \"virtual\"\n{devices}");
     let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
     let mut bus = Shaky { no_heartbeat: at(2000)..at(3000), ..Shaky::new(inner, &[]) };
     let mut kept = Kept::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(SYNC), &mut kept).expect("a recording");
-    let lost =
-        kept.notes.iter().filter(|note| matches!(note, Note::HeartbeatLost(_, silence) if silence.as_millis() < 400));
+    let lost = kept
+        .notes
+        .iter()
+        .filter(|note| matches!(note, LogEvent::HeartbeatLost(_, silence) if silence.as_millis() < 400));
     assert_eq!((lost.count(), outcome.events.heartbeat_losses), (1, 1), "{:?}", kept.notes);
-    assert!(kept.notes.contains(&Note::HeartbeatBack(node(5))));
-    assert!(kept.notes.contains(&Note::ReadAgain(node(5), Vec::new())), "a boot-up may have been missed");
+    assert!(kept.notes.contains(&LogEvent::HeartbeatBack(node(5))));
+    assert!(kept.notes.contains(&LogEvent::ReadAgain(node(5), Vec::new())), "a boot-up may have been missed");
 }
 
 /// A bus whose interface reports given events at given times.
@@ -380,8 +382,8 @@ fn interface_goes_down_and_comes_back() {
     assert!(outcome.lost.is_empty() && outcome.events.silences == 0, "nobody is blamed for the interface");
     let rows = |unit: &str| kept.rows.iter().filter(|row| row.contains(unit)).count();
     assert!(rows(",bar,") > 15 && rows(",psi,") > 15, "restarted unheard, started again, and read by what it is now");
-    let links: Vec<_> = kept.notes.iter().filter(|note| matches!(note, Note::Link(_))).collect();
-    assert_eq!(links, [&Note::Link(false), &Note::Link(true)]);
+    let links: Vec<_> = kept.notes.iter().filter(|note| matches!(note, LogEvent::Link(_))).collect();
+    assert_eq!(links, [&LogEvent::Link(false), &LogEvent::Link(true)]);
     assert_eq!(outcome.dropped, 7, "what was lost last is asked for at the end");
 }
 
@@ -389,8 +391,8 @@ fn interface_goes_down_and_comes_back() {
 fn dropped_frames_are_counted() {
     let (kept, outcome) = shaken(&[(1500, Event::Dropped(5)), (2500, Event::Dropped(30))]);
     assert_eq!(outcome.dropped, 5 + 30 + 7);
-    let told: Vec<_> = kept.notes.iter().filter(|note| matches!(note, Note::Dropped(_))).collect();
-    assert_eq!(told, [&Note::Dropped(5), &Note::Dropped(30), &Note::Dropped(7)]);
+    let told: Vec<_> = kept.notes.iter().filter(|note| matches!(note, LogEvent::Dropped(_))).collect();
+    assert_eq!(told, [&LogEvent::Dropped(5), &LogEvent::Dropped(30), &LogEvent::Dropped(7)]);
 }
 
 #[test]
@@ -442,7 +444,7 @@ fn max_gap_decides_what_is_a_gap() {
         let text = format!("clock = \"virtual\"\n{MH4}");
         let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
         let mut bus = Shaky::new(inner, &[(2000, Event::Link(false)), (2120, Event::Link(true))]);
-        let plan = Plan { max_gap: Some(Duration::from_millis(longest)), ..plan(SYNC) };
+        let plan = LogOptions { max_gap: Some(Duration::from_millis(longest)), ..plan(SYNC) };
         let mut kept = Kept::default();
         let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
         assert_eq!(outcome.gaps, gaps, "{longest}");
@@ -458,7 +460,7 @@ fn restart_among_lost_frames_is_detected() {
     let units: Vec<&str> = kept.rows.iter().filter_map(|row| row.split(',').nth(4)).collect();
     let psi = units.iter().filter(|unit| **unit == "psi").count();
     assert!(psi > 15, "started again, and read by what it is now: {units:?}");
-    let read = kept.notes.iter().filter(|note| matches!(note, Note::ReadAgain(..)));
+    let read = kept.notes.iter().filter(|note| matches!(note, LogEvent::ReadAgain(..)));
     assert_eq!(read.count(), 1, "once a minute is enough: {:?}", kept.notes);
     let has = |wanted: fn(&Remark) -> bool| outcome.remarks.iter().any(wanted);
     assert!(has(|remark| matches!(remark, Remark::ChangedWhileFramesLost(..))), "{:?}", outcome.remarks);

@@ -21,14 +21,14 @@ mod stalled;
 
 use cangauge::bus::Stamp;
 use cangauge::measure::sample::{Sample, Source};
-use cangauge::tasks::log::{Note, Observer};
+use cangauge::tasks::log::{LogEvent, Observer};
 use std::ops::ControlFlow;
 
 /// Keeps what a recording gives, as the simulator's own record would write it.
 #[derive(Default)]
 struct Kept {
     rows: Vec<String>,
-    notes: Vec<Note>,
+    notes: Vec<LogEvent>,
 }
 
 impl Observer for Kept {
@@ -44,7 +44,7 @@ impl Observer for Kept {
         ControlFlow::Continue(())
     }
 
-    fn note(&mut self, note: &Note, _: Stamp) {
+    fn event(&mut self, note: &LogEvent, _: Stamp) {
         self.notes.push(note.clone());
     }
 

@@ -8,7 +8,7 @@ use cangauge::canopen::id::NodeId;
 use cangauge::master::{Master, Timing};
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Bench, Device, State};
-use cangauge::tasks::log::{Mode, Plan, log};
+use cangauge::tasks::log::{LogOptions, Mode, log};
 use cangauge::tasks::{Failure, Kind};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -42,7 +42,7 @@ fn record(mode: Mode) -> (MemoryBus, Kept, Result<u64, Failure>) {
     let text = "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
     let mut bus = Bench::from_toml(text, Path::new("")).expect("a bench").open().expect("a bus");
     bus.attach(Controller { next: Mono::START + PERIOD });
-    let plan = Plan {
+    let plan = LogOptions {
         nodes: vec![NodeId::new(5).expect("a node-ID")],
         wanted: Vec::new(),
         mode,

@@ -13,7 +13,7 @@ use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::value::{DataType, Value};
 use cangauge::master::{Happening, Master, SdoError, SdoFailure, Timing};
 use cangauge::sim::Bench;
-use cangauge::tasks::log::{Mode, Plan, Remark, log};
+use cangauge::tasks::log::{LogOptions, Mode, Remark, log};
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
 use std::path::Path;
@@ -86,8 +86,8 @@ fn away(inner: MemoryBus, milliseconds: Range<u64>, stopped: bool) -> Stalled {
     Stalled { inner, from, until, waiting: VecDeque::new(), stopped, syncs: Vec::new() }
 }
 
-fn plan(mode: Mode, duration: Duration) -> Plan {
-    Plan {
+fn plan(mode: Mode, duration: Duration) -> LogOptions {
+    LogOptions {
         nodes: vec![NodeId::new(5).expect("a node-ID")],
         wanted: Vec::new(),
         mode,

@@ -5,11 +5,11 @@ use crate::bus::claim::Claims;
 use crate::bus::{Mono, Stamp};
 use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
-use crate::output::events::{Events, Weight, Words, words};
+use crate::output::events::{EventText, Events, Weight, event_text};
 use crate::output::progress::Progress;
 use crate::output::rows::Rows;
 use crate::tasks::Failure;
-use crate::tasks::log::{LogFailure, Note, Observer};
+use crate::tasks::log::{LogEvent, LogFailure, Observer};
 use std::io;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -74,16 +74,16 @@ impl Recorder {
         if self.error.is_some() || self.rows.is_complete() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    fn event(&mut self, words: &Words, at: Stamp) {
-        print_event(&self.console, words);
+    fn put_event(&mut self, text: &EventText, at: Stamp) {
+        print_event(&self.console, text);
         let elapsed = self.rows.elapsed(at);
-        if let Some(Err(error)) = self.events.as_mut().map(|events| events.add(at, elapsed, words)) {
+        if let Some(Err(error)) = self.events.as_mut().map(|events| events.add(at, elapsed, text)) {
             self.error.get_or_insert(Unwritten::Events(error));
         }
     }
 
     fn warn(&mut self, event: &'static str, text: String, at: Stamp) {
-        self.event(&Words::of_all(event, Weight::Warning, text), at);
+        self.put_event(&EventText::of_all(event, Weight::Warning, text), at);
     }
 
     fn put(&mut self, cycle: Option<u64>, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
@@ -151,8 +151,8 @@ impl Observer for Recorder {
         self.put(None, samples, sources)
     }
 
-    fn note(&mut self, note: &Note, at: Stamp) {
-        self.event(&words(note), at);
+    fn event(&mut self, event: &LogEvent, at: Stamp) {
+        self.put_event(&event_text(event), at);
     }
 
     fn tick(&mut self, at: Stamp, _rows: u64) -> ControlFlow<()> {

@@ -1,67 +1,71 @@
 //! The text of the events of a recording.
 
 use super::super::failure::reason_text;
-use super::{Weight, Words};
+use super::{EventText, Weight};
 use crate::bus::time::spoken;
 use crate::bus::{Fault, ReceiveBuffer};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
 use crate::output::failure::ErrorMessage;
-use crate::tasks::log::{Change, Note, Remark, TpdoChange};
+use crate::tasks::log::{Change, LogEvent, Remark, TpdoChange};
 
 /// The text of a recording's event.
-pub fn words(note: &Note) -> Words {
+pub fn event_text(event: &LogEvent) -> EventText {
     use Weight::{Detail, Note as Info, Warning};
-    let of_all = Words::of_all;
-    match note {
-        Note::Remark(remark) => of_all("remark", Warning, remark_text(remark)),
-        Note::Emergency(node, emergency, meaning) => {
+    let of_all = EventText::of_all;
+    match event {
+        LogEvent::Remark(remark) => of_all("remark", Warning, remark_text(remark)),
+        LogEvent::Emergency(node, emergency, meaning) => {
             of_node(*node, "emcy", Warning, format!("node {node}: {}", emergency_text(*emergency, meaning)))
         }
-        Note::Share(interval, share) => {
+        LogEvent::Share(interval, share) => {
             let text =
                 format!("SYNC every {} with its TPDOs takes {:.1} % of the bus", spoken(*interval), share * 100.0);
-            Words { event: None, node: None, text, weight: Info }
+            EventText { event: None, node: None, text, weight: Info }
         }
-        Note::Restarted(node) => of_node(*node, "reboot", Warning, format!("node {node} restarted")),
-        Note::ReadAgain(node, changes) if changes.is_empty() => {
+        LogEvent::Restarted(node) => of_node(*node, "reboot", Warning, format!("node {node} restarted")),
+        LogEvent::ReadAgain(node, changes) if changes.is_empty() => {
             of_node(*node, "read-again", Info, format!("node {node} was read again: its setup is unchanged"))
         }
-        Note::ReadAgain(node, changes) => {
+        LogEvent::ReadAgain(node, changes) => {
             let changes: Vec<String> = changes.iter().map(change_text).collect();
             let text = format!("node {node} has changed, and is recorded with its new setup: {}", changes.join("; "));
             of_node(*node, "changed", Warning, text)
         }
-        Note::Unreadable(node, why) => {
+        LogEvent::Unreadable(node, why) => {
             let text =
                 format!("{}: node {node} is not recorded until it can be read again", ErrorMessage::of(why).message);
             of_node(*node, "unreadable", Warning, text)
         }
-        Note::HeartbeatLost(node, since) => {
+        LogEvent::HeartbeatLost(node, since) => {
             let text = format!("node {node}: heartbeat lost, none for {}", spoken(*since));
             of_node(*node, "heartbeat-lost", Warning, text)
         }
-        Note::HeartbeatBack(node) => of_node(*node, "heartbeat-back", Info, format!("node {node}: heartbeat is back")),
-        Note::State(node, state) => of_node(*node, "state", Warning, format!("node {node} is {state} now")),
-        Note::Gap(node, length) => of_node(*node, "gap", Detail, format!("node {node}: a gap of {}", spoken(*length))),
-        Note::Silent(node, since) => {
+        LogEvent::HeartbeatBack(node) => {
+            of_node(*node, "heartbeat-back", Info, format!("node {node}: heartbeat is back"))
+        }
+        LogEvent::State(node, state) => of_node(*node, "state", Warning, format!("node {node} is {state} now")),
+        LogEvent::Gap(node, length) => {
+            of_node(*node, "gap", Detail, format!("node {node}: a gap of {}", spoken(*length)))
+        }
+        LogEvent::Silent(node, since) => {
             of_node(*node, "lost", Warning, format!("node {node}: silent for {}", spoken(*since)))
         }
-        Note::Back(node) => of_node(*node, "back", Info, format!("node {node} is back")),
-        Note::WrongLength(node) => {
+        LogEvent::Back(node) => of_node(*node, "back", Info, format!("node {node} is back")),
+        LogEvent::WrongLength(node) => {
             let text = format!("node {node}: a TPDO has another length than its mapping: it makes no row");
             of_node(*node, "length", Warning, text)
         }
-        Note::Fault(fault) => of_all("fault", fault_weight(*fault), fault.to_string()),
-        Note::Buffer(buffer) => Words { event: None, node: None, text: buffer_text(*buffer), weight: Detail },
-        Note::Dropped(count) => of_all("dropped", Warning, format!("the kernel dropped {count} frames")),
-        Note::Link(true) => of_all("link-up", Info, "the interface is up again".to_owned()),
-        Note::Link(false) => of_all("link-down", Warning, "the interface went down; waiting for it".to_owned()),
+        LogEvent::Fault(fault) => of_all("fault", fault_weight(*fault), fault.to_string()),
+        LogEvent::Buffer(buffer) => EventText { event: None, node: None, text: buffer_text(*buffer), weight: Detail },
+        LogEvent::Dropped(count) => of_all("dropped", Warning, format!("the kernel dropped {count} frames")),
+        LogEvent::Link(true) => of_all("link-up", Info, "the interface is up again".to_owned()),
+        LogEvent::Link(false) => of_all("link-down", Warning, "the interface went down; waiting for it".to_owned()),
     }
 }
 
-fn of_node(node: NodeId, event: &'static str, weight: Weight, text: String) -> Words {
-    Words { event: Some(event), node: Some(node), text, weight }
+fn of_node(node: NodeId, event: &'static str, weight: Weight, text: String) -> EventText {
+    EventText { event: Some(event), node: Some(node), text, weight }
 }
 
 fn emergency_text(emergency: Emergency, meaning: &str) -> String {

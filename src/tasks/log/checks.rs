@@ -1,6 +1,6 @@
 //! Checks before a recording changes anything.
 
-use super::{LogFailure, Mode, Plan};
+use super::{LogFailure, LogOptions, Mode};
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::booted;
 use crate::canopen::pdo::Transmission;
@@ -14,9 +14,9 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// Every requested signal must exist, and must be mapped into a TPDO unless it is polled.
-pub(super) fn check_wanted(nodes: &[Node], plan: &Plan) -> Result<(), Failure> {
-    let polled = matches!(plan.mode, Mode::Poll(_));
-    for item in &plan.wanted {
+pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), Failure> {
+    let polled = matches!(options.mode, Mode::Poll(_));
+    for item in &options.wanted {
         let carried = |node: &Node| {
             let entries = || {
                 let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());

@@ -11,7 +11,7 @@ use super::passive::SetupListener;
 use super::poll::Poll;
 use super::rereads::Rereads;
 use super::states::NmtStates;
-use super::{Mode, Note, Observer, Plan, Remark};
+use super::{LogEvent, LogOptions, Mode, Observer, Remark};
 use crate::bus::{Bus, Filters, ReceiveBuffer, Received, TimestampSource};
 use crate::canopen::id::{CanId, NodeId};
 use crate::master::{Answer, Error, Master, SdoError, Ticket};
@@ -25,8 +25,8 @@ use std::ops::ControlFlow;
 use tally::Tally;
 
 /// A recording: what is known of the nodes, and what was recorded.
-pub(super) struct Recording<'p> {
-    plan: &'p Plan,
+pub(super) struct Recording<'o> {
+    options: &'o LogOptions,
     pub(super) nodes: Vec<Node>,
     pub(super) decoder: Decoder,
     pub(super) poll: Option<Poll>,
@@ -47,14 +47,14 @@ pub(super) struct Recording<'p> {
     samples: Vec<Sample>,
 }
 
-impl<'p> Recording<'p> {
-    pub(super) fn new(nodes: Vec<Node>, plan: &'p Plan, bus: &dyn Bus) -> Recording<'p> {
+impl<'o> Recording<'o> {
+    pub(super) fn new(nodes: Vec<Node>, options: &'o LogOptions, bus: &dyn Bus) -> Recording<'o> {
         // A passive recording expects no node in particular.
-        let expected = plan.nodes.iter().copied().filter(|_| plan.mode != Mode::Passive);
+        let expected = options.nodes.iter().copied().filter(|_| options.mode != Mode::Passive);
         let mut emergencies = Emergencies::default();
         nodes.iter().for_each(|node| emergencies.watch(node));
         Recording {
-            plan,
+            options,
             nodes,
             decoder: Decoder::default(),
             poll: None,
@@ -63,7 +63,7 @@ impl<'p> Recording<'p> {
             tally: Tally::new(),
             liveness: Liveness::new(expected),
             emergencies,
-            rereads: Rereads::new(&plan.overrides),
+            rereads: Rereads::new(&options.overrides),
             timestamps: bus.timestamps(),
             receive_buffer: bus.receive_buffer(),
             link_is_up: true,
@@ -86,7 +86,7 @@ impl<'p> Recording<'p> {
 
     /// Expects nothing from nodes that have none of the requested signals, if another node has them.
     pub(super) fn excuse_nodes_without_signals(&mut self) {
-        if self.plan.wanted.is_empty() {
+        if self.options.wanted.is_empty() {
             return;
         }
         let sources = self.decoder.sources();
@@ -152,14 +152,14 @@ impl<'p> Recording<'p> {
         self.samples.clear();
         let cycle = poll.cycle_of(ticket);
         if let Some(error) = poll.answer(ticket, result, &mut self.samples) {
-            observer.note(&Note::Remark(Remark::PollFailed(error)), master.bus().now());
+            observer.event(&LogEvent::Remark(Remark::PollFailed(error)), master.bus().now());
         }
         Ok(self.take_samples(cycle, observer))
     }
 
     /// Counts the samples and passes them on. `cycle` is the cycle of the poll that they answer.
     fn take_samples(&mut self, cycle: Option<u64>, observer: &mut dyn Observer) -> ControlFlow<()> {
-        if let Some(count) = self.plan.count {
+        if let Some(count) = self.options.count {
             let left = usize::try_from(count - self.tally.rows).unwrap_or(usize::MAX);
             self.samples.truncate(left);
         }
@@ -167,17 +167,17 @@ impl<'p> Recording<'p> {
         let at = last.at;
         let sources = self.decoder.sources();
         let node = sources[last.source].node;
-        if let Some(gap) = self.tally.add(&self.samples, self.plan.max_gap) {
-            observer.note(&Note::Gap(node, gap), at);
+        if let Some(gap) = self.tally.add(&self.samples, self.options.max_gap) {
+            observer.event(&LogEvent::Gap(node, gap), at);
         }
         if self.liveness.take_samples(node, at.mono) {
-            observer.note(&Note::Back(node), at);
+            observer.event(&LogEvent::Back(node), at);
         }
         match cycle {
             Some(cycle) => observer.polled(cycle, &self.samples, sources)?,
             None => observer.samples(&self.samples, sources)?,
         }
-        match self.plan.count {
+        match self.options.count {
             Some(count) if self.tally.rows >= count => ControlFlow::Break(()),
             _ => ControlFlow::Continue(()),
         }

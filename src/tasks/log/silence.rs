@@ -1,22 +1,22 @@
 //! Why a recording has no value.
 
 use super::recording::Recording;
-use super::{FIRST_SAMPLE_TIMEOUT, LogFailure, Mode, Plan, SilenceReason};
+use super::{FIRST_SAMPLE_TIMEOUT, LogFailure, LogOptions, Mode, SilenceReason};
 use crate::measure::layout::Tpdo;
 use crate::node::Node;
 use crate::tasks::Failure;
 
 /// Why a recording has not one row.
-pub(super) fn why_nothing(recording: &Recording<'_>, plan: &Plan) -> Failure {
-    let within = plan.duration.unwrap_or(FIRST_SAMPLE_TIMEOUT).min(FIRST_SAMPLE_TIMEOUT);
+pub(super) fn why_nothing(recording: &Recording<'_>, options: &LogOptions) -> Failure {
+    let within = options.duration.unwrap_or(FIRST_SAMPLE_TIMEOUT).min(FIRST_SAMPLE_TIMEOUT);
     if let Some(&node) = recording.listener.as_ref().and_then(|listener| listener.not_understood.first()) {
         return Failure::at(node, LogFailure::UnknownMapping);
     }
     let Some(first) = recording.nodes.first() else {
-        return Failure::general(LogFailure::NothingReceived { within, nodes: plan.nodes.clone() });
+        return Failure::general(LogFailure::NothingReceived { within, nodes: options.nodes.clone() });
     };
     let reason = match recording.decoder.wrong_lengths(first.id) {
-        0 => silence_reason(first, plan.mode),
+        0 => silence_reason(first, options.mode),
         _ => SilenceReason::WrongLength,
     };
     let of_several = recording.nodes.len() > 1;

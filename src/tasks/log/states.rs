@@ -1,6 +1,6 @@
 //! The NMT states that a recording changes and restores.
 
-use super::{Mode, Plan, Remark};
+use super::{LogOptions, Mode, Remark};
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtCommand, NmtState, booted};
 use crate::master::{Error, Happening, Master};
@@ -28,10 +28,10 @@ impl NmtStates {
         &mut self,
         master: &mut Master<'_>,
         nodes: &[Node],
-        plan: &Plan,
+        options: &LogOptions,
         restarted: &mut BTreeSet<NodeId>,
     ) -> Result<(), Error> {
-        if !plan.nmt || matches!(plan.mode, Mode::Poll(_) | Mode::Passive) {
+        if !options.nmt || matches!(options.mode, Mode::Poll(_) | Mode::Passive) {
             return Ok(());
         }
         let known = heartbeats(master, nodes, restarted)?;

@@ -9,7 +9,7 @@ use crate::master::{Answer, Error, Master, SdoError, Ticket};
 use crate::tasks::log::changes::changes;
 use crate::tasks::log::heartbeats::HeartbeatChange;
 use crate::tasks::log::rereads::{Reread, RereadReason, writes_setup};
-use crate::tasks::log::{Note, Observer, Remark};
+use crate::tasks::log::{LogEvent, Observer, Remark};
 use std::collections::BTreeSet;
 
 impl Recording<'_> {
@@ -22,7 +22,7 @@ impl Recording<'_> {
 
     /// Reports something now and in the summary.
     fn remark(&mut self, remark: Remark, at: Stamp, observer: &mut dyn Observer) {
-        observer.note(&Note::Remark(remark.clone()), at);
+        observer.event(&LogEvent::Remark(remark.clone()), at);
         self.remarks.push(remark);
     }
 
@@ -43,7 +43,7 @@ impl Recording<'_> {
             return;
         }
         self.tally.emergencies += 1;
-        observer.note(&Note::Emergency(node, emergency, self.emergencies.meaning(node, emergency)), at);
+        observer.event(&LogEvent::Emergency(node, emergency, self.emergencies.meaning(node, emergency)), at);
     }
 
     /// Takes a heartbeat or boot-up message.
@@ -59,12 +59,12 @@ impl Recording<'_> {
         match self.liveness.take_life(node, life, at.mono) {
             HeartbeatChange::None => {}
             HeartbeatChange::Back => {
-                observer.note(&Note::HeartbeatBack(node), at);
+                observer.event(&LogEvent::HeartbeatBack(node), at);
                 self.request_reread(node, RereadReason::Away, at.mono, master);
             }
             // This is the expected state.
             HeartbeatChange::State(NmtState::Operational) => {}
-            HeartbeatChange::State(state) => observer.note(&Note::State(node, state), at),
+            HeartbeatChange::State(state) => observer.event(&LogEvent::State(node, state), at),
         }
         if is_boot_up {
             self.restarted(node, at, master, observer);
@@ -73,7 +73,7 @@ impl Recording<'_> {
 
     fn restarted(&mut self, node: NodeId, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
         self.tally.events.restarts += 1;
-        observer.note(&Note::Restarted(node), at);
+        observer.event(&LogEvent::Restarted(node), at);
         self.request_reread(node, RereadReason::Away, at.mono, master);
     }
 
@@ -123,7 +123,7 @@ impl Recording<'_> {
     pub(super) fn dropped(&mut self, count: u32, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let at = master.bus().now();
         self.tally.dropped += u64::from(count);
-        observer.note(&Note::Dropped(count), at);
+        observer.event(&LogEvent::Dropped(count), at);
         self.request_all_rereads(RereadReason::FramesLost, at.mono, master);
     }
 
@@ -143,7 +143,7 @@ impl Recording<'_> {
     ) {
         self.tally.events.wrong_lengths += 1;
         if self.wrong_length_reported.insert(node) {
-            observer.note(&Note::WrongLength(node), at);
+            observer.event(&LogEvent::WrongLength(node), at);
         }
         self.request_reread(node, RereadReason::WrongLength, at.mono, master);
     }
@@ -160,7 +160,7 @@ impl Recording<'_> {
             None => Ok(()),
             Some(Ok(reread)) => self.update(reread, master, observer),
             Some(Err((node, error))) => {
-                observer.note(&Note::Unreadable(node, Box::new(error.into())), master.bus().now());
+                observer.event(&LogEvent::Unreadable(node, Box::new(error.into())), master.bus().now());
                 Ok(())
             }
         }
@@ -174,11 +174,11 @@ impl Recording<'_> {
         let changes = changes(&self.nodes[place], &node);
         match &mut self.poll {
             Some(poll) => {
-                if let Err(failure) = poll.set_node(&node, &self.plan.wanted, &mut self.decoder) {
-                    observer.note(&Note::Unreadable(id, Box::new(failure)), at);
+                if let Err(failure) = poll.set_node(&node, &self.options.wanted, &mut self.decoder) {
+                    observer.event(&LogEvent::Unreadable(id, Box::new(failure)), at);
                 }
             }
-            None => self.decoder.replace(node.layout(), &self.plan.wanted),
+            None => self.decoder.replace(node.layout(), &self.options.wanted),
         }
         self.update_sources();
         self.emergencies.watch(&node);
@@ -197,14 +197,14 @@ impl Recording<'_> {
                 self.remark(Remark::ChangedWhileFramesLost(id, at.mono.since(since)), at, observer);
             }
         }
-        observer.note(&Note::ReadAgain(id, changes), at);
+        observer.event(&LogEvent::ReadAgain(id, changes), at);
         self.report_shared_cob_ids(at, observer);
         Ok(())
     }
 
     /// The controller reports a fault.
     pub(super) fn fault(&mut self, fault: Fault, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
-        observer.note(&Note::Fault(fault), at);
+        observer.event(&LogEvent::Fault(fault), at);
         match fault {
             Fault::BusOff => self.tally.events.bus_offs += 1,
             Fault::Restarted => self.reception_resumed(at.mono, master),
@@ -217,7 +217,7 @@ impl Recording<'_> {
     pub(super) fn link(&mut self, up: bool, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let at = master.bus().now();
         self.link_is_up = up;
-        observer.note(&Note::Link(up), at);
+        observer.event(&LogEvent::Link(up), at);
         if up {
             self.reception_resumed(at.mono, master);
         } else {
@@ -229,11 +229,11 @@ impl Recording<'_> {
     pub(super) fn report_losses(&mut self, now: Mono, master: &Master<'_>, observer: &mut dyn Observer) {
         while let Some((node, silence)) = self.liveness.next_silent(now) {
             self.tally.events.silences += 1;
-            observer.note(&Note::Silent(node, silence), master.bus().now());
+            observer.event(&LogEvent::Silent(node, silence), master.bus().now());
         }
         while let Some((node, silence)) = self.liveness.next_lost_heartbeat(now) {
             self.tally.events.heartbeat_losses += 1;
-            observer.note(&Note::HeartbeatLost(node, silence), master.bus().now());
+            observer.event(&LogEvent::HeartbeatLost(node, silence), master.bus().now());
         }
     }
 }

@@ -10,7 +10,7 @@ impl Recording<'_> {
     pub(in crate::tasks::log) fn report(mut self) -> RecordingReport {
         let lost = self.liveness.lost(self.tally.end());
         self.remark_at_end(&lost);
-        let nothing = (self.tally.rows == 0).then(|| why_nothing(&self, self.plan));
+        let nothing = (self.tally.rows == 0).then(|| why_nothing(&self, self.options));
         RecordingReport {
             rows: self.tally.rows,
             length: self.tally.length(),
@@ -46,7 +46,7 @@ impl Recording<'_> {
             if let Some(node) = self.nodes.iter().find(|node| node.id == id)
                 && !self.liveness.has_sent(id)
             {
-                self.remarks.push(Remark::NoMeasurements(id, silence_reason(node, self.plan.mode)));
+                self.remarks.push(Remark::NoMeasurements(id, silence_reason(node, self.options.mode)));
             }
         }
     }

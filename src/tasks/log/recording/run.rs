@@ -6,7 +6,7 @@ use crate::canopen::id::CanId;
 use crate::master::{Error, Happening, Master};
 use crate::node::wait::{self, Policy, Until, Waiter};
 use crate::tasks::log::producer::Producer;
-use crate::tasks::log::{FIRST_SAMPLE_TIMEOUT, Mode, Note, Observer, TICK};
+use crate::tasks::log::{FIRST_SAMPLE_TIMEOUT, LogEvent, Mode, Observer, TICK};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -51,21 +51,21 @@ impl Recording<'_> {
         observer: &mut dyn Observer,
     ) -> Result<(), Error> {
         if let Some(buffer) = self.receive_buffer {
-            observer.note(&Note::Buffer(buffer), master.bus().now());
+            observer.event(&LogEvent::Buffer(buffer), master.bus().now());
         }
         let start = master.now();
         self.tally.extend_to(start);
         for node in &self.nodes {
             self.liveness.watch_heartbeat(node, start);
         }
-        let mut producer = match self.plan.mode {
+        let mut producer = match self.options.mode {
             Mode::Sync(interval) => {
                 let id = self.nodes.first().map_or(CanId::SYNC, |first| first.sync);
                 Some(Producer::new(interval, id, start))
             }
             _ => None,
         };
-        let schedule = Schedule::new(start, self.plan.duration, master.bus().is_live());
+        let schedule = Schedule::new(start, self.options.duration, master.bus().is_live());
         let mut recorder = Loop { recording: self, schedule, producer: producer.as_mut(), observer };
         let result = wait::run(master, Policy::Record, &mut recorder);
         self.timestamps = master.bus().timestamps();
@@ -75,7 +75,7 @@ impl Recording<'_> {
         let late_drops = master.late_drops();
         if late_drops > 0 {
             self.tally.dropped += u64::from(late_drops);
-            observer.note(&Note::Dropped(late_drops), master.bus().now());
+            observer.event(&LogEvent::Dropped(late_drops), master.bus().now());
         }
         result
     }
@@ -143,8 +143,8 @@ impl Recording<'_> {
 }
 
 /// The recording while it waits.
-struct Loop<'l, 'p> {
-    recording: &'l mut Recording<'p>,
+struct Loop<'l, 'o> {
+    recording: &'l mut Recording<'o>,
     schedule: Schedule,
     producer: Option<&'l mut Producer>,
     observer: &'l mut dyn Observer,
