@@ -17,7 +17,7 @@ use crate::output::progress::Transfer;
 use crate::output::sdo::ObjectValue;
 use crate::output::text;
 use crate::tasks::Failure;
-use crate::tasks::sdo::{encode, read, write};
+use crate::tasks::sdo::{encode, find_form, read, write};
 use clap::{Args, Subcommand, ValueEnum};
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -264,10 +264,15 @@ impl WriteArgs {
                     }
                 });
             }
+            let form = self.sdo_size.into();
+            let has_expedited = ready.iter().any(|(_, bytes, _)| (1..=4).contains(&bytes.len()));
+            if form == Form::Auto && has_expedited {
+                find_form(master, &mut node)?;
+            }
             let bar = Transfer::new(global.shows_progress());
             let (mut progress, mut watch) = (|moved| bar.moved(moved), |_: &_| {});
-            let (form, blocks) = (self.sdo_size.into(), self.block.into());
-            let mut options = WriteOptions { form, blocks, ..WriteOptions::new(&mut progress, &mut watch) };
+            let mut options =
+                WriteOptions { form, blocks: self.block.into(), ..WriteOptions::new(&mut progress, &mut watch) };
             for (at, bytes, data_type) in ready {
                 let is_verifiable = self.verify && !is_signature(&bytes);
                 write(master, &node, at, &bytes, is_verifiable.then_some(data_type), &mut options)?;

@@ -4,10 +4,10 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::Note;
 use crate::canopen::value::{DataType, Value};
-use crate::master::Master;
 use crate::master::transfer::{BlockMode, Moved, read_object};
+use crate::master::{Error, Master};
 use crate::node::write::write_with;
-use crate::node::{self, Node, WriteOptions, names};
+use crate::node::{self, Node, WriteOptions, names, survey};
 use crate::tasks::Failure;
 
 /// A value of an object.
@@ -71,6 +71,19 @@ pub fn encode(
         None => names::type_for(master, node, object, text)?,
     };
     Ok((names::encode(node, object, data_type, text)?, data_type))
+}
+
+/// Finds out which form of a write the node accepts: reads its identity, if its description was not looked for yet.
+///
+/// A node that does not answer this is no error. The form is then found out by the write itself.
+///
+/// # Errors
+/// Bus errors and Ctrl-C.
+pub fn find_form(master: &mut Master<'_>, node: &mut Node) -> Result<(), Failure> {
+    match survey::identify_late(master, node) {
+        Ok(()) | Err(Error::Sdo(_)) => Ok(()),
+        Err(error) => Err(error.into()),
+    }
 }
 
 /// Writes bytes to an object, reads them back if `verify` says so, and compares.

@@ -28,6 +28,7 @@ mod scan;
 mod sdo;
 mod settings;
 mod store;
+mod write_form;
 
 use std::fs;
 use std::io::{self, Read};

@@ -4,11 +4,12 @@ use crate::bus::Received;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtState};
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{AbortCode, DownloadSize};
 use crate::canopen::value::DataType;
-use crate::device::catalog::Model;
-use crate::device::description::SizeIndication;
 use crate::master::{Answer, Error, Happening, Master, Request, SdoError, SdoFailure};
+use crate::node::wait::{Policy, wait};
+use crate::node::write::write_with;
+use crate::node::{self, Node, Repeat, WriteOptions};
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
@@ -65,8 +66,8 @@ impl Write {
 pub(super) struct Device<'a, 'bus> {
     pub(super) master: &'a mut Master<'bus>,
     pub(super) node: NodeId,
-    /// How sizes go, the device's own way first.
-    sizes: [DownloadSize; 2],
+    /// What is known of the node: the form of its writes.
+    known: Node,
     /// Whether a boot-up message came.
     pub(super) restarted: bool,
     /// Writes that the device has carried out.
@@ -74,14 +75,8 @@ pub(super) struct Device<'a, 'bus> {
 }
 
 impl<'a, 'bus> Device<'a, 'bus> {
-    pub(super) fn new(master: &'a mut Master<'bus>, node: NodeId, model: Option<&Model>) -> Device<'a, 'bus> {
-        let omits = model.is_some_and(|model| model.description.sdo.size == SizeIndication::Omitted);
-        let sizes = if omits {
-            [DownloadSize::Omitted, DownloadSize::Indicated]
-        } else {
-            [DownloadSize::Indicated, DownloadSize::Omitted]
-        };
-        Device { master, node, sizes, restarted: false, writes: 0 }
+    pub(super) fn new(master: &'a mut Master<'bus>, node: &Node) -> Device<'a, 'bus> {
+        Device { master, node: node.id, known: node.clone(), restarted: false, writes: 0 }
     }
 
     /// One exchange; boot-ups that come meanwhile are noted.
@@ -105,38 +100,31 @@ impl<'a, 'bus> Device<'a, 'bus> {
         number.ok_or(Trouble::Lost(SdoError { node: self.node, object, operation, failure }))
     }
 
-    /// Writes once. When no answer comes the object is read: what has arrived is not sent again.
+    /// Writes once. If no answer comes, the object is read back before it is written again.
     pub(super) fn write(&mut self, write: &Write) -> Result<(), Trouble> {
-        let mut attempts_left = self.master.timing().retries;
-        let mut sizes = self.sizes;
-        let mut first_refusal = None;
-        loop {
-            let request = Request::write(self.node, write.object, write.bytes(), sizes[0]).once();
-            let error = match self.exchange(request)? {
-                Ok(_) => break,
-                Err(error) => error,
-            };
-            match error.failure {
-                // Some servers do not know the one way of telling the size, some not the other.
-                SdoFailure::Refused(AbortCode::COMMAND_SPECIFIER | AbortCode::LENGTH) if first_refusal.is_none() => {
-                    sizes.reverse();
-                    first_refusal = Some(error);
-                }
-                SdoFailure::Refused(_) => return Err(first_refusal.unwrap_or(error).into()),
-                SdoFailure::NoAnswer { .. } | SdoFailure::Ambiguous | SdoFailure::Disturbed => {
-                    match self.read(write.object, u8::try_from(write.width).unwrap_or(4)) {
-                        Ok(_) if self.restarted => return Err(Trouble::Restarted),
-                        Ok(found) if found == write.value => break,
-                        Ok(_) if attempts_left > 0 => attempts_left -= 1,
-                        Err(Trouble::Stopped(stopped)) => return Err(stopped.into()),
-                        Ok(_) | Err(_) => return Err(Trouble::Lost(error)),
-                    }
-                }
-                _ => return Err(Trouble::Lost(error)),
-            }
+        let node = self.node;
+        let mut has_booted = false;
+        let mut watch = |received: &Received| has_booted |= Life::parse(&received.frame) == Some((node, Life::BootUp));
+        let progress = &mut |_| {};
+        let mut options = WriteOptions { repeat: Repeat::Once, ..WriteOptions::new(progress, &mut watch) };
+        let result = write_with(self.master, &self.known, write.object, &write.bytes(), &mut options);
+        self.restarted |= has_booted;
+        match result {
+            Ok(_) => self.writes += 1,
+            Err(node::Error::Bus(error)) => return Err(Error::Bus(error).into()),
+            Err(node::Error::Interrupted) => return Err(Error::Interrupted.into()),
+            Err(_) if self.restarted => return Err(Trouble::Restarted),
+            Err(node::Error::Sdo(error)) => return Err(error.into()),
+            Err(node::Error::Unknown(error)) => return Err(Trouble::Lost(error)),
+            Err(_) => return Err(Trouble::Lost(self.wrong_width(write.object))),
         }
-        self.writes += 1;
         if self.restarted { Err(Trouble::Restarted) } else { Ok(()) }
+    }
+
+    /// The object is wider than its value.
+    fn wrong_width(&self, object: ObjectId) -> SdoError {
+        let operation = crate::master::Operation::Write;
+        SdoError { node: self.node, object, operation, failure: SdoFailure::NotANumber }
     }
 
     /// After an exchange that was broken off: once another object is answered no older answer can come.
@@ -147,25 +135,19 @@ impl<'a, 'bus> Device<'a, 'bus> {
         }
     }
 
-    /// Waits for a sign of life of a node that is there to be talked to: whether one came.
+    /// Waits for a sign of life of a node that can answer SDO requests. Returns whether one came.
     pub(super) fn wait_for_life(&mut self, at_most: Duration) -> Result<bool, Error> {
-        let until = self.master.now() + at_most;
-        loop {
-            match self.master.next(until)? {
-                Happening::Frame(received) => match Life::parse(&received.frame) {
-                    Some((node, Life::BootUp)) if node == self.node => {
-                        self.restarted = true;
-                        return Ok(true);
-                    }
-                    Some((node, Life::State(state))) if node == self.node && state != NmtState::Stopped => {
-                        return Ok(true);
-                    }
-                    _ => {}
-                },
-                Happening::Deadline | Happening::Ended => return Ok(false),
-                Happening::Interrupted => return Err(Error::Interrupted),
-                Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(_) => {}
+        let (until, own) = (self.master.now() + at_most, self.node);
+        let life = wait(self.master, until, Policy::Reconnect, |_, event| {
+            let Happening::Frame(received) = event else { return ControlFlow::Continue(()) };
+            match Life::parse(&received.frame) {
+                Some((node, Life::State(NmtState::Stopped))) if node == own => ControlFlow::Continue(()),
+                Some((node, life)) if node == own => ControlFlow::Break(life),
+                _ => ControlFlow::Continue(()),
             }
-        }
+        })?;
+        let life = life.done();
+        self.restarted |= life == Some(Life::BootUp);
+        Ok(life.is_some())
     }
 }

@@ -46,7 +46,7 @@ pub fn map(master: &mut Master<'_>, wish: &Wish, keep: bool, overrides: &Overrid
     let instrument = found.ok_or_else(|| Failure::of_node(Kind::NoAnswer, node, "it is not there"))?;
     let model = instrument.model.as_deref();
     let storing = if keep { Some(storing(master, &instrument, wish.number)?) } else { None };
-    let mut device = Device::new(master, node, model);
+    let mut device = Device::new(master, &instrument);
     let (mapping, remarks) = wish.mapping(&mut device, &instrument)?;
     let inhibit = wish.inhibit_100us.is_some() || may_inhibit(&instrument, wish.number);
     let old = Settings::read(&mut device, wish.number, inhibit).map_err(|trouble| unread(&instrument, trouble))?;

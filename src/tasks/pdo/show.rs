@@ -83,7 +83,7 @@ pub fn show(
     if wanted.is_empty() {
         return Err(Failure::of_node(Kind::Unexpected, node, "it has no TPDO"));
     }
-    let mut device = Device::new(master, node, instrument.model.as_deref());
+    let mut device = Device::new(master, &instrument);
     let read = |number| {
         let settings = Settings::read(&mut device, number, may_inhibit(&instrument, number));
         settings.map(|settings| Shown::new(&instrument, settings)).map_err(|trouble| unread(&instrument, trouble))
