@@ -33,7 +33,7 @@ const PARTS: &[(&str, &str, &[&str])] = &[
     ("node", "bus", BUS_TRAIT),
     ("tasks", "bus", BUS_TRAIT),
     ("measure", "bus", &["Mono", "Received", "Stamp", "time"]),
-    ("output", "bus", &["Fault", "Mono", "ReceiveBuffer", "Received", "Stamp", "Wall", "time"]),
+    ("output", "bus", &["Fault", "Mono", "ReceiveBuffer", "Received", "Stamp", "Wall", "replay", "time"]),
     ("output", "canopen", &["emcy", "id", "lss", "nmt", "object", "pdo", "sdo", "value"]),
     ("sim", "canopen", &["frame", "id", "object", "value", "wire_length"]),
     ("cli", "canopen", &["emcy", "id", "lss", "nmt", "object", "pdo", "value"]),
@@ -98,6 +98,7 @@ const UNSAFE: &[(&str, usize, &str)] = &[
     ("bus/claim/holder.rs", 1, "SO_PEERCRED: std has no stable call for the credentials of a peer"),
     ("bus/interrupt.rs", 1, "sigaction: std cannot read the action of a signal"),
     ("bus/poll.rs", 2, "ppoll and poll: std cannot wait for a descriptor"),
+    ("bus/replay.rs", 2, "mktime and its zeroed argument: std knows no time zones"),
     ("bus/socketcan/receive.rs", 3, "recvmmsg and its zeroed headers: no safe crate returns the drop counter"),
     ("bus/socketcan/socket.rs", 1, "SO_MEMINFO: neither socket2 nor the socketcan crate reads it"),
 ];

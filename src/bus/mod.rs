@@ -329,6 +329,16 @@ pub enum BusError {
         /// The error of the operating system.
         source: std::io::Error,
     },
+    /// A file is not a usable recording.
+    #[error("replay {file}{}: {error}", line.map(|line| format!(":{line}")).unwrap_or_default())]
+    Recording {
+        /// The file.
+        file: String,
+        /// The line, counted from 1, if the error is in one line.
+        line: Option<u64>,
+        /// What is wrong.
+        error: replay::RecordingError,
+    },
     /// Another error of the operating system.
     #[error("{what}: {source}")]
     Io {

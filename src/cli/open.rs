@@ -7,13 +7,14 @@ use crate::bus::Bus;
 use crate::bus::claim::{ClaimError, Claims, IfHeld, Part};
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
-use crate::bus::replay::Replay;
+use crate::bus::replay::{Replay, ReplayNote};
 use crate::bus::trace::Traced;
 use crate::canopen::id::NodeId;
 use crate::device::catalog::{self, Model};
 use crate::device::eds;
 use crate::master::Master;
 use crate::node::{Overrides, targets};
+use crate::output;
 use crate::sim::{Bench, BenchError};
 use crate::tasks::scan::ScanFailure;
 use crate::tasks::{Failure, Kind};
@@ -72,7 +73,13 @@ pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyho
     let bus: Box<dyn Bus> = match spec {
         BusSpec::Sim(bench) => Box::new(simulated(bench.as_deref())?),
         BusSpec::Replay(file) => {
-            Box::new(Replay::open(file).map_err(|source| FileError { what: format!("replay {file}"), source })?)
+            let (console, name) = (global.console(), file.clone());
+            let report = move |note: &ReplayNote| match output::replay::note(&name, note) {
+                (text, true) => console.warn(&text),
+                (text, false) => console.note(&text),
+            };
+            let what = || format!("replay {file}");
+            Box::new(Replay::open(file, Box::new(report)).map_err(|source| FileError { what: what(), source })?)
         }
         BusSpec::SocketCan(name) => socketcan(name, even_down)?,
     };

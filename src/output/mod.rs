@@ -17,6 +17,7 @@ pub mod nmt;
 pub mod notes;
 pub mod pdo;
 pub mod progress;
+pub mod replay;
 pub mod report;
 pub mod rows;
 pub mod scan;

@@ -112,7 +112,7 @@ impl Cause {
     pub fn kind(&self) -> Kind {
         match self {
             Cause::Bus(error) => match **error {
-                BusError::File { .. } => Kind::Io,
+                BusError::File { .. } | BusError::Recording { .. } => Kind::Io,
                 _ => Kind::Bus,
             },
             Cause::Sdo(error) => match error.failure {
@@ -172,7 +172,7 @@ fn node_kind(error: &node::Error) -> Kind {
 
 fn lss_kind(error: &LssError) -> Kind {
     match error {
-        LssError::Master(Error::Bus(BusError::File { .. })) => Kind::Io,
+        LssError::Master(Error::Bus(BusError::File { .. } | BusError::Recording { .. })) => Kind::Io,
         LssError::Master(Error::Bus(_)) => Kind::Bus,
         LssError::Master(Error::Interrupted) => Kind::Interrupted,
         LssError::Refused { .. } => Kind::Refused,

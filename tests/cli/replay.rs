@@ -101,12 +101,125 @@ fn nothing_can_be_sent_into_it() {
         .refuses("a recording (replay:) is receive-only: --sync and --poll send");
 }
 
+/// A recording: another program reads the setup of node 5 (pressure in bar, 2 digits), then five values follow. `form`
+/// writes a frame at a time in milliseconds.
+fn recording(form: impl Fn(usize, u32, &str, &str) -> String) -> String {
+    let setup = [
+        ("605", "4000100000000000"),
+        ("585", "4300100094010200"),
+        ("605", "4000180100000000"),
+        ("585", "4300180185010000"),
+        ("605", "40001A0000000000"),
+        ("585", "4F001A0001000000"),
+        ("605", "40001A0100000000"),
+        ("585", "43001A0120013061"),
+        ("605", "4031610100000000"),
+        ("585", "4331610100004E00"),
+        ("605", "4032610100000000"),
+        ("585", "4F32610102000000"),
+        ("000", "0105"),
+    ];
+    let values = ["0000A03F", "0000C03F", "0000E03F", "00000040", "00001040"];
+    let setup = setup.into_iter().zip(0..).map(|((id, data), ms)| (ms, id, data));
+    let values = values.into_iter().zip(1..).map(|(data, at)| (100 * at, "185", data));
+    setup.chain(values).enumerate().map(|(number, (ms, id, data))| form(number, ms, id, data)).collect()
+}
+
+/// As `candump -L`.
+fn log_form(_: usize, ms: u32, id: &str, data: &str) -> String {
+    format!("(1700000000.{ms:03}000) can0 {id}#{data}\n")
+}
+
+/// As `candump` without options, with this time in front.
+fn screen_form(time: &str, id: &str, data: &str) -> String {
+    let bytes: Vec<&str> = (0..data.len()).step_by(2).filter_map(|at| data.get(at..at + 2)).collect();
+    format!(" {time} can0  {id}   [{}]  {}\n", bytes.len(), bytes.join(" "))
+}
+
+/// Replays a text with `log 5`.
+fn log_of(bench: &Bench, text: impl AsRef<[u8]>) -> Done {
+    fs::write(bench.path("t.log"), text).expect("written");
+    replay(bench, "t.log", "log 5")
+}
+
 #[test]
-fn what_is_no_log_is_named_with_its_line() {
+fn forms_of_candump_give_the_same_rows() {
     let bench = Bench::of("mh4@1");
-    fs::write(bench.path("t.log"), "(1.0) can0 701#00\nnonsense\n").expect("written");
-    let done = replay(&bench, "t.log", "log 1").exit(8);
-    assert!(done.stderr.starts_with("cangauge: replay t.log:2: not a line of a candump log"), "{}", done.stderr);
+    let plain = recording(log_form);
+    let expected = log_of(&bench, &plain).exit(0).stdout;
+    assert!(expected.lines().nth(5).is_some_and(|row| row.contains(",5,ch1,2.25,bar,,")), "{expected}");
+    assert_eq!(expected.lines().count(), 6);
+    let absolute = |_: usize, ms, id: &str, data: &str| screen_form(&format!("(1700000000.{ms:03}000) "), id, data);
+    for text in [
+        format!("\u{feff}{plain}"),
+        format!("# bench 2, after the repair\n{plain}"),
+        plain.replace('\n', "\r\n"),
+        recording(absolute),
+        recording(|number, ms, id, data| absolute(number, ms, id, data).replace('\n', "   '....'\r\n")),
+    ] {
+        assert_eq!(log_of(&bench, &text).exit(0).stdout, expected, "{text}");
+    }
+    // The time zone of the machine: 2023-11-14 22:13:20 UTC.
+    let dated = recording(|_, ms, id, data| screen_form(&format!("(2023-11-14 23:13:20.{ms:03}000) "), id, data));
+    fs::write(bench.path("t.log"), dated).expect("written");
+    let mut command = bench.command(&["--bus", "replay:t.log", "log", "5"]);
+    assert_eq!(bench.finish(command.env("TZ", "XXX-1")).exit(0).stdout, expected);
+}
+
+#[test]
+fn broken_lines_are_skipped_counted_and_named() {
+    let bench = Bench::of("mh4@1");
+    let cut = |is_cut: fn(usize) -> bool| {
+        recording(|number, ms, id, data| {
+            let line = log_form(number, ms, id, data);
+            if is_cut(number) { format!("{}\n", &line[..20]) } else { line }
+        })
+    };
+    let done = log_of(&bench, cut(|number| number == 15)).exit(0);
+    assert_eq!(done.stdout.lines().count(), 5, "{}", done.stdout);
+    assert!(done.stderr.contains("t.log: 1 line skipped: line 16 is not a line"), "{}", done.stderr);
+    let done = log_of(&bench, cut(|number| number > 14)).exit(0);
+    assert_eq!(done.stdout.lines().count(), 3, "{}", done.stdout);
+    assert!(done.stderr.contains("t.log: 3 lines skipped, line 16 first"), "{}", done.stderr);
+}
+
+#[test]
+fn recordings_without_usable_times_are_refused_with_the_reason() {
+    let bench = Bench::of("mh4@1");
+    let done = log_of(&bench, recording(|_, _, id, data| screen_form("", id, data))).exit(8);
+    assert_eq!(
+        done.stderr,
+        "cangauge: replay t.log:1: the frames have no times\n\
+         hint: record with times: candump -L can0 (or candump -ta can0)\n"
+    );
+    let intervals = |number: usize| if number < 13 { "0.001000" } else { "0.100000" };
+    let log = recording(|number, _, id, data| format!("({}) can0 {id}#{data}\n", intervals(number)));
+    let screen = recording(|number, _, id, data| screen_form(&format!("(00{}) ", intervals(number)), id, data));
+    for text in [log, screen] {
+        let done = log_of(&bench, text).exit(8);
+        assert!(done.stderr.contains("t.log:1: the times do not increase"), "{}", done.stderr);
+        assert_eq!(done.stdout, "");
+    }
+    // Times that count from the start of the recording are times.
+    let done = log_of(&bench, recording(|_, ms, id, data| format!("(0.{ms:03}000) can0 {id}#{data}\n"))).exit(0);
+    assert_eq!(done.stdout.lines().count(), 6, "{}", done.stdout);
+    assert!(done.stderr.contains("the times have no date"), "{}", done.stderr);
+}
+
+#[test]
+fn files_that_are_no_recordings_are_named() {
+    let bench = Bench::of("mh4@1");
+    for (text, message) in [
+        ("", "replay t.log: the file is empty"),
+        ("nonsense\n", "replay t.log: not a candump log"),
+        ("date Mon Jan 1 10:00:00 2024\n", "replay t.log: this is a Vector ASC file"),
+        (";$FILEVERSION=1.1\n", "replay t.log: this is a PEAK TRC file"),
+    ] {
+        let done = log_of(&bench, text).exit(8);
+        assert!(done.stderr.starts_with(&format!("cangauge: {message}")), "{}", done.stderr);
+    }
+    let done = log_of(&bench, b"LOGG\x90\0\0\0").exit(8);
+    assert!(done.stderr.contains("hint: convert it with python-can: "), "{}", done.stderr);
     replay(&bench, "nowhere.log", "log 1").exit(8);
     replay(&bench, "", "log 1").exit(2);
 }

@@ -1,8 +1,10 @@
 //! Text for causes from the layers below the tasks: bus, SDO, LSS, expressions.
 
 use super::{Place, Words};
+use crate::bus::replay::{FileFormat, RecordingError};
 use crate::canopen::lss::Service;
 use crate::tasks::failure::{BusError, ExpressionError, LssError, SdoError, SdoFailure};
+use std::path::Path;
 
 /// The bus failed.
 pub(super) fn bus(error: &BusError) -> Words {
@@ -19,9 +21,42 @@ pub(super) fn bus(error: &BusError) -> Words {
             words.hint("list the interfaces: cangauge bus list; without hardware: --bus sim")
         }
         BusError::ReceiveOnly(_) => words.hint("commands that only listen work on it: log, scan --passive, nmt watch"),
+        BusError::Recording { file, error, .. } => match recording_hint(file, error) {
+            Some(hint) => words.hint(hint),
+            None => words,
+        },
         BusError::Unsupported(_) => words.hint("without it: --bus sim"),
         _ => words,
     }
+}
+
+/// How to get a recording that can be replayed.
+fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
+    let converted = Path::new(file).with_extension("candump.log");
+    let converted = converted.display();
+    Some(match error {
+        RecordingError::Empty => return None,
+        RecordingError::NotALog | RecordingError::SeveralInterfaces(..) => "record with: candump -L can0".to_owned(),
+        RecordingError::NoTimes => "record with times: candump -L can0 (or candump -ta can0)".to_owned(),
+        RecordingError::Intervals => "record with absolute times: candump -L can0".to_owned(),
+        RecordingError::OtherFormat(format) => match format {
+            FileFormat::Gzip => format!("zcat {file} | cangauge -b replay:- ..."),
+            FileFormat::Utf16 => format!("convert it: iconv -f UTF-16 -t UTF-8 {file} > {converted}"),
+            FileFormat::Blf
+            | FileFormat::Mdf
+            | FileFormat::Sqlite
+            | FileFormat::Asc
+            | FileFormat::Trc
+            | FileFormat::PythonCanCsv => {
+                format!("convert it with python-can: python3 -m can.logconvert {file} {converted}")
+            }
+            FileFormat::SavvyCanCsv => "save it from SavvyCAN as a candump log".to_owned(),
+            FileFormat::Measurements => {
+                "replay needs the frames: record them with --trace FILE or candump -L".to_owned()
+            }
+            FileFormat::Pcap | FileFormat::Xml => "record with: candump -L can0".to_owned(),
+        },
+    })
 }
 
 /// An SDO transfer failed.

@@ -16,7 +16,7 @@ static FILE: LazyLock<PathBuf> = LazyLock::new(|| {
 
 fuzz_target!(|data: &[u8]| {
     std::fs::write(&*FILE, data).expect("a place for the log");
-    let mut bus = Replay::open(&FILE.display().to_string()).expect("it is there");
+    let mut bus = Replay::open(&FILE.display().to_string(), Box::new(|_| {})).expect("it is there");
     // It need not stay there for that.
     std::fs::remove_file(&*FILE).expect("it is ours");
     let lines = data.split(|byte| *byte == b'\n').count();
