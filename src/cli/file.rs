@@ -152,7 +152,7 @@ impl ReportFile {
         }
         let mut name = OsString::from(".");
         name.push(path.file_name().unwrap_or_default());
-        name.push(format!(".{}", std::process::id()));
+        name.push(".tmp");
         let temporary = path.with_file_name(name);
         let file = options.write(true).create(true).truncate(true).open(&temporary);
         let file = file.map_err(|source| file_error("create", &path, source))?;
