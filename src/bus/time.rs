@@ -60,7 +60,7 @@ impl Wall {
         Wall(since_epoch)
     }
 
-    /// What the host's clock says now. A clock set before 1970 reads as 1970.
+    /// The present time of the host's clock. A clock set before 1970 reads as 1970.
     pub fn now() -> Wall {
         Wall(SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default())
     }
@@ -85,16 +85,16 @@ impl Add<Duration> for Wall {
     }
 }
 
-/// When something was received, on both time lines.
+/// A moment on both time lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stamp {
     /// For intervals and deadlines.
     pub mono: Mono,
-    /// For people and files.
+    /// For users and files.
     pub wall: Wall,
 }
 
-/// A length of time for people: `500 ms`, `5 s`, `2.5 s`, `1h 30m`.
+/// A duration as text for users: `500 ms`, `5 s`, `2.5 s`, `1h 30m`.
 pub fn spoken(length: Duration) -> String {
     let milliseconds = length.as_millis();
     if length >= Duration::from_secs(60) {

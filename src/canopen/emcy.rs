@@ -3,20 +3,20 @@
 use super::frame::Frame;
 use std::fmt;
 
-/// An emergency message. Shorter ones than eight bytes are read as far as they go.
+/// An emergency message (EMCY). It may have fewer than eight bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Emergency {
-    /// The emergency error code; 0000h means that an error has gone.
+    /// The emergency error code; 0000h means that an error was reset.
     pub code: u16,
-    /// 1001h when it was sent, if the message was long enough.
+    /// The error register (1001h), if the message contains it.
     pub register: Option<ErrorRegister>,
-    /// Manufacturer's bytes 3 to 7; missing ones are zero.
+    /// The manufacturer-specific bytes 3 to 7; missing bytes are 0.
     pub manufacturer: [u8; 5],
 }
 
 impl Emergency {
-    /// Reads the data of an emergency frame; `None` when even the code is not there. The caller knows by
-    /// 1014h (or the predefined identifier) whose it is.
+    /// Parses the data of an emergency frame; `None` if it has fewer than two bytes. The caller knows the node by the
+    /// COB-ID (1014h, or the predefined identifier).
     pub fn parse(frame: &Frame) -> Option<Emergency> {
         let [low, high, rest @ ..] = frame.data() else { return None };
         let mut manufacturer = [0; 5];
@@ -27,7 +27,7 @@ impl Emergency {
         Some(Emergency { code: u16::from_le_bytes([*low, *high]), register, manufacturer })
     }
 
-    /// What the class of the code means (CiA 301, table 26), for codes that no description explains.
+    /// The meaning of an error code by its class (CiA 301, table 26). It is used if the description has no text for it.
     pub fn class(code: u16) -> &'static str {
         match code {
             0x8110 => "CAN overrun",
@@ -77,7 +77,7 @@ impl Emergency {
 pub struct ErrorRegister(pub u8);
 
 impl fmt::Display for ErrorRegister {
-    /// The names of the bits set, or `no error`.
+    /// The names of the set bits, or `no error`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const NAMES: [&str; 8] =
             ["generic", "current", "voltage", "temperature", "communication", "profile", "reserved", "manufacturer"];

@@ -1,4 +1,4 @@
-//! A classic CAN frame, and its text in the grammar of `candump -L` and `cansend`.
+//! A classic CAN frame, and its text form as in `candump -L` and `cansend`.
 
 use super::id::CanId;
 use std::fmt;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 /// A classic CAN data or remote frame.
 ///
-/// CAN FD frames are no part of CANopen (CiA 301) and have no place here; transports pass them over.
+/// CANopen (CiA 301) does not use CAN FD frames; transports ignore them.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Frame {
     id: CanId,
@@ -15,7 +15,7 @@ pub struct Frame {
     data: [u8; 8],
 }
 
-/// Text or bytes that make no classic CAN frame.
+/// Why text or bytes are not a classic CAN frame.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
     /// More than eight bytes.
@@ -28,6 +28,9 @@ pub enum FrameError {
 
 impl Frame {
     /// A data frame of 0 to 8 bytes.
+    ///
+    /// # Errors
+    /// [`FrameError::TooLong`] if `data` has more than 8 bytes.
     pub fn new(id: CanId, data: &[u8]) -> Result<Frame, FrameError> {
         match u8::try_from(data.len()) {
             Ok(len) if len <= 8 => {
@@ -39,27 +42,30 @@ impl Frame {
         }
     }
 
-    /// A data frame of exactly eight bytes, as SDO and LSS use it.
+    /// A data frame of exactly eight bytes, as in SDO and LSS.
     pub fn full(id: CanId, data: [u8; 8]) -> Frame {
         Frame { id, remote: false, len: 8, data }
     }
 
-    /// A data frame without bytes, as SYNC is (CiA 301, 7.2.5).
+    /// A data frame without data, such as SYNC (CiA 301, 7.2.5).
     pub fn empty(id: CanId) -> Frame {
         Frame { id, remote: false, len: 0, data: [0; 8] }
     }
 
-    /// A data frame of one byte, as a heartbeat is.
+    /// A data frame of one byte, such as a heartbeat.
     pub fn byte(id: CanId, byte: u8) -> Frame {
         Frame { id, remote: false, len: 1, data: [byte, 0, 0, 0, 0, 0, 0, 0] }
     }
 
-    /// A data frame of two bytes, as an NMT command is.
+    /// A data frame of two bytes, such as an NMT command.
     pub fn pair(id: CanId, first: u8, second: u8) -> Frame {
         Frame { id, remote: false, len: 2, data: [first, second, 0, 0, 0, 0, 0, 0] }
     }
 
     /// A remote transmission request for `len` bytes, 0 to 8.
+    ///
+    /// # Errors
+    /// [`FrameError::TooLong`] if `len` is above 8.
     pub fn remote(id: CanId, len: u8) -> Result<Frame, FrameError> {
         if len > 8 {
             return Err(FrameError::TooLong(usize::from(len)));
@@ -77,22 +83,22 @@ impl Frame {
         self.remote
     }
 
-    /// The data length code, 0 to 8. Of a remote frame: the length asked for.
+    /// The data length code, 0 to 8. For a remote frame this is the requested length.
     pub fn len(&self) -> u8 {
         self.len
     }
 
-    /// Whether the frame carries no byte.
+    /// Whether the frame has no data.
     pub fn is_empty(&self) -> bool {
         self.data().is_empty()
     }
 
-    /// The bytes carried, none for a remote frame.
+    /// The data; empty for a remote frame.
     pub fn data(&self) -> &[u8] {
         if self.remote { &[] } else { &self.data[..usize::from(self.len)] }
     }
 
-    /// The eight bytes of an SDO or LSS frame, or nothing when the frame is shorter.
+    /// The eight data bytes of an SDO or LSS frame; `None` if the frame is shorter.
     pub fn all_eight(&self) -> Option<[u8; 8]> {
         (self.len == 8 && !self.remote).then_some(self.data)
     }
@@ -121,7 +127,7 @@ impl fmt::Debug for Frame {
 impl FromStr for Frame {
     type Err = FrameError;
 
-    /// Reads `123#0011`, `12345678#`, `701#R1`; dots between bytes are allowed, as in `cansend`.
+    /// Parses `123#0011`, `12345678#`, `701#R1`; dots between bytes are allowed, as in `cansend`.
     fn from_str(text: &str) -> Result<Frame, FrameError> {
         let wrong = || FrameError::Text(text.to_owned());
         let (id, rest) = text.split_once('#').ok_or_else(wrong)?;

@@ -1,16 +1,16 @@
-//! Node-IDs and CAN identifiers, each with one checked door.
+//! Node-IDs and CAN identifiers. Their constructors check the range.
 //!
-//! The predefined connection set is that of CiA 301, 7.3.3 (function code in bits 10-7, node-ID in
-//! bits 6-0); LSS identifiers are those of CiA 305.
+//! The predefined connection set is that of CiA 301, 7.3.3: function code in bits 10 to 7, node-ID in bits 6 to 0. The
+//! LSS identifiers are those of CiA 305.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// A CANopen node-ID, 1 to 127 (CiA 301, 7.3.3). 0 addresses every node and is not a node.
+/// A CANopen node-ID, 1 to 127 (CiA 301, 7.3.3). 0 addresses all nodes and is not a node-ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct NodeId(u8);
 
-/// A number that is no node-ID.
+/// Text or a number that is not a node-ID.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{0}\" is not a node-ID (1 to 127)")]
 pub struct NodeIdError(String);
@@ -21,7 +21,10 @@ impl NodeId {
     /// The highest node-ID.
     pub const MAX: NodeId = NodeId(127);
 
-    /// Checks that `id` is within 1 to 127.
+    /// The node-ID with this number.
+    ///
+    /// # Errors
+    /// `id` is not in 1 to 127.
     pub fn new(id: u8) -> Result<NodeId, NodeIdError> {
         if (1..=127).contains(&id) { Ok(NodeId(id)) } else { Err(NodeIdError(id.to_string())) }
     }
@@ -31,7 +34,7 @@ impl NodeId {
         self.0
     }
 
-    /// Every node-ID in ascending order.
+    /// All node-IDs in ascending order.
     pub fn all() -> impl Iterator<Item = NodeId> {
         (1..=127).map(NodeId)
     }
@@ -53,7 +56,7 @@ impl fmt::Display for NodeId {
 impl FromStr for NodeId {
     type Err = NodeIdError;
 
-    /// Reads `5` or `0x7f`.
+    /// Parses `5` or `0x7f`.
     fn from_str(text: &str) -> Result<NodeId, NodeIdError> {
         parse_u32(text)
             .and_then(|number| u8::try_from(number).ok())
@@ -62,7 +65,7 @@ impl FromStr for NodeId {
     }
 }
 
-/// An unsigned number as people type it: decimal, or hexadecimal with `0x`.
+/// Parses an unsigned number that a user typed: decimal, or hexadecimal with `0x`.
 pub(crate) fn parse_u32(text: &str) -> Option<u32> {
     let digits_only = |digits: &str| !digits.is_empty() && !digits.starts_with('+');
     match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
@@ -72,7 +75,7 @@ pub(crate) fn parse_u32(text: &str) -> Option<u32> {
     }
 }
 
-/// The identifier of a CAN frame as it stands on the wire, 11 or 29 bits.
+/// The identifier of a CAN frame: 11 or 29 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum CanId {
     /// 11 bits, 000h to 7FFh.
@@ -91,17 +94,17 @@ impl CanId {
     /// LSS master to slave, 7E5h.
     pub const LSS_MASTER: CanId = CanId::Standard(0x7e5);
 
-    /// An 11-bit identifier, if `id` is at most 7FFh.
+    /// An 11-bit identifier; `None` if `id` is above 7FFh.
     pub fn standard(id: u16) -> Option<CanId> {
         (id <= 0x7ff).then_some(CanId::Standard(id))
     }
 
-    /// A 29-bit identifier, if `id` is at most 1FFF_FFFFh.
+    /// A 29-bit identifier; `None` if `id` is above 1FFF_FFFFh.
     pub fn extended(id: u32) -> Option<CanId> {
         (id <= 0x1fff_ffff).then_some(CanId::Extended(id))
     }
 
-    /// The number on the wire, without its width.
+    /// The number of the identifier, without its width.
     pub fn number(self) -> u32 {
         match self {
             CanId::Standard(id) => u32::from(id),
@@ -129,27 +132,27 @@ impl CanId {
         CanId::Standard(0x080 + u16::from(node.0))
     }
 
-    /// The node whose SDO server sends on this identifier.
+    /// The node whose SDO server sends with this identifier.
     pub fn sdo_response_node(self) -> Option<NodeId> {
         NodeId::of(self, 0x580)
     }
 
-    /// The node whose SDO server listens on this identifier.
+    /// The node whose SDO server receives this identifier.
     pub fn sdo_request_node(self) -> Option<NodeId> {
         NodeId::of(self, 0x600)
     }
 
-    /// The node whose heartbeat, boot-up or guarding answer has this identifier.
+    /// The node whose heartbeat, boot-up message or node guarding answer has this identifier.
     pub fn heartbeat_node(self) -> Option<NodeId> {
         NodeId::of(self, 0x700)
     }
 
-    /// The node whose predefined EMCY identifier this is.
+    /// The node with this predefined EMCY identifier.
     pub fn emergency_node(self) -> Option<NodeId> {
         NodeId::of(self, 0x080)
     }
 
-    /// Whether CiA 301, 7.3.5 keeps this identifier from PDOs, SYNC and EMCY set by the user.
+    /// Whether CiA 301, 7.3.5 forbids this identifier for PDOs, SYNC and EMCY.
     pub fn is_restricted(self) -> bool {
         match self {
             CanId::Extended(_) => false,

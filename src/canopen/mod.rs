@@ -1,6 +1,6 @@
-//! CiA 301 and 305 as pure state machines and codecs: frames in, frames and results out.
+//! CiA 301 and CiA 305 as state machines and codecs: they take frames, and return frames and results.
 //!
-//! No I/O, no clock, no printing, no device names. Decoding any frame of 0 to 8 bytes is total.
+//! This layer has no I/O, clock, output or device names. Decoding never panics, for any frame of 0 to 8 bytes.
 
 pub mod emcy;
 pub mod frame;

@@ -1,4 +1,4 @@
-//! Network management: commands, states, heartbeat and boot-up (CiA 301, 7.2.8).
+//! Network management (NMT): commands, states, heartbeat and boot-up (CiA 301, 7.2.8).
 
 use super::frame::Frame;
 use super::id::{CanId, NodeId};
@@ -7,20 +7,20 @@ use std::fmt;
 /// An NMT command (CiA 301, 7.2.8.3.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NmtCommand {
-    /// 01h, to OPERATIONAL.
+    /// 01h: change to OPERATIONAL.
     Start,
-    /// 02h, to STOPPED.
+    /// 02h: change to STOPPED.
     Stop,
-    /// 80h, to PRE-OPERATIONAL.
+    /// 80h: change to PRE-OPERATIONAL.
     EnterPreOperational,
-    /// 81h, restart of the application.
+    /// 81h: restart the node.
     ResetNode,
-    /// 82h, restart of the communication.
+    /// 82h: restart the communication.
     ResetCommunication,
 }
 
 impl NmtCommand {
-    /// Every command.
+    /// All commands.
     pub const ALL: [NmtCommand; 5] = [
         NmtCommand::Start,
         NmtCommand::Stop,
@@ -29,7 +29,7 @@ impl NmtCommand {
         NmtCommand::ResetCommunication,
     ];
 
-    /// The command specifier on the wire.
+    /// The command specifier: the first byte of the frame.
     pub fn specifier(self) -> u8 {
         match self {
             NmtCommand::Start => 0x01,
@@ -40,13 +40,13 @@ impl NmtCommand {
         }
     }
 
-    /// The frame for one node, or with `None` for every node.
+    /// The frame that sends the command to `node`, or to all nodes (`None`).
     pub fn frame(self, node: Option<NodeId>) -> Frame {
         Frame::pair(CanId::NMT, self.specifier(), node.map_or(0, NodeId::get))
     }
 
     /// The state a node is in when it has carried the command out; a reset ends in
-    /// PRE-OPERATIONAL unless the device starts by itself.
+    /// PRE-OPERATIONAL unless the device starts on its own.
     pub fn target(self) -> NmtState {
         match self {
             NmtCommand::Start => NmtState::Operational,
@@ -57,12 +57,12 @@ impl NmtCommand {
         }
     }
 
-    /// Whether the command restarts the node, so that a boot-up message follows.
+    /// Whether the node sends a boot-up message after the command.
     pub fn is_reset(self) -> bool {
         matches!(self, NmtCommand::ResetNode | NmtCommand::ResetCommunication)
     }
 
-    /// Reads an NMT frame: the command and its node, `None` for every node.
+    /// Parses an NMT frame: the command and the node it is for, where `None` means all nodes.
     pub fn parse(frame: &Frame) -> Option<(NmtCommand, Option<NodeId>)> {
         let [specifier, node] = *frame.data() else { return None };
         if frame.id() != CanId::NMT {
@@ -76,21 +76,21 @@ impl NmtCommand {
     }
 }
 
-/// The NMT state of a node as a heartbeat or a guarding answer tells it.
+/// The NMT state of a node, from a heartbeat or a node guarding answer (CiA 301, 7.2.8.3.2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum NmtState {
-    /// 04h. Only NMT, heartbeat, guarding and LSS.
+    /// 04h: only NMT, heartbeat, node guarding and LSS.
     Stopped,
-    /// 05h. Everything.
+    /// 05h: all services.
     Operational,
-    /// 7Fh. Everything but PDOs.
+    /// 7Fh: all services except PDOs.
     PreOperational,
     /// A code that CiA 301 does not define.
     Other(u8),
 }
 
 impl NmtState {
-    /// The state of a code, bit 7 (toggle of node guarding) left out of account.
+    /// The state with this code. Bit 7, the toggle bit of node guarding, is ignored.
     pub fn from_code(code: u8) -> NmtState {
         match code & 0x7f {
             0x04 => NmtState::Stopped,
@@ -112,18 +112,18 @@ impl fmt::Display for NmtState {
     }
 }
 
-/// What a frame on 700h + node-ID says.
+/// The content of a frame with COB-ID 700h + node-ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Life {
-    /// The node has (re)started: one byte 00h.
+    /// The boot-up message: one byte 00h. The node was started or reset.
     BootUp,
-    /// A heartbeat, or the answer to node guarding.
+    /// A heartbeat or a node guarding answer.
     State(NmtState),
 }
 
 impl Life {
-    /// Reads a heartbeat, boot-up or guarding answer. A frame that is none of them is `None`: remote
-    /// frames (guarding requests), and lengths other than 1.
+    /// Parses a heartbeat, boot-up message or node guarding answer. `None` for any other frame, including remote
+    /// frames (guarding requests) and lengths other than 1.
     pub fn parse(frame: &Frame) -> Option<(NodeId, Life)> {
         let node = frame.id().heartbeat_node()?;
         match frame.data() {
@@ -134,7 +134,7 @@ impl Life {
     }
 }
 
-/// The node that says with this frame that it has (re)started.
+/// The node that sent this boot-up message; `None` if the frame is not one.
 pub fn booted(frame: &Frame) -> Option<NodeId> {
     Life::parse(frame).filter(|(_, life)| *life == Life::BootUp).map(|(node, _)| node)
 }
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn commands_of_the_dps_manual_tables_9_to_14() {
+    fn commands_match_tables_9_to_14_of_the_dps_manual() {
         let node = NodeId::MAX;
         for (command, text) in [
             (NmtCommand::Start, "000#017F"),
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn heartbeat_boot_up_and_what_is_neither() {
+    fn only_one_byte_frames_are_heartbeats_or_boot_ups() {
         let node = NodeId::MAX;
         assert_eq!(Life::parse(&frame("77F#00")), Some((node, Life::BootUp)));
         for (text, state) in [

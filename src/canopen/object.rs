@@ -4,7 +4,7 @@ use super::id::parse_u32;
 use std::fmt;
 use std::str::FromStr;
 
-/// An entry of the object dictionary: index and sub-index (CiA 301, 7.4).
+/// The address of an object in the object dictionary: index and sub-index (CiA 301, 7.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ObjectId {
     /// 0000h to FFFFh.
@@ -13,36 +13,36 @@ pub struct ObjectId {
     pub sub: u8,
 }
 
-/// Text that is no object address.
+/// Text that is not an object address.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{0}\" is not an object (0x6130:1, 6130:1, 6130h:1 or 6130.1; the index is hexadecimal)")]
 pub struct ObjectIdError(String);
 
 impl ObjectId {
-    /// The entry at `index` and `sub`.
+    /// The object at `index` and `sub`.
     pub const fn new(index: u16, sub: u8) -> ObjectId {
         ObjectId { index, sub }
     }
 
-    /// The multiplexer as it stands in bytes 1 to 3 of an SDO frame.
+    /// The multiplexer: bytes 1 to 3 of an SDO frame (CiA 301, 7.2.4.3.3).
     pub fn multiplexer(self) -> [u8; 3] {
         let [low, high] = self.index.to_le_bytes();
         [low, high, self.sub]
     }
 
-    /// The entry that bytes 1 to 3 of an SDO frame name.
+    /// The object with this multiplexer (bytes 1 to 3 of an SDO frame).
     pub fn from_multiplexer(bytes: [u8; 3]) -> ObjectId {
         ObjectId { index: u16::from_le_bytes([bytes[0], bytes[1]]), sub: bytes[2] }
     }
 
-    /// The same index with another sub-index.
+    /// The object at the same index and another sub-index.
     pub fn with_sub(self, sub: u8) -> ObjectId {
         ObjectId { sub, ..self }
     }
 }
 
 impl fmt::Display for ObjectId {
-    /// `0x6130:1`, the index in hexadecimal and the sub-index in decimal.
+    /// `0x6130:1`: hexadecimal index, decimal sub-index.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "0x{:04X}:{}", self.index, self.sub)
     }

@@ -4,12 +4,12 @@ use super::id::CanId;
 use super::object::ObjectId;
 use std::fmt;
 
-/// The number of a transmit PDO, 1 to 512. Its parameters stand at 1800h + n-1 and 1A00h + n-1.
+/// The number n of a transmit PDO, 1 to 512. Its parameters are 1800h + n-1 (communication) and 1A00h + n-1 (mapping).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TpdoNumber(u16);
 
 impl TpdoNumber {
-    /// Checks that `number` is within 1 to 512.
+    /// The TPDO with this number; `None` if it is not in 1 to 512.
     pub fn new(number: u16) -> Option<TpdoNumber> {
         (1..=512).contains(&number).then_some(TpdoNumber(number))
     }
@@ -19,12 +19,12 @@ impl TpdoNumber {
         self.0
     }
 
-    /// A sub-index of the communication parameter record.
+    /// The object at `sub` of the communication parameter record (CiA 301, 7.5.2.37).
     pub fn communication(self, sub: u8) -> ObjectId {
         ObjectId::new(0x1800 + self.0 - 1, sub)
     }
 
-    /// A sub-index of the mapping parameter record.
+    /// The object at `sub` of the mapping parameter record (CiA 301, 7.5.2.38).
     pub fn mapping(self, sub: u8) -> ObjectId {
         ObjectId::new(0x1a00 + self.0 - 1, sub)
     }
@@ -36,7 +36,7 @@ impl fmt::Display for TpdoNumber {
     }
 }
 
-/// A COB-ID word: 1005h, 1014h or 180xh:1. Not the CAN identifier alone: bits 29 to 31 are flags.
+/// A COB-ID as in 1005h, 1014h or 18xxh:1: a CAN identifier, and flags in bits 29 to 31.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CobId(pub u32);
 
@@ -51,32 +51,32 @@ impl CobId {
     }
 
     /// Whether a remote request is answered (bit 30 clear). PDOs only: in 1005h the bit says that the
-    /// device produces SYNC.
+    /// device sends SYNC.
     pub fn allows_rtr(self) -> bool {
         self.0 & CobId::NO_RTR == 0
     }
 
-    /// The same PDO switched off (bit 31 set), every other bit kept.
+    /// The COB-ID with the PDO switched off: bit 31 set, other bits unchanged.
     pub fn switched_off(self) -> CobId {
         CobId(self.0 | CobId::INVALID)
     }
 
-    /// The same PDO switched on (bit 31 clear), every other bit kept.
+    /// The COB-ID with the PDO switched on: bit 31 clear, other bits unchanged.
     pub fn switched_on(self) -> CobId {
         CobId(self.0 & !CobId::INVALID)
     }
 
-    /// The same flags with another 11-bit identifier; `None` if `id` is more than 7FFh.
+    /// The COB-ID with another 11-bit identifier and the same bits 30 and 31; `None` if `id` is above 7FFh.
     pub fn with_standard(self, id: u32) -> Option<CobId> {
         (id <= 0x7ff).then_some(CobId(self.0 & (CobId::INVALID | CobId::NO_RTR) | id))
     }
 
-    /// The word with bit 30 left out of account: a device may decide for itself about remote requests.
+    /// The COB-ID without bit 30, for comparisons: some devices set this bit themselves.
     pub fn without_rtr(self) -> u32 {
         self.0 & !CobId::NO_RTR
     }
 
-    /// The identifier on the wire: bits 0 to 10, or with bit 29 set, bits 0 to 28.
+    /// The CAN identifier: bits 0 to 28 if bit 29 is set, else bits 0 to 10.
     pub fn can_id(self) -> CanId {
         if self.0 & CobId::EXTENDED == 0 {
             CanId::Standard((self.0 & 0x7ff) as u16)
@@ -86,18 +86,18 @@ impl CobId {
     }
 }
 
-/// When a TPDO is sent (180xh:2).
+/// The transmission type of a TPDO (18xxh:2): when it is sent (CiA 301, table 72).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transmission {
-    /// 0: with the next SYNC after a change.
+    /// 0: at the next SYNC after a change.
     AcyclicSync,
-    /// 1 to 240: with every n-th SYNC.
+    /// 1 to 240: at every n-th SYNC.
     Sync(u8),
-    /// 252, 253: on remote request only.
+    /// 252, 253: only on remote request.
     Rtr(u8),
-    /// 254: as the manufacturer says; on measuring devices mostly the event timer.
+    /// 254: manufacturer-specific; most measuring devices use the event timer.
     Manufacturer,
-    /// 255: as the device profile says: event timer, limits, delta.
+    /// 255: profile-specific: event timer, limits, delta.
     Profile,
     /// 241 to 251: reserved.
     Reserved(u8),
@@ -116,7 +116,7 @@ impl Transmission {
         }
     }
 
-    /// Whether nothing is sent without SYNC.
+    /// Whether the TPDO is sent only at a SYNC.
     pub fn needs_sync(self) -> bool {
         matches!(self, Transmission::AcyclicSync | Transmission::Sync(_))
     }
@@ -134,42 +134,42 @@ impl fmt::Display for Transmission {
     }
 }
 
-/// One entry of a mapping (1Axxh:1 …): which object, how many bits.
+/// One entry of a mapping (1Axxh:1 …): an object and its length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MappingEntry {
-    /// The object carried.
+    /// The mapped object.
     pub object: ObjectId,
     /// Its length in bits, 0 to 255.
     pub bits: u8,
 }
 
 impl MappingEntry {
-    /// Reads a mapping word: index in bits 31-16, sub-index in 15-8, bits in 7-0.
+    /// Decodes a mapping entry: index in bits 31 to 16, sub-index in bits 15 to 8, length in bits 7 to 0.
     pub fn from_word(word: u32) -> MappingEntry {
         let [bits, sub, low, high] = word.to_le_bytes();
         MappingEntry { object: ObjectId::new(u16::from_le_bytes([low, high]), sub), bits }
     }
 
-    /// The mapping word.
+    /// Encodes the mapping entry.
     pub fn word(self) -> u32 {
         let [low, high] = self.object.index.to_le_bytes();
         u32::from_le_bytes([self.bits, self.object.sub, low, high])
     }
 }
 
-/// Where a mapped object lies in the data of a PDO.
+/// The position of a mapped object in the data of a PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// What is carried.
+    /// The mapped object and its length.
     pub entry: MappingEntry,
-    /// The first bit, counted from bit 0 of byte 0.
+    /// The number of the first bit; bit 0 is the lowest bit of byte 0.
     pub start: u16,
 }
 
 impl Field {
-    /// The field's bytes in wire order out of the data of a PDO, the last one filled up with zero bits
-    /// when the length is no multiple of 8, and how many there are. `None` when the data ends before it,
-    /// and for fields of more than 64 bits.
+    /// Extracts the field from the data of a PDO: its bytes in wire order, and their number. If the length is not a
+    /// multiple of 8, the upper bits of the last byte are 0. `None` if the data ends before the field does, or if the
+    /// field has more than 64 bits.
     pub fn bytes(&self, data: &[u8]) -> Option<([u8; 8], usize)> {
         let bits = u32::from(self.entry.bits);
         let end = usize::from(self.start) + usize::from(self.entry.bits);
@@ -184,7 +184,7 @@ impl Field {
     }
 }
 
-/// The fields of a mapping, laid out one behind the other without gaps.
+/// The fields of a mapping: each starts where the previous one ends (CiA 301, 7.5.2.36).
 pub fn lay_out(mapping: &[MappingEntry]) -> Vec<Field> {
     let mut start = 0u16;
     mapping
@@ -203,8 +203,8 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn mapping_words_of_the_manuals() {
-        // MH-4: REAL32 pressure and its status; MC1609, TPDO4: the sub-index is hexadecimal.
+    fn mapping_entries_of_the_manuals_decode() {
+        // MH-4: pressure (REAL32). MC1609, TPDO4: sub-index 10h is 16.
         let pressure = MappingEntry { object: ObjectId::new(0x6130, 1), bits: 32 };
         assert_eq!(MappingEntry::from_word(0x6130_0120), pressure);
         assert_eq!(pressure.word(), 0x6130_0120);
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn cob_id_words() {
+    fn cob_id_flags_are_read_and_changed() {
         let mh4 = CobId(0x4000_0181);
         assert!(mh4.is_valid() && !mh4.allows_rtr());
         assert_eq!(mh4.can_id(), CanId::Standard(0x181));
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tpdo_by_its_mapping() {
+    fn a_tpdo_is_decoded_by_its_mapping() {
         let fields = lay_out(&[MappingEntry::from_word(0x6130_0120), MappingEntry::from_word(0x6150_0108)]);
         let data = [0x50, 0xc3, 0, 0, 3];
         assert_eq!(fields[0].bytes(&data), Some(([0x50, 0xc3, 0, 0, 0, 0, 0, 0], 4)));
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_need_not_start_at_a_byte() {
+    fn a_field_may_start_within_a_byte() {
         let entries = [
             MappingEntry { object: ObjectId::new(1, 0), bits: 3 },
             MappingEntry { object: ObjectId::new(2, 0), bits: 13 },
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn transmission_types() {
+    fn transmission_types_have_names() {
         for (code, text, needs_sync) in [
             (0, "acyclic", true),
             (1, "sync:1", true),
@@ -262,16 +262,16 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn fields_of_any_mapping_never_reach_beyond_the_data(
-            words in proptest::collection::vec(any::<u32>(), 0..10),
-            data in proptest::collection::vec(any::<u8>(), 0..=8),
-        ) {
-            let mapping: Vec<_> = words.into_iter().map(MappingEntry::from_word).collect();
-            for field in lay_out(&mapping) {
-                let fits = usize::from(field.start) + usize::from(field.entry.bits) <= data.len() * 8;
-                prop_assert_eq!(field.bytes(&data).is_some(), fits);
+            #[test]
+    fn only_fields_inside_the_data_are_extracted(
+                words in proptest::collection::vec(any::<u32>(), 0..10),
+                data in proptest::collection::vec(any::<u8>(), 0..=8),
+            ) {
+                let mapping: Vec<_> = words.into_iter().map(MappingEntry::from_word).collect();
+                for field in lay_out(&mapping) {
+                    let fits = usize::from(field.start) + usize::from(field.entry.bits) <= data.len() * 8;
+                    prop_assert_eq!(field.bytes(&data).is_some(), fits);
+                }
             }
         }
-    }
 }

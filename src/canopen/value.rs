@@ -1,4 +1,4 @@
-//! Data types of CiA 301 (7.1.6, 7.4.7) and values of them: bytes to value, text to value, and back.
+//! Data types of CiA 301 (7.1.6, 7.4.7) and their values: decoding bytes, parsing and formatting text.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,11 +6,11 @@ use std::str::FromStr;
 /// A data type of the object dictionary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DataType {
-    /// BOOLEAN, one byte in an SDO.
+    /// BOOLEAN: one byte in an SDO.
     Boolean,
-    /// UNSIGNEDn, n a multiple of 8 from 8 to 64; here in bytes, 1 to 8.
+    /// UNSIGNED8 to UNSIGNED64, with its size in bytes: 1 to 8.
     Unsigned(u8),
-    /// INTEGERn, n a multiple of 8 from 8 to 64; here in bytes, 1 to 8.
+    /// INTEGER8 to INTEGER64, with its size in bytes: 1 to 8.
     Integer(u8),
     /// REAL32.
     Real32,
@@ -20,18 +20,18 @@ pub enum DataType {
     VisibleString,
     /// OCTET_STRING.
     OctetString,
-    /// UNICODE_STRING, UTF-16 little endian.
+    /// UNICODE_STRING: UTF-16, little endian.
     UnicodeString,
     /// TIME_OF_DAY: milliseconds after midnight (28 bits), days since 1984-01-01 (16 bits).
     TimeOfDay,
     /// TIME_DIFFERENCE: milliseconds (28 bits), days (16 bits).
     TimeDifference,
-    /// DOMAIN: bytes of any length and meaning.
+    /// DOMAIN: any number of bytes.
     Domain,
 }
 
 impl DataType {
-    /// How many bytes a value has, where the type says.
+    /// The size of a value in bytes; `None` if the type has no fixed size.
     pub fn width(self) -> Option<usize> {
         match self {
             DataType::Boolean => Some(1),
@@ -43,7 +43,7 @@ impl DataType {
         }
     }
 
-    /// The type of a code in the object dictionary's type area (CiA 301, table 44), as EDS files use it.
+    /// The type with this code (CiA 301, table 44), as used in EDS files.
     pub fn from_code(code: u16) -> Option<DataType> {
         Some(match code {
             0x01 => DataType::Boolean,
@@ -75,10 +75,10 @@ impl DataType {
         })
     }
 
-    /// A value of this type out of exactly its bytes.
+    /// Decodes a value of this type. `bytes` must contain the value and nothing else.
     ///
     /// # Errors
-    /// When a type of fixed width is given another number of bytes.
+    /// The type has a fixed size and `bytes` has another one.
     pub fn decode(self, bytes: &[u8]) -> Result<Value, WidthError> {
         if let Some(width) = self.width()
             && width != bytes.len()
@@ -105,14 +105,14 @@ impl DataType {
     }
 }
 
-/// The first `width` bytes of a two's complement number, sign extended.
+/// Extends the sign of a two's complement number with `width` bytes.
 fn sign_extend(unsigned: u64, width: u8) -> i64 {
     let unused = 64 - 8 * u32::from(width.clamp(1, 8));
     (unsigned << unused).cast_signed() >> unused
 }
 
-/// VISIBLE_STRING is ISO 646, but devices send Latin-1; every byte has a character there. Zeros at the
-/// end are filling (an expedited string has four bytes, whatever its length).
+/// Decodes a VISIBLE_STRING. The standard says ISO 646, but devices send Latin-1, where each byte is a character.
+/// Trailing zeros are removed: an expedited answer has four bytes even if the string is shorter.
 fn latin1(bytes: &[u8]) -> String {
     let end = bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
     bytes[..end].iter().map(|&byte| char::from(byte)).collect()
@@ -125,7 +125,7 @@ fn utf16(bytes: &[u8]) -> String {
 }
 
 impl fmt::Display for DataType {
-    /// The names of CiA 309-3: `u8`, `i16`, `r32`, `vs` …
+    /// The name from CiA 309-3: `u8`, `i16`, `r32`, `vs` …
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             DataType::Boolean => f.write_str("b"),
@@ -143,7 +143,7 @@ impl fmt::Display for DataType {
     }
 }
 
-/// Text that names no data type.
+/// Text that is not the name of a data type.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{0}\" is not a type (b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex)")]
 pub struct DataTypeError(String);
@@ -151,7 +151,7 @@ pub struct DataTypeError(String);
 impl FromStr for DataType {
     type Err = DataTypeError;
 
-    /// Reads the names of CiA 309-3 and the aliases `bool`, `f32`, `f64`, `str`, `hex`.
+    /// Parses the names of CiA 309-3 and the aliases `bool`, `f32`, `f64`, `str`, `hex`.
     fn from_str(text: &str) -> Result<DataType, DataTypeError> {
         Ok(match text {
             "b" | "bool" => DataType::Boolean,
@@ -188,9 +188,9 @@ impl FromStr for DataType {
 /// TIME_OF_DAY or TIME_DIFFERENCE (CiA 301, 7.1.6.6 and 7.1.6.7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CanTime {
-    /// Milliseconds, 28 bits: after midnight, or of the difference.
+    /// Milliseconds (28 bits): since midnight, or of the difference.
     pub milliseconds: u32,
-    /// Days: since 1984-01-01, or of the difference.
+    /// Days since 1984-01-01, or of the difference.
     pub days: u16,
 }
 
@@ -214,9 +214,9 @@ impl CanTime {
 pub enum Value {
     /// BOOLEAN.
     Bool(bool),
-    /// Any UNSIGNEDn.
+    /// UNSIGNED8 to UNSIGNED64.
     Unsigned(u64),
-    /// Any INTEGERn.
+    /// INTEGER8 to INTEGER64.
     Integer(i64),
     /// REAL32.
     Real32(f32),
@@ -233,7 +233,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// The number as a REAL64, where the value is one. 64-bit integers lose what a REAL64 cannot hold.
+    /// The number as a REAL64; `None` if the value is not a number. Integers above 2^53 are rounded.
     pub fn as_f64(&self) -> Option<f64> {
         match self {
             Value::Unsigned(number) => Some(*number as f64),
@@ -244,7 +244,7 @@ impl Value {
         }
     }
 
-    /// The number as an unsigned one, where it is one and not negative.
+    /// The value as an unsigned integer; `None` if it is negative or not an integer. `true` is 1.
     pub fn as_u64(&self) -> Option<u64> {
         match self {
             Value::Bool(bit) => Some(u64::from(*bit)),
@@ -256,8 +256,8 @@ impl Value {
 }
 
 impl fmt::Display for Value {
-    /// The value as it is written to stdout: integers in decimal, reals as the shortest text that reads
-    /// back to the same number, bytes in hexadecimal, text as it is.
+    /// The value as printed: integers in decimal, bytes in hexadecimal, text unchanged. A real is the shortest text
+    /// that parses to the same number.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Value::Bool(bit) => write!(f, "{}", u8::from(*bit)),
@@ -336,11 +336,12 @@ pub enum ValueError {
 }
 
 impl DataType {
-    /// The bytes of a value typed by a person: decimal, `0x…` (for integers the bit pattern too),
-    /// `-5`, `1.25e3`, text, hexadecimal bytes, RFC 3339 for times, `1h30m` for time differences.
+    /// Encodes a value that a user typed: decimal, `0x…` (for signed integers also the bit pattern), `-5`, `1.25e3`,
+    /// text, hexadecimal bytes, RFC 3339 for times, `1h30m` for time differences.
     ///
     /// # Errors
-    /// Text of another form, and numbers that the type cannot hold; nothing is ever cut off.
+    /// [`ValueError::Form`] if the text has another form, [`ValueError::Range`] if the type cannot hold the number.
+    /// Values are never truncated.
     pub fn encode_text(self, text: &str) -> Result<Vec<u8>, ValueError> {
         let form = || ValueError::Form { text: text.to_owned(), data_type: self };
         match self {
@@ -433,7 +434,7 @@ fn parse_real(text: &str) -> Option<f64> {
     text.parse().ok()
 }
 
-/// Bytes in hexadecimal, two digits each, with `0x` in front and blanks between them if one likes.
+/// Parses bytes in hexadecimal, two digits each. A leading `0x` and spaces are optional. `None` for other text.
 pub fn parse_hex(text: &str) -> Option<Vec<u8>> {
     let text = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")).unwrap_or(text);
     let digits: Vec<u8> = text

@@ -1,17 +1,17 @@
-//! How many bits a frame takes on the wire (ISO 11898-1, 10.4 to 10.6): header, data, CRC, stuff bits,
-//! end of frame, and the pause that must follow.
+//! The length of a frame on the bus in bits (ISO 11898-1, 10.4 to 10.6): header, data, CRC, stuff bits, end of frame,
+//! and the intermission after it.
 
 use super::frame::Frame;
 use super::id::CanId;
 use std::time::Duration;
 
-/// Bits after the CRC: its delimiter, acknowledge and its delimiter, seven bits of end of frame. Never stuffed.
+/// Bits after the CRC, without stuff bits: CRC delimiter, acknowledge slot and delimiter, seven bits end of frame.
 const TAIL: u32 = 10;
 
-/// The pause between two frames.
+/// The intermission between two frames, in bits.
 pub const INTERMISSION: u32 = 3;
 
-/// The length of `frame` in bits, stuff bits included, the pause after it not.
+/// The length of `frame` in bits, with stuff bits, without the intermission.
 pub fn frame_bits(frame: &Frame) -> u32 {
     let mut wire = Wire::new();
     wire.put(0, 1);
@@ -40,18 +40,17 @@ pub fn frame_bits(frame: &Frame) -> u32 {
     wire.bits + TAIL
 }
 
-/// How long `frame` occupies a bus of `bit_rate` bit/s, the pause after it included.
+/// The time that `frame` and its intermission take at `bit_rate` bit/s.
 pub fn frame_time(frame: &Frame, bit_rate: u32) -> Duration {
     bit_time(frame_bits(frame) + INTERMISSION, bit_rate)
 }
 
-/// How long `bits` take at `bit_rate` bit/s. At 0 bit/s nothing is ever sent, which no bus has: taken as 1.
+/// The duration of `bits` at `bit_rate` bit/s. A bit rate of 0 counts as 1 bit/s.
 pub fn bit_time(bits: u32, bit_rate: u32) -> Duration {
     Duration::from_nanos(u64::from(bits) * 1_000_000_000 / u64::from(bit_rate.max(1)))
 }
 
-/// What decides when two frames begin at the same moment: the bits of the arbitration field in wire order,
-/// left-aligned, so that the smaller number wins.
+/// The arbitration field in wire order, left-aligned. If two frames start at the same time, the smaller number wins.
 pub fn priority(frame: &Frame) -> u32 {
     let remote = u32::from(frame.is_remote());
     match frame.id() {
@@ -62,12 +61,12 @@ pub fn priority(frame: &Frame) -> u32 {
     }
 }
 
-/// A frame on its way to the wire: counts bits and stuff bits, and carries the CRC along.
+/// Counts the bits and stuff bits of a frame, and computes its CRC.
 struct Wire {
     bits: u32,
     crc: u16,
     last: bool,
-    /// How many equal bits the last one ends; 0 before the first bit.
+    /// The number of equal bits at the end so far; 0 before the first bit.
     run: u8,
 }
 
@@ -76,9 +75,9 @@ impl Wire {
         Wire { bits: 0, crc: 0, last: false, run: 0 }
     }
 
-    /// The lowest `width` bits of `value`, the highest first.
+    /// Adds the lowest `width` bits of `value`, highest bit first.
     fn put(&mut self, value: u32, width: u32) {
-        // Not a reversed range: in a build without optimization that takes most of the simulator's time.
+        // A reversed range would take most of the simulator's time in a build without optimization.
         let mut position = width;
         while position > 0 {
             position -= 1;
@@ -102,7 +101,7 @@ impl Wire {
         }
     }
 
-    /// One bit; after five alike, a stuff bit of the other kind, which starts a run of its own.
+    /// Adds one bit, and a stuff bit of the opposite value after five equal bits. The stuff bit starts a new run.
     fn stuff(&mut self, bit: bool) {
         self.bits += 1;
         self.run = if self.last == bit { self.run + 1 } else { 1 };
@@ -137,7 +136,7 @@ mod tests {
         wire.crc
     }
 
-    /// The CRC as polynomial division over a list of bits, to check the shift register against.
+    /// The CRC by polynomial division of a list of bits, as a reference for the shift register.
     fn divided(bits: &[u8]) -> u16 {
         let mut rest: Vec<u8> = bits.iter().copied().chain([0; 15]).collect();
         let divisor = [1, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1];
@@ -161,12 +160,12 @@ mod tests {
     }
 
     #[test]
-    fn counted_by_hand() {
-        // 000# is 34 dominant bits (the CRC is 0 too). The first stuff bit stands after 5; being recessive it
-        // breaks the run, and every further 5 dominant bits bring one more: 34 / 5 = 6. 34 + 6 + 10.
+    fn lengths_match_a_count_by_hand() {
+        // 000# has 34 dominant bits; the CRC is 0 too. A recessive stuff bit follows each 5 of them: 34 / 5 = 6.
+        // Sum: 34 + 6 + 10.
         assert_eq!(frame_bits(&frame("000#")), 50);
         // 080#: with the CRC 1C05h the bits are 0000 1 0000000000000000 111 0000000 101. The run of sixteen zeros
-        // brings three stuff bits, the one of seven brings one: 34 + 4 + 10.
+        // needs three stuff bits, the run of seven needs one. Sum: 34 + 4 + 10.
         assert_eq!(crc("080#"), 7173);
         assert_eq!(frame_bits(&frame("080#")), 48);
         assert_eq!(crc("701#00"), 20568);
@@ -176,23 +175,23 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_without_stuff_bits_has_the_length_of_the_books() {
-        // 47 + 8n for 11 bits with the pause: 111 for 8 bytes.
+    fn eight_data_bytes_take_111_to_135_bits() {
+        // An 11-bit frame with intermission has 47 + 8n bits: 111 for 8 bytes.
         let plain = frame("2AA#AAAAAAAAAAAAAAAA");
-        let with_pause = frame_bits(&plain) + INTERMISSION;
-        assert!((111..=135).contains(&with_pause), "{with_pause}");
-        // 55h in the data has no run longer than 2; only header (r0, DLC) and CRC could have one.
-        assert_eq!(frame_time(&plain, 250_000), Duration::from_micros(u64::from(with_pause) * 4));
+        let with_intermission = frame_bits(&plain) + INTERMISSION;
+        assert!((111..=135).contains(&with_intermission), "{with_intermission}");
+        // Data bytes AAh have no stuff bits; only the header (r0, DLC) and the CRC can have some.
+        assert_eq!(frame_time(&plain, 250_000), Duration::from_micros(u64::from(with_intermission) * 4));
     }
 
     #[test]
-    fn a_remote_frame_carries_its_length_and_no_data() {
+    fn a_remote_frame_has_a_length_code_and_no_data() {
         assert!(frame_bits(&frame("701#R8")) < frame_bits(&frame("701#0000000000000000")));
         assert!(frame_bits(&frame("701#R1")) >= 44);
     }
 
     #[test]
-    fn the_shortest_and_the_longest_of_many() {
+    fn shortest_and_longest_frames_match_the_standard() {
         let (mut shortest, mut longest) = (u32::MAX, 0);
         for id in 0..0x800u16 {
             for fill in [0x00, 0xff, 0x55, 0x0f, 0x78, 0xe1, 0x3c, 0x87] {
@@ -206,13 +205,13 @@ mod tests {
     }
 
     #[test]
-    fn arbitration_is_decided_as_on_the_wire() {
+    fn priority_orders_frames_as_arbitration_does() {
         let order = [
             "000#",
             "07F#R",
             "080#",
             "080#R",
-            // The 29-bit frame with the same first 11 bits loses to both 11-bit frames, then its own order.
+            // A 29-bit frame with the same first 11 bits loses against both 11-bit frames.
             "02000000#",
             "02000000#R",
             "02000001#",
@@ -226,22 +225,22 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn lengths_stay_within_the_bounds_of_the_standard(
-            id in 0u32..0x2000_0000, extended: bool, remote: bool,
-            data in proptest::collection::vec(any::<u8>(), 0..=8),
-        ) {
-            let id = if extended {
-                CanId::Extended(id)
-            } else {
-                CanId::Standard(u16::try_from(id & 0x7ff).expect("11 bits"))
-            };
-            let len = u8::try_from(data.len()).expect("at most 8");
-            let frame = if remote { Frame::remote(id, len) } else { Frame::new(id, &data) }.expect("at most 8");
-            let stuffable = if extended { 54 } else { 34 } + if remote { 0 } else { 8 * u32::from(len) };
-            let bits = frame_bits(&frame);
-            prop_assert!(bits >= stuffable + TAIL);
-            prop_assert!(bits <= stuffable + TAIL + (stuffable - 1) / 4);
+            #[test]
+    fn lengths_stay_within_the_limits_of_the_standard(
+                id in 0u32..0x2000_0000, extended: bool, remote: bool,
+                data in proptest::collection::vec(any::<u8>(), 0..=8),
+            ) {
+                let id = if extended {
+                    CanId::Extended(id)
+                } else {
+                    CanId::Standard(u16::try_from(id & 0x7ff).expect("11 bits"))
+                };
+                let len = u8::try_from(data.len()).expect("at most 8");
+                let frame = if remote { Frame::remote(id, len) } else { Frame::new(id, &data) }.expect("at most 8");
+                let stuffable = if extended { 54 } else { 34 } + if remote { 0 } else { 8 * u32::from(len) };
+                let bits = frame_bits(&frame);
+                prop_assert!(bits >= stuffable + TAIL);
+                prop_assert!(bits <= stuffable + TAIL + (stuffable - 1) / 4);
+            }
         }
-    }
 }

@@ -156,12 +156,12 @@ pub enum SdoFailure {
     #[error("refused by the device ({0})")]
     Refused(AbortCode),
     /// The device did not answer in time.
-    #[error("no answer within {}{}", spoken(*.waited), if *.begun { " in the middle of the transfer" } else { "" })]
+    #[error("no answer within {}{}", spoken(*.waited), if *.started { " in the middle of the transfer" } else { "" })]
     NoAnswer {
         /// The longest wait for one answer.
         waited: Duration,
-        /// Whether the device had begun to answer.
-        begun: bool,
+        /// Whether the device answered before and then stopped.
+        started: bool,
     },
     /// The answer violates the protocol.
     #[error("{0}: {1}")]

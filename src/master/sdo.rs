@@ -436,7 +436,7 @@ impl SdoClient {
                 continue;
             }
             let waited = active.timeout(timing);
-            let mut error = active.error(SdoFailure::NoAnswer { waited, begun: has_begun });
+            let mut error = active.error(SdoFailure::NoAnswer { waited, started: has_begun });
             // The error names the deferred request, except a write that was never sent.
             let was_sent = |request: &Request| request.operation() == Operation::Read || request.refused_blocks;
             if let Some((_, request)) = active.deferred.as_ref().filter(|(_, request)| was_sent(request)) {

@@ -29,7 +29,7 @@ pub fn run(
     let mut host = Host { places, bit_rate: bus.bit_rate() };
     let now = bus.now().mono;
     for (station, out) in &mut host.places {
-        host.bit_rate.into_iter().for_each(|bit_rate| station.told_bit_rate(bit_rate));
+        host.bit_rate.into_iter().for_each(|bit_rate| station.on_bus_bit_rate(bit_rate));
         station.power_on(now, out);
     }
     loop {
@@ -74,7 +74,7 @@ impl Host {
         if bit_rate != self.bit_rate {
             self.bit_rate = bit_rate;
             for (station, _) in &mut self.places {
-                bit_rate.into_iter().for_each(|bit_rate| station.told_bit_rate(bit_rate));
+                bit_rate.into_iter().for_each(|bit_rate| station.on_bus_bit_rate(bit_rate));
             }
         }
     }

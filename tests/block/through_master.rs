@@ -247,7 +247,7 @@ fn a_device_that_does_not_even_refuse_is_asked_in_the_usual_way() {
     let start = bus.now().mono;
     let mut master = Master::new(&mut bus, Timing::default());
     let outcome = read_object(&mut master, (node(9), TEXT), Some(DataType::Domain), BlockMode::Auto, &mut |_| {});
-    assert!(matches!(outcome.unwrap().unwrap_err().failure, SdoFailure::NoAnswer { begun: false, .. }));
+    assert!(matches!(outcome.unwrap().unwrap_err().failure, SdoFailure::NoAnswer { started: false, .. }));
     let waited = master.now().since(start);
     assert!(waited < Duration::from_millis(1_100), "{waited:?}");
 }

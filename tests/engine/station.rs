@@ -249,8 +249,8 @@ impl Station for FaultyDevice {
         self.device.tuning()
     }
 
-    fn told_bit_rate(&mut self, bit_rate: u32) {
-        self.device.told_bit_rate(bit_rate);
+    fn on_bus_bit_rate(&mut self, bit_rate: u32) {
+        self.device.on_bus_bit_rate(bit_rate);
     }
 }
 

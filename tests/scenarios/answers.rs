@@ -253,7 +253,7 @@ fn no_other_frame_extends_the_wait() {
         let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 0 });
         let error = master.transfer_one(Request::read(node(), ObjectId::new(0x2000, 0))).expect("the bus works");
         let failure = error.expect_err("nobody answers").failure;
-        assert_eq!(failure, SdoFailure::NoAnswer { waited: TIMEOUT, begun: false }, "{text}");
+        assert_eq!(failure, SdoFailure::NoAnswer { waited: TIMEOUT, started: false }, "{text}");
         assert!(master.now().since_start() < TIMEOUT + Duration::from_millis(20), "{text}: {:?}", master.now());
     }
 }

@@ -162,5 +162,5 @@ fn an_answer_that_came_too_late_is_late_whenever_it_is_read() {
     let mut bus = away(inner, 0..500, false);
     let timeout = Duration::from_millis(100);
     let error = read(&mut Master::new(&mut bus, Timing { timeout, retries: 0 })).expect_err("no answer in time");
-    assert_eq!(error.failure, SdoFailure::NoAnswer { waited: timeout, begun: false });
+    assert_eq!(error.failure, SdoFailure::NoAnswer { waited: timeout, started: false });
 }

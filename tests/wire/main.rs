@@ -186,7 +186,7 @@ impl Case {
                 Ok(Answer::NodeId(node)) => node.map_or("none".to_owned(), |node| node.to_string()),
                 Err(ExchangeError::NoAnswer) => "no answer".to_owned(),
                 Err(ExchangeError::Several(frames)) => format!("several: {frames:?}"),
-                Err(ExchangeError::Refused(code)) => format!("refused: {}", code.spoken(exchange.service())),
+                Err(ExchangeError::Refused(code)) => format!("refused: {}", code.describe(exchange.service())),
                 Err(ExchangeError::Violation(violation, frame)) => format!("violation: {violation}: {frame}"),
             }),
             _ => self.outcome.clone(),
@@ -202,7 +202,7 @@ impl Case {
                 None
             }
             lss::Progress::Found(address) => Some(address.to_string()),
-            lss::Progress::Nobody => Some("nobody".to_owned()),
+            lss::Progress::NoneFound => Some("nobody".to_owned()),
             lss::Progress::Failed(error) => Some(error.to_string()),
         };
     }

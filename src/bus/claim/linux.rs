@@ -1,7 +1,7 @@
 //! Claims as Unix sockets in the abstract namespace.
 //!
 //! Two rules exclude each other's holders. A process that claims single nodes binds their names and then checks that
-//! nobody holds "every node". A process that claims every node binds that name and then checks each node. If both
+//! "every node" is free. A process that claims every node binds that name and then checks each node. If both
 //! meet, at least one sees the other; the one with single nodes releases them and waits.
 
 use super::holder::identify;
@@ -35,12 +35,12 @@ pub struct Claims {
 }
 
 impl Claims {
-    /// Claims what `claim` says on the interface `name`, under which of its names ever. `report` gets the first
-    /// holder that is waited for longer than half a second, and each one that is not waited for.
+    /// Claims the parts of `claim` on the interface `name`; all names of an interface count as one. `report` gets the
+    /// first holder that is waited for longer than half a second, and each holder that is not waited for.
     ///
     /// # Errors
-    /// [`ClaimError::InUse`] when the time to wait is over; an interrupt; a failure of the system. A system that has
-    /// no such sockets or forbids them has no claims; that is not an error.
+    /// [`ClaimError::InUse`] after the waiting time; an interrupt; a failure of the system. A system that does not have
+    /// such sockets, or forbids them, has no claims; this is not an error.
     pub fn take(
         name: &str,
         claim: &Claim,
@@ -52,11 +52,11 @@ impl Claims {
             return Ok(Claims::default());
         }
         let key = socketcan::primary_name(name).unwrap_or_else(|| name.to_owned());
-        let begun = Instant::now();
+        let started = Instant::now();
         let mut attempt = Attempt {
             key,
             if_held,
-            begun,
+            started,
             interrupts: None,
             is_reported: false,
             holder: None,
@@ -134,7 +134,7 @@ struct Attempt<'a> {
     /// The interface.
     key: String,
     if_held: IfHeld,
-    begun: Instant,
+    started: Instant,
     /// Present from the first wait on. Until then Ctrl-C ends the program by itself.
     interrupts: Option<Interrupts>,
     is_reported: bool,
@@ -223,7 +223,7 @@ impl Attempt<'_> {
             (self.report)(&in_use);
             return Ok(false);
         };
-        let waited = self.begun.elapsed();
+        let waited = self.started.elapsed();
         let left = limit.saturating_sub(waited);
         if left.is_zero() {
             return Err(in_use);
@@ -247,7 +247,7 @@ impl Attempt<'_> {
     }
 }
 
-/// What an attempt to bind a name gave.
+/// The result of an attempt to bind a name.
 enum Bound {
     Held(UnixListener),
     InUse,

@@ -133,7 +133,7 @@ impl MemoryBus {
     pub fn attach(&mut self, station: impl Station) {
         let (out, controller) = (Outbox::default(), Controller::default());
         let mut place = Place { station: Box::new(station), out, controller, next_wake: None };
-        place.station.told_bit_rate(self.bit_rate);
+        place.station.on_bus_bit_rate(self.bit_rate);
         place.station.power_on(self.now, &mut place.out);
         place.update();
         self.places.push(place);
@@ -262,7 +262,7 @@ impl BitRateControl for MemoryBus {
         self.bit_rate = bit_rate.max(1);
         self.mode = mode;
         for place in &mut self.places {
-            place.station.told_bit_rate(bit_rate);
+            place.station.on_bus_bit_rate(bit_rate);
             place.update();
         }
         Ok(())

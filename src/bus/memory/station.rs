@@ -32,7 +32,7 @@ pub trait Station: Any + Send {
     }
 
     /// Gives the bit rate of the bus in bit/s: before [`Station::power_on`], and when the program changes it.
-    fn told_bit_rate(&mut self, _bit_rate: u32) {}
+    fn on_bus_bit_rate(&mut self, _bit_rate: u32) {}
 }
 
 /// The bit rate of a station.

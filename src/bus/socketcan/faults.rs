@@ -56,7 +56,7 @@ mod tests {
     }
 
     #[test]
-    fn error_frames_of_drivers() {
+    fn error_frames_of_drivers_are_converted() {
         // Classes and data as in linux/can/error.h; the combinations are those of sja1000 and gs_usb.
         assert_eq!(of(0x040, [0; 8]), [Fault::BusOff]);
         assert_eq!(of(0x100, [0; 8]), [Fault::Restarted]);
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn no_trouble_and_unknown_trouble() {
+    fn harmless_and_unknown_classes_are_handled() {
         assert_eq!(of(0x002, [5, 0, 0, 0, 0, 0, 0, 0]), []);
         assert_eq!(of(0x200, [0, 0, 0, 0, 0, 0, 7, 7]), []);
         assert_eq!(of(0, [0; 8]), [Fault::Other]);

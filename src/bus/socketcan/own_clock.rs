@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn intervals_are_those_of_the_interface() {
+    fn intervals_follow_the_clock_of_the_interface() {
         // The clock started an hour earlier and runs 80 ppm too fast or too slow for half an hour.
         for wrong in [-80, 0, 80] {
             let mut clock = OwnClock::default();
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_is_set_does_no_harm() {
+    fn a_clock_that_is_set_never_exceeds_the_kernels_time() {
         let mut clock = OwnClock::default();
         let mut last = Mono::START;
         for n in 0..2000u64 {
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_a_frame_without_its_time_is_not_earlier() {
+    fn a_frame_after_one_without_hardware_time_is_not_earlier() {
         let mut clock = OwnClock::default();
         clock.place(us(1000), kernel(us(5000)));
         clock.pass(kernel(us(9000)));

@@ -1,48 +1,47 @@
-//! Reading many frames with one system call, each with the kernel's timestamp and drop counter.
+//! Reads many frames with one system call, each with the kernel's timestamp and drop counter.
 //!
-//! `recvmmsg` is called directly because nothing else does all three: the `socketcan` crate reads
-//! one frame a call and passes the drop counter over, nix loses control messages when its buffers
-//! are used again (nix-rust/nix pull request 2813).
+//! `recvmmsg` is called directly. The `socketcan` crate reads one frame per call and ignores the drop counter. The
+//! `nix` crate loses control messages when its buffers are reused (nix-rust/nix pull request 2813).
 
 use std::io;
 use std::os::fd::{AsRawFd, BorrowedFd};
 use std::time::Duration;
 
 const VECTOR: libc::c_uint = 64;
-/// Frames taken in by one system call at most.
+/// The largest number of frames per system call.
 pub(super) const BATCH: usize = VECTOR as usize;
-/// Room for the control messages of one frame: two timestamps and a counter take 120 bytes.
+/// The size for the control messages of one frame in bytes: two timestamps and a counter take 120.
 const CONTROL: usize = 128;
 
-/// Aligned as the kernel's control message header is.
+/// Has the alignment of the kernel's control message header.
 #[repr(C, align(8))]
 #[derive(Clone, Copy)]
 struct Control([u8; CONTROL]);
 
-/// Where the kernel puts one frame.
+/// The buffer for one frame.
 #[derive(Clone, Copy)]
 struct Slot {
     frame: libc::can_frame,
     control: Control,
-    /// How much of `frame` and `control` is filled.
+    /// The number of bytes that the kernel wrote to `frame`, and below to `control`.
     filled: usize,
     control_filled: usize,
 }
 
-/// What the kernel tells with a frame.
+/// A frame as received from the kernel.
 #[derive(Clone, Copy)]
 pub(super) struct Message {
-    /// The frame, not yet looked into.
+    /// The frame, not parsed yet.
     pub(super) frame: libc::can_frame,
-    /// When the kernel received it, since 1970.
+    /// When the kernel received it, as time since 1970.
     pub(super) wall: Option<Duration>,
-    /// When the interface saw it, by its own clock.
+    /// When the interface received it, by its own clock.
     pub(super) own: Option<Duration>,
-    /// How many frames this socket had lost in all when this one was queued.
+    /// The total number of frames that this socket had lost when this one was queued.
     pub(super) lost: Option<u32>,
 }
 
-/// The frames of the last system call that nobody has asked for yet.
+/// The frames of the last system call that were not returned yet.
 pub(super) struct Batch {
     slots: Box<[Slot; BATCH]>,
     next: usize,
@@ -61,17 +60,20 @@ impl Batch {
         while self.next < self.count {
             let slot = &self.slots[self.next];
             self.next += 1;
-            // Anything else is no classic frame, and no such thing has been asked for.
+            // Another length is not a classic frame. The socket does not request such frames.
             if slot.filled == size_of::<libc::can_frame>() {
-                let told = read_control(&slot.control.0[..slot.control_filled.min(CONTROL)]);
-                return Some(Message { frame: slot.frame, wall: told.wall, own: told.own, lost: told.lost });
+                let info = parse_control(&slot.control.0[..slot.control_filled.min(CONTROL)]);
+                return Some(Message { frame: slot.frame, wall: info.wall, own: info.own, lost: info.lost });
             }
         }
         None
     }
 
-    /// Takes in what is there: how many frames, none only with an error. With `wait` it waits for the first
-    /// one as long as the socket's `SO_RCVTIMEO` says, else not at all.
+    /// Reads all waiting frames, up to [`BATCH`], and returns their number, which is never 0. With `wait` it waits for
+    /// the first frame up to the socket's `SO_RCVTIMEO`.
+    ///
+    /// # Errors
+    /// No frame is waiting, or the socket failed.
     #[expect(unsafe_code, reason = "no safe interface to recvmmsg delivers the drop counter")]
     pub(super) fn fill(&mut self, socket: BorrowedFd<'_>, wait: bool) -> io::Result<usize> {
         let flags = if wait { libc::MSG_WAITFORONE } else { libc::MSG_DONTWAIT };
@@ -88,9 +90,8 @@ impl Batch {
             header.msg_hdr.msg_control = slot.control.0.as_mut_ptr().cast();
             header.msg_hdr.msg_controllen = CONTROL as _;
         }
-        // SAFETY: every header points to one part and to a control buffer with their true lengths;
-        // `parts` and the slots outlive the call and nothing else touches them during it. A can_frame
-        // is plain bytes, so whatever the kernel writes is a valid one.
+        // SAFETY: each header points to one part and one control buffer, with their actual lengths. `parts` and the
+        // slots outlive the call and are not used elsewhere during it. Any bytes are a valid can_frame.
         let received = unsafe {
             libc::recvmmsg(socket.as_raw_fd(), headers.as_mut_ptr(), VECTOR, flags as _, std::ptr::null_mut())
         };
@@ -104,20 +105,19 @@ impl Batch {
     }
 }
 
-/// What the control messages of a frame tell; see [`Message`].
+/// The content of the control messages of a frame; see [`Message`].
 #[derive(Debug, Default, PartialEq, Eq)]
-struct Told {
+struct ControlInfo {
     wall: Option<Duration>,
     own: Option<Duration>,
     lost: Option<u32>,
 }
 
-/// Reads timestamps and drop counter from the control messages of one frame. Each has the kernel's
-/// header (a length of the width of `size_t` that counts the header, level, type) and starts at a
-/// multiple of that width.
-fn read_control(mut control: &[u8]) -> Told {
+/// Parses timestamps and drop counter from the control messages of one frame. Each message has a header: a length of
+/// type `size_t` that includes the header, level, type. It starts at a multiple of the size of `size_t`.
+fn parse_control(mut control: &[u8]) -> ControlInfo {
     const WORD: usize = size_of::<usize>();
-    let mut told = Told::default();
+    let mut info = ControlInfo::default();
     while let Some((len, rest)) = control.split_first_chunk::<WORD>() {
         let Some((level, rest)) = rest.split_first_chunk::<4>() else { break };
         let Some((kind, _)) = rest.split_first_chunk::<4>() else { break };
@@ -125,22 +125,22 @@ fn read_control(mut control: &[u8]) -> Told {
         let Some(data) = control.get(WORD + 8..len) else { break };
         if i32::from_ne_bytes(*level) == libc::SOL_SOCKET {
             match i32::from_ne_bytes(*kind) {
-                libc::SCM_TIMESTAMPNS => told.wall = read_timespec(data),
-                // Three times: the kernel's, one that is used no more, and that of the hardware, 0 where it has none.
+                libc::SCM_TIMESTAMPNS => info.wall = read_timespec(data),
+                // Three times: of the kernel, an unused one, and of the hardware. The last is 0 if there is none.
                 libc::SCM_TIMESTAMPING => {
                     let own = data.get(data.len() / 3 * 2..).and_then(read_timespec);
-                    told.own = own.filter(|own| !own.is_zero());
+                    info.own = own.filter(|own| !own.is_zero());
                 }
-                libc::SO_RXQ_OVFL => told.lost = data.first_chunk().map(|bytes| u32::from_ne_bytes(*bytes)),
+                libc::SO_RXQ_OVFL => info.lost = data.first_chunk().map(|bytes| u32::from_ne_bytes(*bytes)),
                 _ => {}
             }
         }
         control = control.get(len.next_multiple_of(WORD)..).unwrap_or_default();
     }
-    told
+    info
 }
 
-/// A `timespec` of either width.
+/// Parses a `timespec` with 64-bit or 32-bit fields.
 fn read_timespec(data: &[u8]) -> Option<Duration> {
     let (seconds, nanos) = if data.len() >= 16 {
         let (seconds, rest) = data.split_first_chunk()?;
@@ -156,7 +156,7 @@ fn read_timespec(data: &[u8]) -> Option<Duration> {
 mod tests {
     use super::*;
 
-    /// A control message as the kernel lays it out.
+    /// A control message in the layout of the kernel.
     fn message(level: i32, kind: i32, data: &[u8]) -> Vec<u8> {
         let len = size_of::<usize>() + 8 + data.len();
         let mut bytes = [&len.to_ne_bytes()[..], &level.to_ne_bytes(), &kind.to_ne_bytes(), data].concat();
@@ -170,46 +170,47 @@ mod tests {
     }
 
     #[test]
-    fn timestamp_and_counter_in_either_order() {
+    fn timestamp_and_counter_are_read_in_either_order() {
         let counter = message(libc::SOL_SOCKET, libc::SO_RXQ_OVFL, &1829u32.to_ne_bytes());
         let time = timestamp(1_436_509_052, 249_713_001);
-        let expected = || Told { wall: Some(Duration::new(1_436_509_052, 249_713_001)), own: None, lost: Some(1829) };
-        assert_eq!(read_control(&[time.clone(), counter.clone()].concat()), expected());
-        assert_eq!(read_control(&[counter.clone(), time.clone()].concat()), expected());
+        let expected =
+            || ControlInfo { wall: Some(Duration::new(1_436_509_052, 249_713_001)), own: None, lost: Some(1829) };
+        assert_eq!(parse_control(&[time.clone(), counter.clone()].concat()), expected());
+        assert_eq!(parse_control(&[counter.clone(), time.clone()].concat()), expected());
         let other = message(libc::SOL_SOCKET, 37, &[0; 48]);
-        assert_eq!(read_control(&[other, counter, time].concat()), expected());
-        assert_eq!(read_control(&[]), Told::default());
+        assert_eq!(parse_control(&[other, counter, time].concat()), expected());
+        assert_eq!(parse_control(&[]), ControlInfo::default());
     }
 
     #[test]
-    fn the_interfaces_own_time() {
+    fn the_hardware_time_is_read() {
         let times = |numbers: [i64; 6]| {
             let data: Vec<u8> = numbers.iter().flat_map(|number| number.to_ne_bytes()).collect();
             message(libc::SOL_SOCKET, libc::SCM_TIMESTAMPING, &data)
         };
         let wall = timestamp(1_436_509_052, 5);
-        let told = read_control(&[wall.clone(), times([0, 0, 0, 0, 12, 345])].concat());
+        let info = parse_control(&[wall.clone(), times([0, 0, 0, 0, 12, 345])].concat());
         assert_eq!(
-            told,
-            Told { wall: Some(Duration::new(1_436_509_052, 5)), own: Some(Duration::new(12, 345)), lost: None }
+            info,
+            ControlInfo { wall: Some(Duration::new(1_436_509_052, 5)), own: Some(Duration::new(12, 345)), lost: None }
         );
-        assert_eq!(read_control(&times([7, 7, 7, 7, 0, 0])), Told::default(), "it has none");
-        assert_eq!(read_control(&times([7, 7, 7, 7, -1, 0])).own, Some(Duration::new(u64::MAX, 0)));
+        assert_eq!(parse_control(&times([7, 7, 7, 7, 0, 0])), ControlInfo::default(), "it has none");
+        assert_eq!(parse_control(&times([7, 7, 7, 7, -1, 0])).own, Some(Duration::new(u64::MAX, 0)));
     }
 
     #[test]
-    fn control_messages_that_lie_are_passed_over() {
+    fn invalid_control_messages_are_ignored() {
         let time = timestamp(1, 2);
         for end in 0..time.len() {
-            assert_eq!(read_control(&time[..end]), Told::default(), "{end}");
+            assert_eq!(parse_control(&time[..end]), ControlInfo::default(), "{end}");
         }
         for len in [0usize, 1, 15, 16, 1000, usize::MAX] {
             let mut wrong = time.clone();
             wrong[..size_of::<usize>()].copy_from_slice(&len.to_ne_bytes());
-            assert_eq!(read_control(&wrong), Told::default(), "{len}");
+            assert_eq!(parse_control(&wrong), ControlInfo::default(), "{len}");
         }
-        assert_eq!(read_control(&timestamp(1, 1_000_000_000)), Told::default());
-        assert_eq!(read_control(&timestamp(1, -1)), Told::default());
+        assert_eq!(parse_control(&timestamp(1, 1_000_000_000)), ControlInfo::default());
+        assert_eq!(parse_control(&timestamp(1, -1)), ControlInfo::default());
     }
 
     #[test]

@@ -106,11 +106,11 @@ pub(super) fn retime(
         let now = switch(name, before, true)?;
         let made = now.bit_rate().unwrap_or(0);
         if !is_near(made, bit_rate) {
-            let why = format!("it comes no nearer than {made} bit/s");
+            let why = format!("the nearest possible is {made} bit/s");
             return Err(BusError::BitRate { name: name.to_owned(), bit_rate, why });
         }
         if listens_only(&now) != listens {
-            return Err(if listens { no_listening(name) } else { unchanged(name, "it still only listens") });
+            return Err(if listens { no_listening(name) } else { unchanged(name, "it is still in listen-only mode") });
         }
         Ok(now)
     };
@@ -141,13 +141,13 @@ pub(super) fn put_back(name: &str, before: &Link, while_down: &mut dyn FnMut()) 
         // Time quanta give exactly the same bit timing. If the driver rejects them, the bit rate is used.
         set(timing.again())
             .or_else(|_| set(BitTiming::of_rate(timing.bit_rate)))
-            .map_err(|refusal| refusal.into_error(&format!("put {name} back to {} bit/s", timing.bit_rate), name))?;
+            .map_err(|refusal| refusal.into_error(&format!("restore {name} to {} bit/s", timing.bit_rate), name))?;
     }
     now = if before.up { switch(name, &now, true)? } else { link(name)? };
     if now.bit_rate() == timing.map(|timing| timing.bit_rate) && now.listen_only == before.listen_only {
         Ok(())
     } else {
-        Err(unchanged(name, "it is not what it was"))
+        Err(unchanged(name, "its former state is not restored"))
     }
 }
 
@@ -185,7 +185,7 @@ fn is_controller(name: &str, link: &Link) -> Result<(), BusError> {
     }
     Err(BusError::Unsupported(match &link.kind {
         Some(kind) => format!("{name} is virtual ({kind}): it has no bit rate"),
-        None => format!("{name} has no bit rate that could be set"),
+        None => format!("{name}: the bit rate of this interface cannot be set"),
     }))
 }
 
@@ -194,12 +194,12 @@ fn listens_only(link: &Link) -> bool {
 }
 
 fn no_listening(name: &str) -> BusError {
-    BusError::Unsupported(format!("{name} cannot only listen: its driver has no such mode"))
+    BusError::Unsupported(format!("{name} has no listen-only mode: its driver does not support it"))
 }
 
 fn unchanged(name: &str, what: &str) -> BusError {
     let source = std::io::Error::other(what.to_owned());
-    BusError::Io { what: format!("{name} was told, and said yes"), source }
+    BusError::Io { what: format!("the kernel accepted the change of {name} without effect"), source }
 }
 
 /// Explains why the kernel rejected a bit rate.
@@ -216,7 +216,7 @@ fn explain(refusal: Refusal, doing: &str, name: &str, bit_rate: u32, listens: bo
 
 /// Combines an error with a second one that occurred while restoring.
 fn not_put_back(error: BusError, worse: &BusError) -> BusError {
-    let what = format!("{error}; and it could not be put back as it was");
+    let what = format!("{error}; the former state could not be restored");
     BusError::Io { what, source: std::io::Error::other(worse.to_string()) }
 }
 
@@ -231,7 +231,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_right_to_set_interfaces() {
+    fn the_privilege_is_read_from_the_process_status() {
         let status =
             |effective: &str| format!("Name:\tcat\nCapPrm:\t000001ffffffffff\nCapEff:\t{effective}\nCapBnd:\t0\n");
         assert_eq!(has_net_admin(&status("000001ffffffffff")), Some(true));

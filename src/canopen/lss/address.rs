@@ -177,7 +177,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn addresses_and_ranges_as_people_type_them() {
+    fn addresses_and_ranges_are_parsed_and_printed() {
         let dps = LssAddress::new([0x362, 0x0044_3150, 0x0001_0000, 20002]);
         for text in ["0x362:0x443150:0x10000:20002", "866:4469072:65536:0x4E22"] {
             assert_eq!(text.parse(), Ok(dps), "{text}");
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_and_the_last_have_one_neighbour() {
+    fn the_lowest_and_highest_serial_number_have_one_neighbour() {
         let with_serial =
             |serial| LssAddress::new([1, 2, 3, serial]).neighbours().map(|range| range.map(|it| it.serial));
         assert_eq!(with_serial(0), [None, Some((1, u32::MAX))]);
@@ -207,26 +207,26 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn text_round_trips(parts: [u32; 4], more: (u32, u32)) {
-            let address = LssAddress::new(parts);
-            prop_assert_eq!(address.to_string().parse(), Ok(address));
-            let range = LssRange {
-                revision: (address.revision.min(more.0), address.revision.max(more.0)),
-                serial: (address.serial.min(more.1), address.serial.max(more.1)),
-                ..LssRange::from(address)
-            };
-            prop_assert_eq!(range.to_string().parse(), Ok(range));
-            prop_assert!(range.contains(&address));
-        }
+            #[test]
+            fn text_round_trips(parts: [u32; 4], more: (u32, u32)) {
+                let address = LssAddress::new(parts);
+                prop_assert_eq!(address.to_string().parse(), Ok(address));
+                let range = LssRange {
+                    revision: (address.revision.min(more.0), address.revision.max(more.0)),
+                    serial: (address.serial.min(more.1), address.serial.max(more.1)),
+                    ..LssRange::from(address)
+                };
+                prop_assert_eq!(range.to_string().parse(), Ok(range));
+                prop_assert!(range.contains(&address));
+            }
 
-        /// Between them, the neighbours and the other revisions are all but the address itself.
-        #[test]
-        fn nobody_of_the_kind_is_forgotten(revision in 0u32..4, serial in 0u32..4, other in (0u32..4, 0u32..4)) {
-            let address = LssAddress { vendor: 1, product: 2, revision, serial };
-            let other = LssAddress { revision: other.0, serial: other.1, ..address };
-            let found = address.neighbours().into_iter().chain(address.revisions()).flatten();
-            prop_assert_eq!(found.filter(|range| range.contains(&other)).count(), usize::from(other != address));
+    /// Together, the neighbours and the other revisions contain each other address once, and not the address itself.
+            #[test]
+    fn neighbours_and_revisions_cover_all_other_addresses(revision in 0u32..4, serial in 0u32..4, other in (0u32..4, 0u32..4)) {
+                let address = LssAddress { vendor: 1, product: 2, revision, serial };
+                let other = LssAddress { revision: other.0, serial: other.1, ..address };
+                let found = address.neighbours().into_iter().chain(address.revisions()).flatten();
+                prop_assert_eq!(found.filter(|range| range.contains(&other)).count(), usize::from(other != address));
+            }
         }
-    }
 }

@@ -29,23 +29,23 @@ impl ErrorCode {
             (Service::ConfigureBitTiming, 1) => "bit rate not supported",
             (Service::Store, 1) => "storing not supported",
             (Service::Store, 2) => "the memory cannot be written",
-            (_, ErrorCode::SPECIFIC) => "an error of the manufacturer's own",
+            (_, ErrorCode::SPECIFIC) => "manufacturer-specific error",
             _ => return None,
         })
     }
 
-    /// The code in words: `error 1, node-ID out of range`, `error 255, an error of the manufacturer's own: 3`.
-    pub fn spoken(self, service: Service) -> impl fmt::Display {
-        Spoken { code: self, service }
+    /// The code in words: `error 1, node-ID out of range`, `error 255, manufacturer-specific error: 3`.
+    pub fn describe(self, service: Service) -> impl fmt::Display {
+        Description { code: self, service }
     }
 }
 
-struct Spoken {
+struct Description {
     code: ErrorCode,
     service: Service,
 }
 
-impl fmt::Display for Spoken {
+impl fmt::Display for Description {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "error {}", self.code.code)?;
         if let Some(meaning) = self.code.meaning(self.service) {
@@ -60,16 +60,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_same_code_means_something_else_to_each_service() {
+    fn the_meaning_of_a_code_depends_on_the_service() {
         for (code, specific, service, words) in [
             (1, 0, Service::ConfigureNodeId, "error 1, node-ID out of range"),
             (1, 0, Service::ConfigureBitTiming, "error 1, bit rate not supported"),
             (1, 0, Service::Store, "error 1, storing not supported"),
             (2, 0, Service::Store, "error 2, the memory cannot be written"),
             (2, 0, Service::ConfigureNodeId, "error 2"),
-            (255, 3, Service::Store, "error 255, an error of the manufacturer's own: 3"),
+            (255, 3, Service::Store, "error 255, manufacturer-specific error: 3"),
         ] {
-            assert_eq!(ErrorCode { code, specific }.spoken(service).to_string(), words);
+            assert_eq!(ErrorCode { code, specific }.describe(service).to_string(), words);
         }
     }
 }

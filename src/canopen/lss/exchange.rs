@@ -92,14 +92,14 @@ impl Exchange {
         &self.heard
     }
 
-    /// The result if one slave is addressed. If all slaves send the same frame ([`Service::is_chorus`]), several count
-    /// as one.
+    /// The result if one slave is addressed. If all slaves send the same frame ([`Service::has_common_answer`]), several
+    /// answers count as one.
     ///
     /// # Errors
     /// No answer, several slaves, a rejection, or a protocol violation.
     pub fn one(&self) -> Result<Answer, ExchangeError> {
         let Some(&(frame, answer)) = self.heard.first() else { return Err(ExchangeError::NoAnswer) };
-        if self.is_crowded() && !self.service.is_chorus() {
+        if self.is_crowded() && !self.service.has_common_answer() {
             return Err(ExchangeError::Several(self.heard.iter().map(|(frame, _)| *frame).collect()));
         }
         match answer.map_err(|violation| ExchangeError::Violation(violation, frame))? {

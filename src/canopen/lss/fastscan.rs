@@ -24,13 +24,13 @@ const CHECK_EVERY: u8 = 8;
 const RESTARTS: u8 = 3;
 
 /// A number that no step asks for. No slave that follows the protocol answers it.
-const NOBODY: u32 = u32::MAX;
+const UNUSED_NUMBER: u32 = u32::MAX;
 
 /// What a step waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wait {
     /// Any slave: the longest time-out. It measures how fast the slaves answer.
-    Everybody,
+    AllSlaves,
     /// An answer within the usual time, or none.
     Bit,
     /// An expected answer, with a somewhat longer time-out.
@@ -47,7 +47,7 @@ pub struct Step {
     /// What to wait for.
     pub wait: Wait,
     /// Whether to wait until the time-out even after an answer.
-    pub to_the_end: bool,
+    pub until_timeout: bool,
     /// How often the usual time-out was too short: 0, 1, 2 …
     pub extensions: u8,
 }
@@ -60,7 +60,7 @@ pub enum Progress {
     /// The slave with this address is in configuration state.
     Found(LssAddress),
     /// There is no slave without a node-ID.
-    Nobody,
+    NoneFound,
     /// The scan failed.
     Failed(FastscanError),
 }
@@ -69,8 +69,8 @@ pub enum Progress {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FastscanError {
     /// A slave answers a request that no slave may answer.
-    #[error("a device answers every fastscan frame, whatever is asked")]
-    Babbler,
+    #[error("a device answers every fastscan request, whether it matches or not")]
+    AnswersEverything,
     /// The answers contradict each other.
     #[error("the answers about the {} contradict each other", name(*.0))]
     Unsettled(Part),
@@ -88,7 +88,7 @@ fn name(part: Part) -> &'static str {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// All slaves are asked. Their scans restart.
-    Everybody,
+    AllSlaves,
     /// An impossible request. Slaves that start a scan compare the vendor-ID.
     Probe,
     /// The bit, 31 to 0.
@@ -112,31 +112,31 @@ pub struct Fastscan {
     number: u32,
     tries: u8,
     restarts: u8,
-    /// A step got several answers.
-    crowded: bool,
+    /// Whether a step got several answers, or its answers may be late.
+    has_several_answers: bool,
     /// How often the usual time-out was too short.
     extensions: u8,
     /// Whether the impossible request got no answer.
-    probed: bool,
+    has_passed_probe: bool,
     /// How often it got an answer.
-    babbled: u8,
+    probe_answers: u8,
 }
 
 impl Fastscan {
     /// A new scan. The first request to all slaves is repeated `retries` times.
     pub fn new(retries: u32) -> Fastscan {
         Fastscan {
-            phase: Phase::Everybody,
+            phase: Phase::AllSlaves,
             retries,
             known: [None; 4],
             part: Part::Vendor,
             number: 0,
             tries: 0,
             restarts: 0,
-            crowded: false,
+            has_several_answers: false,
             extensions: 0,
-            probed: false,
-            babbled: 0,
+            has_passed_probe: false,
+            probe_answers: 0,
         }
     }
 
@@ -149,8 +149,8 @@ impl Fastscan {
     pub fn step(&self) -> Step {
         let ask = |number, bit_check, sub, next| Request::Fastscan { number, bit_check, sub, next };
         let (request, wait) = match self.phase {
-            Phase::Everybody => (ask(0, Request::EVERYBODY, Part::Vendor, Part::Vendor), Wait::Everybody),
-            Phase::Probe => (ask(NOBODY, 0, Part::Product, Part::Product), Wait::Bit),
+            Phase::AllSlaves => (ask(0, Request::ALL_SLAVES, Part::Vendor, Part::Vendor), Wait::AllSlaves),
+            Phase::Probe => (ask(UNUSED_NUMBER, 0, Part::Product, Part::Product), Wait::Bit),
             Phase::Bit(bit) => (ask(self.number, bit, self.part, self.part), Wait::Bit),
             Phase::Check(bit) => (ask(self.number, bit, self.part, self.part), Wait::Check),
             Phase::Advance => {
@@ -158,32 +158,32 @@ impl Fastscan {
                 (ask(self.number, 0, self.part, next), Wait::Advance)
             }
         };
-        Step { request, wait, to_the_end: self.crowded, extensions: self.extensions }
+        Step { request, wait, until_timeout: self.has_several_answers, extensions: self.extensions }
     }
 
     /// Ends a step that got this number of answers.
     pub fn on_end(&mut self, answers: usize) -> Progress {
-        self.crowded |= answers > 1;
+        self.has_several_answers |= answers > 1;
         let answered = answers > 0;
         match self.phase {
-            Phase::Everybody if answered => {
-                if self.probed {
+            Phase::AllSlaves if answered => {
+                if self.has_passed_probe {
                     self.look_at(Part::Vendor);
                 } else {
                     self.phase = Phase::Probe;
                 }
             }
-            Phase::Everybody if self.retries > 0 => self.retries -= 1,
-            Phase::Everybody if self.restarts > 0 => return self.unsettled(),
-            Phase::Everybody => return Progress::Nobody,
+            Phase::AllSlaves if self.retries > 0 => self.retries -= 1,
+            Phase::AllSlaves if self.restarts > 0 => return self.unsettled(),
+            Phase::AllSlaves => return Progress::NoneFound,
             Phase::Probe if answered => {
-                self.babbled += 1;
-                if self.babbled >= PROBES {
-                    return Progress::Failed(FastscanError::Babbler);
+                self.probe_answers += 1;
+                if self.probe_answers >= PROBES {
+                    return Progress::Failed(FastscanError::AnswersEverything);
                 }
             }
             Phase::Probe => {
-                self.probed = true;
+                self.has_passed_probe = true;
                 self.look_at(Part::Vendor);
             }
             Phase::Bit(bit) => {
@@ -205,7 +205,7 @@ impl Fastscan {
                     self.phase = Phase::Bit(top);
                 } else {
                     // The previous check may have been passed by a late answer, or slaves answer slowly.
-                    self.crowded = true;
+                    self.has_several_answers = true;
                     self.search();
                 }
             }
@@ -228,8 +228,8 @@ impl Fastscan {
                     self.known = [None; 4];
                 }
                 self.extensions = self.restarts;
-                self.crowded = true;
-                self.phase = Phase::Everybody;
+                self.has_several_answers = true;
+                self.phase = Phase::AllSlaves;
             }
         }
         Progress::Continue
@@ -276,7 +276,7 @@ mod tests {
 
         fn hears(&mut self, request: Request) -> bool {
             let Request::Fastscan { number, bit_check, sub, next } = request else { return false };
-            if bit_check == Request::EVERYBODY {
+            if bit_check == Request::ALL_SLAVES {
                 (self.compares, self.found) = (Part::Vendor, false);
                 return true;
             }
@@ -310,11 +310,11 @@ mod tests {
 
     #[test]
     fn nobody_and_one_who_answers_everything() {
-        assert_eq!(scan(&mut [], &mut |_| false), (Progress::Nobody, 2));
-        let mut babbled = Fastscan::new(1);
-        let mut ends = (0..1000).map(|_| babbled.on_end(1));
+        assert_eq!(scan(&mut [], &mut |_| false), (Progress::NoneFound, 2));
+        let mut probe_answers = Fastscan::new(1);
+        let mut ends = (0..1000).map(|_| probe_answers.on_end(1));
         let end = ends.find(|progress| *progress != Progress::Continue);
-        assert_eq!(end, Some(Progress::Failed(FastscanError::Babbler)));
+        assert_eq!(end, Some(Progress::Failed(FastscanError::AnswersEverything)));
     }
 
     #[test]

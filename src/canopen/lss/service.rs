@@ -89,7 +89,7 @@ impl Service {
 
     /// Whether all addressed slaves answer with the same frame. Then two frames do not prove two
     /// slaves, and one frame does not prove a single one.
-    pub fn is_chorus(self) -> bool {
+    pub fn has_common_answer(self) -> bool {
         matches!(self, Service::Identify | Service::IdentifyUnconfigured | Service::Fastscan)
     }
 }
@@ -151,7 +151,7 @@ pub enum Request {
     Fastscan {
         /// The number to compare with.
         number: u32,
-        /// The lowest bit compared, 0 to 31. 80h ([`Request::EVERYBODY`]) asks all slaves and restarts their scans.
+        /// The lowest bit compared, 0 to 31. 80h ([`Request::ALL_SLAVES`]) asks all slaves and restarts their scans.
         bit_check: u8,
         /// The part that is compared.
         sub: Part,
@@ -185,7 +185,7 @@ impl Limit {
 
 impl Request {
     /// The bit check that all slaves without a node-ID answer.
-    pub const EVERYBODY: u8 = 0x80;
+    pub const ALL_SLAVES: u8 = 0x80;
 
     /// The service that the frame belongs to.
     pub fn service(self) -> Service {
@@ -255,7 +255,7 @@ impl Request {
             0x46..=0x4b => Request::Identify(*Limit::ALL.get(usize::from(specifier - 0x46))?, number()?),
             0x4c => Request::IdentifyUnconfigured,
             0x51 => match rest {
-                [_, _, _, _, bit_check @ (0..=31 | Request::EVERYBODY), sub, next, ..] => Request::Fastscan {
+                [_, _, _, _, bit_check @ (0..=31 | Request::ALL_SLAVES), sub, next, ..] => Request::Fastscan {
                     number: number()?,
                     bit_check: *bit_check,
                     sub: Part::from_number(*sub)?,
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn every_request_as_the_standard_has_it() {
+    fn requests_match_the_frames_of_the_standard() {
         let node = NodeId::new(0x7e).ok();
         for (request, text) in [
             (Request::SwitchGlobal(Mode::Waiting), "7E5#0400000000000000"),
@@ -301,7 +301,7 @@ mod tests {
             (Request::Identify(Limit::SerialHigh, u32::MAX), "7E5#4BFFFFFFFF000000"),
             (Request::IdentifyUnconfigured, "7E5#4C00000000000000"),
             (
-                Request::Fastscan { number: 0, bit_check: Request::EVERYBODY, sub: Part::Vendor, next: Part::Vendor },
+                Request::Fastscan { number: 0, bit_check: Request::ALL_SLAVES, sub: Part::Vendor, next: Part::Vendor },
                 "7E5#5100000000800000",
             ),
             (
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_request() {
+    fn invalid_frames_are_not_requests() {
         for text in [
             "7E5#",
             "7E5#04",
@@ -339,13 +339,13 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn whatever_comes_is_read(bytes in proptest::collection::vec(any::<u8>(), 0..=8)) {
-            let frame = Frame::new(CanId::LSS_MASTER, &bytes).expect("a frame");
-            if let Some(request) = Request::parse(&frame) {
-                // The parsed request is the one sent, apart from unused bytes.
-                prop_assert_eq!(Request::parse(&request.frame()), Some(request));
+            #[test]
+    fn parsed_requests_round_trip(bytes in proptest::collection::vec(any::<u8>(), 0..=8)) {
+                let frame = Frame::new(CanId::LSS_MASTER, &bytes).expect("a frame");
+                if let Some(request) = Request::parse(&frame) {
+                    // The parsed request is the one sent, apart from unused bytes.
+                    prop_assert_eq!(Request::parse(&request.frame()), Some(request));
+                }
             }
         }
-    }
 }

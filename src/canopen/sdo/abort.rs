@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// The reason that a device gives for refusing or breaking off a transfer.
+/// The reason why a device rejected or aborted a transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct AbortCode(pub u32);
 
@@ -35,16 +35,16 @@ impl AbortCode {
     pub const NO_SUB_INDEX: AbortCode = AbortCode(0x0609_0011);
     /// Value outside its range.
     pub const VALUE: AbortCode = AbortCode(0x0609_0030);
-    /// Read of a write-only object.
+    /// Attempt to read a write-only object.
     pub const WRITE_ONLY: AbortCode = AbortCode(0x0601_0001);
-    /// Write of a read-only object.
+    /// Attempt to write a read-only object.
     pub const READ_ONLY: AbortCode = AbortCode(0x0601_0002);
-    /// Not in the present device state.
+    /// Not possible in the present device state.
     pub const DEVICE_STATE: AbortCode = AbortCode(0x0800_0022);
     /// General error.
     pub const GENERAL: AbortCode = AbortCode(0x0800_0000);
 
-    /// What the standard says the code means; `None` for codes that it does not know.
+    /// The meaning of the code in CiA 301; `None` for codes that it does not define.
     pub fn meaning(self) -> Option<&'static str> {
         Some(match self.0 {
             0x0503_0000 => "toggle bit not alternated",
@@ -84,7 +84,7 @@ impl AbortCode {
 }
 
 impl fmt::Display for AbortCode {
-    /// `0x06020000, the object does not exist`; of unknown codes the number alone.
+    /// `0x06020000, the object does not exist`; only the number for unknown codes.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "0x{:08X}", self.0)?;
         self.meaning().map_or(Ok(()), |meaning| write!(f, ", {meaning}"))
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_code_of_the_standard_has_words_and_others_stay_raw() {
+    fn codes_of_the_standard_have_a_meaning_and_others_print_as_numbers() {
         let codes = [
             0x0503_0000,
             0x0504_0000,
@@ -134,7 +134,7 @@ mod tests {
         words.sort_unstable();
         words.dedup();
         assert_eq!(words.len(), codes.len());
-        // The wrong table that many programs copied (0606_0010 …) is not the standard's.
+        // Many programs copied a wrong table (0606_0010 …). It is not that of the standard.
         assert_eq!(AbortCode(0x0606_0010).to_string(), "0x06060010");
         assert_eq!(AbortCode(0x0602_0000).to_string(), "0x06020000, the object does not exist");
     }

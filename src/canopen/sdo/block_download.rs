@@ -14,7 +14,7 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 
-/// A write in blocks, in progress.
+/// A block download in progress.
 #[derive(Clone, Debug)]
 pub struct BlockDownload {
     node: NodeId,
@@ -41,12 +41,12 @@ enum State {
         /// Segments already sent.
         sent: u8,
     },
-    /// All is acknowledged and the end frame was sent.
+    /// All segments are acknowledged and the end frame was sent.
     Ended,
 }
 
 impl BlockDownload {
-    /// A write of `data` to `object` of `node`, of any length.
+    /// A download of `data`, of any length, to `object` of `node`.
     pub fn new(node: NodeId, object: ObjectId, data: Vec<u8>, size: DownloadSize) -> BlockDownload {
         let state = State::Initiated;
         BlockDownload { node, object, data, size, state, crc: false, setbacks: 0, acknowledge: None }

@@ -15,7 +15,7 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 
-/// A read in blocks, in progress.
+/// A block upload in progress.
 #[derive(Clone, Debug)]
 pub struct BlockUpload {
     node: NodeId,

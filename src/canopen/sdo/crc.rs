@@ -2,7 +2,7 @@
 
 const POLYNOMIAL: u16 = 0x1021;
 
-/// What each value of the highest byte adds.
+/// The CRC contribution of each value of the highest byte.
 const TABLE: [u16; 256] = table();
 
 const fn table() -> [u16; 256] {
@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_example_of_the_standard() {
+    fn the_crc_of_the_standards_example_matches() {
         assert_eq!(crc16(b"123456789"), 0x31c3);
         assert_eq!(crc16(b""), 0);
         assert_eq!(crc16(&[0; 889]), 0);

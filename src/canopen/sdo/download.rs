@@ -15,7 +15,7 @@ pub enum DownloadSize {
     Omitted,
 }
 
-/// A write in progress.
+/// A download in progress.
 #[derive(Clone, Debug)]
 pub struct Download {
     node: NodeId,

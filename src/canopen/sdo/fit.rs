@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_size_the_type_decides() {
+    fn without_an_indicated_size_the_type_decides() {
         let answer = uploaded(&[0xe8, 0x03, 0xaa, 0xbb], false);
         assert_eq!(text(DataType::Unsigned(2), &answer), Ok(("1000".into(), None)));
         assert_eq!(text(DataType::VisibleString, &uploaded(b"D2X9", false)), Ok(("D2X9".into(), None)));
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn wider_is_accepted_if_the_excess_says_nothing() {
+    fn excess_bytes_must_be_zero_or_the_sign() {
         let note = Some(Note::Wider { expected: 1, found: 4 });
         assert_eq!(text(DataType::Unsigned(1), &uploaded(&[5, 0, 0, 0], true)), Ok(("5".into(), note)));
         assert_eq!(text(DataType::Integer(1), &uploaded(&[0xfb, 0xff, 0xff, 0xff], true)), Ok(("-5".into(), note)));
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn narrower_integers_are_the_same_number_and_nothing_else_is_filled_up() {
+    fn only_integers_may_be_narrower_than_their_type() {
         // MH-4, 9130h: the table says INTEGER16, text and mapping INTEGER32.
         let note = Some(Note::Narrower { expected: 4, found: 2 });
         assert_eq!(text(DataType::Integer(4), &uploaded(&[0xfe, 0xff], true)), Ok(("-2".into(), note)));
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn another_size_than_announced_is_said() {
+    fn a_size_that_differs_from_the_announced_one_is_noted() {
         let answer = Uploaded { bytes: b"MH-4-CAN".to_vec(), indicated: true, announced: Some(9), misnamed_end: false };
         let note = Some(Note::Announced { announced: 9, found: 8 });
         assert_eq!(text(DataType::VisibleString, &answer), Ok(("MH-4-CAN".into(), note)));

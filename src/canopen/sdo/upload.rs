@@ -5,23 +5,23 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 
-/// More than this no object has; it bounds what a server that never ends can make us keep.
+/// The limit for the size of an object in bytes. It limits the memory for a server that never ends the transfer.
 pub(super) const LONGEST: usize = 64 << 20;
 
-/// What a device answered to a read.
+/// The answer to an upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Uploaded {
-    /// The bytes in wire order. Of an answer without size: all four.
+    /// The bytes in wire order. An expedited answer without a size has all four.
     pub bytes: Vec<u8>,
-    /// Whether the server indicated the size (not with 42h).
+    /// Whether the server indicated the size. `false` for an expedited answer without a size (42h, 60h).
     pub indicated: bool,
-    /// The size that a segmented transfer announced.
+    /// The size in bytes that a segmented or block transfer announced.
     pub announced: Option<u32>,
-    /// Whether the end of a block transfer took back a segment that size and CRC include: it has not been.
+    /// Whether the end frame of a block transfer declared a segment invalid that size and CRC include. It is kept.
     pub misnamed_end: bool,
 }
 
-/// A read in progress.
+/// An upload in progress.
 #[derive(Clone, Debug)]
 pub struct Upload {
     node: NodeId,
@@ -39,7 +39,7 @@ enum State {
 }
 
 impl Upload {
-    /// A read of `object` from `node`. `accept_60` takes command specifier 60h for a size-less answer
+    /// An upload of `object` from `node`. With `accept_60`, command specifier 60h counts as an answer without a size
     /// ([`crate::device::quirk::Quirk::UploadAnswered60`]).
     pub fn new(node: NodeId, object: ObjectId, accept_60: bool) -> Upload {
         Upload { node, object, state: State::Initiated, bytes: Vec::new(), announced: None, accept_60 }
@@ -61,7 +61,7 @@ impl Upload {
         (self.bytes.len(), self.announced)
     }
 
-    /// Takes a frame of the bus; what is to be sent next goes to `out`.
+    /// Handles a received frame. Frames to send go to `out`.
     pub fn on_frame(&mut self, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
         if let Some(code) = abort_of(frame, self.node, self.object) {
             return Progress::Failed(TransferError::Aborted(code));

@@ -6,7 +6,7 @@ fn text(data_type: DataType, bytes: &[u8]) -> String {
 }
 
 #[test]
-fn values_of_the_manuals() {
+fn examples_of_the_manuals_decode() {
     // DPS, table 19: 50 C3 00 00 is 50000; MC1609: 7130h.2 = 7985.
     assert_eq!(text(DataType::Integer(4), &[0x50, 0xc3, 0, 0]), "50000");
     assert_eq!(text(DataType::Integer(2), &[0x31, 0x1f]), "7985");
@@ -20,7 +20,7 @@ fn values_of_the_manuals() {
 }
 
 #[test]
-fn reals_are_the_shortest_text_that_reads_back() {
+fn reals_print_the_shortest_text_that_parses_to_the_same_number() {
     assert_eq!(text(DataType::Real32, &1.1f32.to_le_bytes()), "1.1");
     assert_eq!(text(DataType::Real32, &0f32.to_le_bytes()), "0");
     assert_eq!(text(DataType::Real32, &(-0f32).to_le_bytes()), "-0");
@@ -30,7 +30,7 @@ fn reals_are_the_shortest_text_that_reads_back() {
 }
 
 #[test]
-fn times() {
+fn times_are_parsed_and_printed() {
     assert_eq!(text(DataType::TimeOfDay, &[0, 0, 0, 0, 0, 0]), "1984-01-01T00:00:00.000Z");
     let bytes = DataType::TimeOfDay.encode_text("2026-11-22T12:00:00.250Z").expect("a time");
     assert_eq!(text(DataType::TimeOfDay, &bytes), "2026-11-22T12:00:00.250Z");
@@ -40,7 +40,7 @@ fn times() {
 }
 
 #[test]
-fn text_that_does_not_fit_is_refused_never_cut() {
+fn values_out_of_range_are_rejected_not_truncated() {
     for (data_type, wrong) in [
         ("u8", "300"),
         ("u8", "-1"),
@@ -73,7 +73,7 @@ fn text_that_does_not_fit_is_refused_never_cut() {
 }
 
 #[test]
-fn hexadecimal_is_the_bit_pattern_of_a_signed_type() {
+fn signed_integers_accept_a_hexadecimal_bit_pattern() {
     assert_eq!(DataType::Integer(2).encode_text("0x8000"), Ok(vec![0, 0x80]));
     assert_eq!(DataType::Integer(2).encode_text("0x7fff"), Ok(vec![0xff, 0x7f]));
     assert_eq!(DataType::Unsigned(4).encode_text("0x65766173"), Ok(b"save".to_vec()));
@@ -81,7 +81,7 @@ fn hexadecimal_is_the_bit_pattern_of_a_signed_type() {
 }
 
 #[test]
-fn names_of_types_round_trip() {
+fn type_names_round_trip() {
     for name in
         ["b", "u8", "u16", "u24", "u32", "u64", "i8", "i24", "i64", "r32", "r64", "vs", "os", "us", "d", "t", "td"]
     {

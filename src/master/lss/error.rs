@@ -10,7 +10,7 @@ use std::time::Duration;
 #[derive(Debug, thiserror::Error)]
 pub enum LssError {
     /// The slave rejected the request with an error code.
-    #[error("LSS {service}: refused by the device ({})", code.spoken(*.service))]
+    #[error("LSS {service}: refused by the device ({})", code.describe(*.service))]
     Refused {
         /// The service.
         service: Service,

@@ -74,7 +74,7 @@ impl Lss<'_, '_> {
         self.discard_received()?;
         loop {
             let step = scan.step();
-            if step.wait == Wait::Everybody {
+            if step.wait == Wait::AllSlaves {
                 self.switch_global(Mode::Waiting)?;
                 self.is_configuring = true;
                 for address in aside {
@@ -84,7 +84,7 @@ impl Lss<'_, '_> {
             let answers = self.step(step, &mut pace)?;
             match scan.on_end(answers) {
                 Progress::Continue => {}
-                Progress::Nobody => {
+                Progress::NoneFound => {
                     self.is_configuring = !aside.is_empty();
                     return Ok(None);
                 }
@@ -100,7 +100,7 @@ impl Lss<'_, '_> {
         let sent = self.send_now(step.request.frame())?;
         let usual = sent + pace.usual(step.extensions);
         let mut deadline = match step.wait {
-            Wait::Everybody | Wait::Advance => sent + pace.timeout,
+            Wait::AllSlaves | Wait::Advance => sent + pace.timeout,
             Wait::Check => sent + pace.check(step.extensions),
             Wait::Bit => usual,
         };
@@ -113,8 +113,8 @@ impl Lss<'_, '_> {
             let at = received.at.mono;
             pace.note(at.since(sent));
             deadline = match step.wait {
-                Wait::Everybody => deadline.min(end_of_gathering(sent, at)),
-                _ if step.to_the_end => deadline.min(usual.max(at)),
+                Wait::AllSlaves => deadline.min(end_of_gathering(sent, at)),
+                _ if step.until_timeout => deadline.min(usual.max(at)),
                 _ => return Ok(answers),
             };
         }

@@ -63,7 +63,7 @@ fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
 pub(super) fn sdo(error: &SdoError) -> Words {
     let words = Words::new(error.to_string());
     match error.failure {
-        SdoFailure::NoAnswer { begun: false, .. } => words.hint("list the nodes that answer: cangauge scan"),
+        SdoFailure::NoAnswer { started: false, .. } => words.hint("list the nodes that answer: cangauge scan"),
         SdoFailure::Fit(_) => {
             words.hint(format!("show its bytes: cangauge sdo read {} {} --type hex", error.node, error.object))
         }

@@ -121,7 +121,7 @@ impl Station for Device {
         }
     }
 
-    fn told_bit_rate(&mut self, bit_rate: u32) {
+    fn on_bus_bit_rate(&mut self, bit_rate: u32) {
         let settings = &mut self.memory.settings;
         settings.set_bus_bit_rate(bit_rate, self.setup.bit_rate.is_some());
     }

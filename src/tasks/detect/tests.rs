@@ -76,7 +76,7 @@ impl BitRateControl for Wire {
             return Err(BusError::BitRate { name: "can9".into(), bit_rate, why: "no".into() });
         }
         if mode == Mode::ListenOnly && !self.listens {
-            return Err(BusError::Unsupported("can9 cannot only listen".into()));
+            return Err(BusError::Unsupported("can9 has no listen-only mode".into()));
         }
         self.set = Some((bit_rate, mode));
         self.waiting.clear();
@@ -212,7 +212,7 @@ fn unsupported_bit_rates_and_modes() {
     let mut no_listen_only = Wire { listens: false, ..Wire::at(100_000) };
     let failure = run(&mut no_listen_only, false).unwrap_err();
     let action = HostAction::Detect { interface: "can9".into() };
-    let expected = HostFailure::Unsupported { reason: "can9 cannot only listen".into(), action };
+    let expected = HostFailure::Unsupported { reason: "can9 has no listen-only mode".into(), action };
     assert!(matches!(&failure.cause, Cause::Host(cause) if *cause == expected), "{failure:?}");
     assert_eq!(no_listen_only.log, ["back"]);
     assert_eq!(run(&mut no_listen_only, true).unwrap().found, Some((100_000, By::Frames)));

@@ -15,7 +15,7 @@ fuzz_target!(|data: &[u8]| {
     for _ in 0..STEPS {
         let step = scan.step();
         let Request::Fastscan { bit_check, .. } = step.request else { panic!("{step:?}") };
-        assert!(bit_check < 32 || bit_check == Request::EVERYBODY);
+        assert!(bit_check < 32 || bit_check == Request::ALL_SLAVES);
         // Two bits a step; behind the end the answers begin anew.
         if bytes.is_empty() {
             bytes = Bytes(data);
@@ -27,7 +27,7 @@ fuzz_target!(|data: &[u8]| {
                 assert!(answers % 3 > 0, "found by silence");
                 return;
             }
-            Progress::Nobody | Progress::Failed(_) => return,
+            Progress::NoneFound | Progress::Failed(_) => return,
         }
     }
     panic!("no end");

@@ -111,7 +111,7 @@ fn a_device_that_answers_everything_is_no_address() {
     babbler.babbles = Some(false);
     let mut bus = bus_of([babbler]);
     let (found, configuring) = scan(&mut bus);
-    assert!(matches!(found, Err(LssError::Fastscan(FastscanError::Babbler))), "{found:?}");
+    assert!(matches!(found, Err(LssError::Fastscan(FastscanError::AnswersEverything))), "{found:?}");
     assert_eq!(configuring.len(), 0);
 }
 
@@ -196,7 +196,7 @@ fn answers_at_leisure_make_up_nobody() {
                 found += 1;
             }
             Ok(None) => panic!("{run}: somebody is there"),
-            Err(LssError::Fastscan(FastscanError::Babbler)) => panic!("{run}: nobody talks too much"),
+            Err(LssError::Fastscan(FastscanError::AnswersEverything)) => panic!("{run}: nobody talks too much"),
             Err(_) => given_up += 1,
         }
     }

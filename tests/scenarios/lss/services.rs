@@ -92,7 +92,7 @@ fn what_the_slave_says_is_what_it_said() {
         ),
         (
             &[0x17, 0xff, 7, 0, 0, 0, 0, 0],
-            "LSS store configuration: refused by the device (error 255, an error of the manufacturer's own: 7)",
+            "LSS store configuration: refused by the device (error 255, manufacturer-specific error: 7)",
             Some(Kind::Refused),
         ),
         (&[0x17], "LSS store configuration: frame too short: 7E4#17", Some(Kind::Unexpected)),

@@ -11,7 +11,7 @@ fn seconds(seconds: u64) -> Mono {
 struct Tuned {
     script: Script,
     tuning: Tuning,
-    told: Vec<u32>,
+    bus_rates: Vec<u32>,
 }
 
 impl Station for Tuned {
@@ -39,13 +39,13 @@ impl Station for Tuned {
         self.tuning
     }
 
-    fn told_bit_rate(&mut self, bit_rate: u32) {
-        self.told.push(bit_rate);
+    fn on_bus_bit_rate(&mut self, bit_rate: u32) {
+        self.bus_rates.push(bit_rate);
     }
 }
 
 fn tuned(tuning: Tuning, frames: &[(u64, &str)]) -> Tuned {
-    Tuned { script: script(frames), tuning, told: Vec::new() }
+    Tuned { script: script(frames), tuning, bus_rates: Vec::new() }
 }
 
 fn bus(stations: impl IntoIterator<Item = Tuned>) -> MemoryBus {
@@ -81,7 +81,7 @@ fn own(text: &str, times: u32) -> (String, u32) {
 
 #[test]
 fn without_a_receiver_no_frame_is_acknowledged() {
-    // No station, one without power, and one that only could if it were there.
+    // No station at all, and a station without power.
     for stations in [vec![], vec![tuned(Tuning::Off, &[(10, "701#00")])]] {
         let mut bus = bus(stations);
         bus.send(&frame("080#")).expect("room");
@@ -127,7 +127,7 @@ fn a_device_at_a_different_bit_rate_receives_nothing_and_makes_the_program_bus_o
     bus.send(&frame("081#")).expect("room");
     seen(&mut bus, seconds(4));
     assert_eq!((received(&bus, 0), bus.bit_rate()), (1, Some(125_000)));
-    assert_eq!(bus.stations::<Tuned>().next().map(|station| station.told.clone()), Some(vec![250_000, 125_000]));
+    assert_eq!(bus.stations::<Tuned>().next().map(|station| station.bus_rates.clone()), Some(vec![250_000, 125_000]));
 }
 
 #[test]

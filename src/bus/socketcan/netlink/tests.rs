@@ -1,10 +1,10 @@
-//! Captured from Linux 6.1 with `kvaser_pci`, `vcan` and `lo`; of the attributes name and link info were kept.
+//! Messages captured from Linux 6.1 with `kvaser_pci`, `vcan` and `lo`. Only name and link info are kept.
 
 use super::link::{BitTiming, Link, State};
 use super::message::{Reply, Request, reply};
 use proptest::prelude::*;
 
-/// can0 that was never set.
+/// can0 before its bit rate was set.
 const FRESH: &str = "cc000000100000000100000076000000000018010200000080000400000000000900030063616e3000000000a0001200\
     0800010063616e001c0003000000000000000000000000000000000000000000000000007800020034000200736a6131\
     303030000000000000000000010000001000000001000000080000000400000001000000400000000100000008000300\
@@ -21,14 +21,14 @@ const VIRTUAL: &str = "3c0000001000000001000000760000000000180104000000c10001000
     090001007663616e00000000";
 /// lo.
 const LOOPBACK: &str = "2800000010000000010000007600000000000403010000004900010000000000070003006c6f0000";
-/// There is no such interface.
+/// The error if the interface does not exist.
 const MISSING: &str = "24000000020000010100000076000000edffffff2c000000120001000100000000000000";
-/// A bit rate for an interface that is up.
+/// The error for a bit rate if the interface is up.
 const BUSY: &str = "24000000020000010100000076000000f0ffffff54000000100005000100000000000000";
 /// An acknowledge.
 const DONE: &str = "240000000200000101000000760000000000000060000000100005000100000000000000";
 
-/// Captures hold the numbers of a machine of the usual byte order.
+/// The captures are from a little-endian machine.
 fn captured(hex: &str) -> Vec<u8> {
     let nibbles: Vec<u8> = hex.chars().map(|c| u8::try_from(c.to_digit(16).unwrap()).unwrap()).collect();
     nibbles.as_chunks::<2>().0.iter().map(|[high, low]| high << 4 | low).collect()
@@ -42,7 +42,7 @@ fn link(hex: &str) -> Link {
 }
 
 #[test]
-fn a_controller_that_was_never_set() {
+fn a_controller_without_a_bit_rate_is_parsed() {
     let link = link(FRESH);
     assert!(link.is_can && link.is_controller() && !link.up);
     assert_eq!((link.bit_timing, link.bit_rate()), (None, None));
@@ -51,7 +51,7 @@ fn a_controller_that_was_never_set() {
 }
 
 #[test]
-fn a_controller_that_listens() {
+fn a_listen_only_controller_is_parsed() {
     let link = link(UP);
     assert!(link.is_can && link.is_controller() && link.up);
     let timing = BitTiming { bit_rate: 250_000, sample_point: 875, quantum: 250, segments: [6, 7, 2, 1] };
@@ -62,7 +62,7 @@ fn a_controller_that_listens() {
 }
 
 #[test]
-fn what_is_no_controller() {
+fn virtual_and_other_interfaces_are_not_controllers() {
     let link = |hex| {
         let link = link(hex);
         (link.is_can, link.is_controller(), link.up, link.kind, link.bit_timing, link.state)
@@ -72,7 +72,7 @@ fn what_is_no_controller() {
 }
 
 #[test]
-fn answers() {
+fn acknowledges_and_errors_are_parsed() {
     assert_eq!(reply(&captured(DONE), 1), Some(Reply::Done));
     assert_eq!(reply(&captured(MISSING), 1), Some(Reply::Refused(libc::ENODEV, None)));
     assert_eq!(reply(&captured(BUSY), 1), Some(Reply::Refused(libc::EBUSY, None)));
@@ -80,20 +80,20 @@ fn answers() {
     assert_eq!(reply(&[captured(DONE), captured(MISSING)].concat(), 1), Some(Reply::Done), "the first one");
 }
 
-/// As linux/netlink.h describes an error with words, with only the header of the request.
+/// An error with a message and only the header of the request, as in linux/netlink.h.
 const CAPPED: &str = "58000000020000030700000076000000eaffffff60000000100005000700000000000000320001006269747261746520\
     33303030303030206270732065786365656473207472616e73636569766572206c696d6974000000";
-/// The same with the whole request in between.
+/// The same error with the whole request before the message.
 const REPEATED: &str = "a8000000020000020700000076000000eaffffff60000000100005000700000000000000000000000200000000000000\
     00000000400012000700010063616e00340002002400010020a107000000000000000000000000000000000000000000\
     00000000000000000c000500020000000000000032000100626974726174652033303030303030206270732065786365\
     656473207472616e73636569766572206c696d6974000000";
-/// 500 kbit/s and listen-only off for interface 2, put together by hand.
+/// A request for 500 kbit/s and listen-only off for interface 2, encoded by hand.
 const SET: &str = "6000000010000500070000000000000000000000020000000000000000000000400012000700010063616e0034000200\
     2400010020a10700000000000000000000000000000000000000000000000000000000000c0005000200000000000000";
 
 #[test]
-fn the_kernels_own_words() {
+fn the_message_of_the_kernel_is_read() {
     let words = "bitrate 3000000 bps exceeds transceiver limit";
     for hex in [CAPPED, REPEATED] {
         assert_eq!(reply(&captured(hex), 7), Some(Reply::Refused(libc::EINVAL, Some(words))));
@@ -101,7 +101,7 @@ fn the_kernels_own_words() {
 }
 
 #[test]
-fn only_what_is_asked_for_is_set() {
+fn a_request_contains_only_the_given_settings() {
     let link = Link { index: 2, ..link(UP) };
     let request = |timing, listens| link.configure(timing, listens).finish(7);
     assert_eq!(request(BitTiming::of_rate(500_000), Some(false)), captured(SET));
@@ -115,13 +115,13 @@ fn only_what_is_asked_for_is_set() {
 }
 
 #[test]
-fn an_interface_is_asked_for_by_name() {
+fn an_interface_is_requested_by_name() {
     let request = Request::get("can0").finish(1);
     assert_eq!((request.len(), request[0]), (44, 44));
     assert_eq!(request[32..], *b"\x09\x00\x03\x00can0\0\0\0\0");
 }
 
-/// What is read must end without a panic, whatever it says.
+/// Parsing must not panic for any bytes.
 fn read(bytes: &[u8]) {
     if let Some(Reply::Link(header, attributes)) = reply(bytes, 1) {
         let link = Link::read(header, attributes);
