@@ -5,7 +5,6 @@ use super::text::steers;
 use crate::canopen::id::NodeId;
 use crate::measure::sample::{Number, Source, Status};
 use crate::tasks::autozero::Zeroed;
-use crate::tasks::store::Done;
 use serde::Serialize;
 use serde_json::ser::Formatter;
 use std::io::{self, Write};
@@ -62,28 +61,6 @@ pub fn zeroed(out: &mut dyn Write, node: NodeId, zeroed: &Zeroed) -> io::Result<
         notes: notes(&zeroed.notes),
     };
     line(out, &row)
-}
-
-/// What a device stored.
-pub fn stored(out: &mut dyn Write, node: NodeId, done: &Done) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Stored<'a> {
-        node: u8,
-        stored: String,
-        verified: &'a str,
-    }
-    line(out, &Stored { node: node.get(), stored: done.groups(), verified: done.verified.as_str() })
-}
-
-/// What a device restored.
-pub fn restored(out: &mut dyn Write, node: NodeId, done: &Done) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Restored<'a> {
-        node: u8,
-        restored: String,
-        verified: &'a str,
-    }
-    line(out, &Restored { node: node.get(), restored: done.groups(), verified: done.verified.as_str() })
 }
 
 /// A number as JSON has them: decimals keep their digits, what is not finite is null.

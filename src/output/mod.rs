@@ -23,6 +23,7 @@ pub mod rows;
 pub mod scan;
 pub mod sdo;
 pub mod settings;
+pub mod store;
 pub mod summary;
 pub mod table;
 pub mod text;
