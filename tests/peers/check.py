@@ -1,8 +1,8 @@
-"""Checks the two peers against each other: what master.py reads is what device.py is.
+"""Checks the two peers against each other: master.py must read the values of device.py.
 
     check.py IFACE
 
-A fault of the peers themselves must not be taken for one of cangauge.
+This separates faults of the peers from faults of cangauge.
 """
 
 import json
@@ -15,7 +15,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 
 
 def run(interface, sync):
-    """One pair of devices, asked by the master; the answers and the record of what was sent."""
+    """Reads one pair of devices with the master. Returns the answers and the record of sent TPDOs."""
     with tempfile.TemporaryDirectory() as directory:
         record = os.path.join(directory, "record.csv")
         command = [sys.executable, os.path.join(HERE, "device.py"), "--record", record, "--heartbeat", "200"]
@@ -35,7 +35,7 @@ def run(interface, sync):
 
 
 def check(answer, sent, expected, sync):
-    """Compares one answer with what the device is known to be."""
+    """Compares one answer with the known device."""
     tpdos = answer.pop("tpdos")
     inputs = answer.pop("inputs")
     node = answer["node"]

@@ -9,12 +9,12 @@ import sys
 from harness import GIVE_UP, HERE, PATIENT, devices, expected, wait_for
 
 PAIR = ("10:real32", "11:integer")
-# Nobody has this node-ID.
+# No device has this node-ID.
 ABSENT = 77
 
 
 def found(node):
-    """What `scan` has to tell of one of the PAIR, with the state left out."""
+    """The expected result of `scan` for one of the PAIR, without the state."""
     product, name = {10: (1, "python-canopen pressure transmitter"), 11: (2, "python-canopen pressure switch")}[node]
     return {"node": node, "device_type": "0x00020194", "profile": 404, "vendor": 0x1234, "product": product,
             "revision": 0x20004, "serial": 1000 + node, "name": name, "device": None}
@@ -25,17 +25,17 @@ def scan(cangauge, directory):
         nodes = cangauge.run("scan", "--format", "json", "--timeout", "2s").json()
         states = [node.pop("state") for node in nodes]
         assert nodes == [found(10), found(11)], nodes
-        # Two seconds bring twenty heartbeats.
+        # Twenty heartbeats arrive in two seconds.
         assert states == ["pre-operational"] * 2, states
         lines = cangauge.run("scan", "--timeout", "2s").out.splitlines()
         assert lines[0].split() == ["NODE", "STATE", "DEVICE", "NAME", "VENDOR", "PRODUCT", "REVISION", "SERIAL"], lines
         cells = ["10", "pre-operational", "-", "python-canopen", "pressure", "transmitter", "0x00001234", "0x00000001",
                  "0x00020004", "1010"]
         assert len(lines) == 3 and lines[1].split() == cells, lines
-        # Listening shows them by their heartbeats.
+        # A passive scan finds them by their heartbeats.
         passive = cangauge.run("scan", "--passive", "--format", "json", "--timeout", "3s").json()
         assert [(node["node"], node["state"]) for node in passive] == [(10, "pre-operational"), (11, "pre-operational")]
-        # Named nodes are waited for no longer than they need; who is not there is not invented.
+        # The scan of given nodes ends when they have answered. A missing node is not listed.
         some = cangauge.run("scan", "9-11", "--format", "json", "--timeout", "1s").json()
         assert [node["node"] for node in some] == [10, 11], some
     cangauge.run("scan", "10,11", exit=3)
@@ -46,7 +46,7 @@ def sdo_read(cangauge, directory):
         return cangauge.run(*PATIENT, "sdo", "read", *arguments, **options).out
 
     with devices(cangauge.interface, directory, *PAIR):
-        # Expedited, of every size, and with a type of the user's own.
+        # Expedited transfers of each size, and with a type given by the user.
         assert read(10, "0x1018:1") == "4660\n"
         assert read(10, "1018h:4") == "1010\n"
         assert read(10, "1000") == "131476\n"
@@ -54,10 +54,10 @@ def sdo_read(cangauge, directory):
         assert read(10, "1018:1", "--hex") == "0x34120000\n"
         assert read(10, "6130:1", "--type", "r32") == "-100\n"
         assert read(11, "9130:1", "--type", "i32") == "-5000\n"
-        # Segmented, over several segments.
+        # A transfer with several segments.
         assert read(10, "1008") == "python-canopen pressure transmitter\n"
         assert read(10, "2001", "--type", "vs") == "as delivered\n"
-        # A type that nothing tells: the bytes.
+        # The type is unknown: the bytes are printed.
         assert read(10, "2000") == "0xEFBE\n"
         assert read(10, "2000", "--type", "u16") == "48879\n"
         assert read(10, "vendor-id", "1018:4") == "vendor-id 4660\n0x1018:4 1010\n"
@@ -68,7 +68,7 @@ def sdo_read(cangauge, directory):
         line = json.loads(read(10, "1018:1", "--format", "json"))
         assert line == {"node": 10, "object": "0x1018:1", "name": "vendor-id", "type": "u32", "value": 4660,
                         "raw": "0x34120000"}, line
-        # Refused, in the device's words.
+        # Rejected: the abort code of the device is printed.
         refused = cangauge.run(*PATIENT, "sdo", "read", 10, "3000", exit=4)
         assert refused.out == "" and "0x06020000" in refused.err, refused
         refused = cangauge.run(*PATIENT, "--format", "json", "sdo", "read", 10, "1018:9", exit=4)
@@ -91,10 +91,10 @@ def sdo_write(cangauge, directory):
         assert read(10, "1017") == "0"
         write(10, "6132:1", 3, "--type", "u8")
         assert read(10, "6132:1", "--type", "u8") == "3"
-        # The type from what the object reads.
+        # The type follows from reading the object.
         write(10, "2000", 513, "--verify")
         assert read(10, "2000") == "0x0102"
-        # Segmented down.
+        # A segmented download.
         text = "a text that needs several segments"
         write(10, "2001", text, "--type", "vs", "--verify")
         assert read(10, "2001", "--type", "vs") == text
@@ -103,10 +103,10 @@ def sdo_write(cangauge, directory):
             file.write(bytes(range(1, 200)))
         write(10, "2001", "--input", path)
         assert read(10, "2001", "--hex") == "0x" + bytes(range(1, 200)).hex().upper()
-        # Several at once.
+        # Several objects in one command.
         write(11, "1017=300", "2000=1")
         assert read(11, "1017") == "300" and read(11, "2000") == "0x0100"
-        # Too large: nothing is sent. Not writable, not there: the device says so, and holds what it held.
+        # Too large: nothing is sent. Read-only or missing: the device rejects it and keeps its value.
         write(10, "1017", 65536, exit=2)
         write(10, "1018:1", 5, exit=4)
         write(10, "3000", 5, "--type", "u8", exit=4)
@@ -114,7 +114,7 @@ def sdo_write(cangauge, directory):
 
 
 def absent(cangauge, directory):
-    """Exit code 3, after all attempts and not before; what is not there is said."""
+    """Exit code 3 after all attempts; the message names the missing node."""
     with devices(cangauge.interface, directory, *PAIR):
         for command in (["sdo", "read", ABSENT, "1000"], ["sdo", "write", ABSENT, "1017", 100],
                         ["read", ABSENT], ["log", ABSENT], ["log", ABSENT, "--poll", "100ms"]):
@@ -122,7 +122,7 @@ def absent(cangauge, directory):
             assert result.seconds >= 0.6, result
             assert f"node {ABSENT}" in result.err and result.out == "", result
         assert cangauge.run("nmt", "state", ABSENT, exit=3).out.split() == [str(ABSENT), "-", "none"]
-        # Some there and some not: each is named.
+        # Some nodes exist and some do not: each is named.
         result = cangauge.run("--timeout", "2s", "nmt", "state", f"10,{ABSENT}", exit=7)
         assert f"node {ABSENT}" in result.err and "node 10" not in result.err, result
 
@@ -140,7 +140,7 @@ def nmt(cangauge, directory):
                               ("preop", "pre-operational"), ("stop", "stopped"), ("preop", "pre-operational")):
             assert state(True, command, 10) == (10, name, "heartbeat"), command
             assert state(True, "state", 10) == (10, name, "heartbeat"), command
-        # TPDOs came while it was operational, and nobody else was started.
+        # TPDOs were sent while the node was operational, and no other node was started.
         assert record(10) and not record(11)
         for command in ("reset", "reset-comm"):
             assert state(True, "start", 10)[1] == "operational"
@@ -151,9 +151,9 @@ def nmt(cangauge, directory):
         broadcast = cangauge.run("--timeout", "2s", "nmt", "preop", "all", "--format", "json").json()
         assert broadcast == [{"node": node, "state": "pre-operational", "by": "heartbeat"} for node in (10, 11)], broadcast
         cangauge.run("nmt", "start", 11, "--no-wait")
-        wait_for(lambda: record(11), lambda: "nmt start --no-wait started nobody")
+        wait_for(lambda: record(11), lambda: "nmt start --no-wait started no node")
     with devices(cangauge.interface, directory, *PAIR):
-        # No heartbeat: nothing tells the state, and it is not guessed.
+        # Without a heartbeat the state is unknown, and it is not guessed.
         answers = cangauge.run("--timeout", "1s", "nmt", "start", 10, "--format", "json")
         assert answers.json() == [{"node": 10, "state": None, "by": "none"}], answers
         cangauge.run("--timeout", "1s", "nmt", "start", 10, "--confirm", exit=3)
@@ -172,7 +172,7 @@ def read(cangauge, directory):
         text = cangauge.run(*PATIENT, "read", 11).out.split()
         assert text[:4] == ["11", "ch1", "-5", "psi"], text
         cangauge.run(*PATIENT, "read", 10, "temperature", exit=2)
-        # What it has sent counts its values up: the 5th and its two neighbours are no measurements.
+        # Each TPDO increments the value; the 5th and its two neighbours have an invalid status.
         seen = set()
         cangauge.run(*PATIENT, "log", 12, "--count", 5)
         cangauge.run("nmt", "preop", 12, "--timeout", "1s")
@@ -182,7 +182,7 @@ def read(cangauge, directory):
 
 
 def python_master_reads_simulated_devices(cangauge, directory):
-    """The other way round: all four of our devices, read by python-canopen, hold what they send."""
+    """python-canopen reads all four simulated devices; they contain what they send."""
     record = os.path.join(directory, "truth.csv")
     bench = os.path.join(directory, "bench.toml")
     with open(bench, "w", encoding="ascii") as file:
@@ -192,7 +192,7 @@ def python_master_reads_simulated_devices(cangauge, directory):
     command = [sys.executable, os.path.join(HERE, "master.py"), "--sync"]
     answers = []
     with cangauge.simulator(bench, directory) as simulator:
-        # The D-20-9's and the DPS's own types, from their manuals.
+        # The types of the D-20-9 and the DPS, from their manuals.
         for arguments in (["1", "2", "3"], ["127"]):
             own = ["--type", "6130=INTEGER32"] if arguments == ["127"] else []
             done = subprocess.run([*command, *own, cangauge.interface, *arguments], stdout=subprocess.PIPE, text=True,
@@ -213,7 +213,7 @@ def python_master_reads_simulated_devices(cangauge, directory):
         for tpdo in answer["tpdos"]:
             for values in tpdo["values"]:
                 mapped = [entry.split("/") for entry in tpdo["mapping"]]
-                # A status byte makes no row of its own.
+                # A status byte has no separate row.
                 received += [own_bytes(entry, bits, value) for (entry, bits), value in zip(mapped, values)
                              if not entry.startswith("6150")]
         of_node = [raw for _, number, _, _, _, _, raw in sent if int(number) == node]
@@ -227,7 +227,7 @@ def own_bytes(entry, bits, value):
 
 
 def contains_in_order(sent, received, tpdos):
-    """Whether every value received was sent, each TPDO's in the order in which they were sent."""
+    """Whether each received value was sent, in the same order for each TPDO."""
     count = sum(len(tpdo["values"]) * sum(not entry.startswith("6150") for entry in tpdo["mapping"]) for tpdo in tpdos)
     assert count == len(received)
     at = 0

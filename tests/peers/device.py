@@ -13,7 +13,7 @@ of psi). Of every eight values of overload the 5th is NaN and too high by its st
 too low, and the 7th a number with the status "invalid". --record writes "NODE,N,VALUE,STATUS" for
 every TPDO, value and status as they stand in the PDO, just before it is sent.
 
-2000h and 2001h are a maker's own objects, of types that no standard tells: UNSIGNED16 and a text.
+2000h and 2001h are manufacturer-specific objects: UNSIGNED16 and a text.
 """
 
 import argparse
@@ -97,7 +97,7 @@ def dictionary(kind, node, arguments):
 
 
 class Device:
-    """One node: what python-canopen's LocalNode leaves to its user."""
+    """One node: the parts that LocalNode of python-canopen does not implement."""
 
     def __init__(self, network, node, kind, arguments, log):
         self.kind, self.log = kind, log
@@ -118,7 +118,7 @@ class Device:
         self.node.nmt.state = "PRE-OPERATIONAL"
 
     def on_nmt(self, _can_id, data, _timestamp):
-        # LocalNode notes the reset and does nothing about it.
+        # LocalNode only records the reset.
         if len(data) >= 2 and data[0] in (129, 130) and data[1] in (0, self.node.id):
             with self.lock:
                 self.node.data_store.clear()
@@ -145,7 +145,7 @@ class Device:
         tpdo = self.node.tpdo[1]
         if not self.configured:
             self.configured = True
-            # Reading subscribes to the COB-ID, which is a device's own here.
+            # Reading subscribes to the COB-ID, which this device itself sends.
             tpdo.read()
             if tpdo.enabled:
                 self.node.network.unsubscribe(tpdo.cob_id)
@@ -173,7 +173,7 @@ class Device:
                     self.transmit(tpdo)
 
     def tick(self):
-        """Sends when the event timer says so; the time until it should be asked again."""
+        """Sends if the event timer has expired. Returns the time until the next call."""
         with self.lock:
             tpdo = self.tpdo()
             if self.node.nmt.state != "OPERATIONAL" or not tpdo.enabled or tpdo.trans_type < 254 or not tpdo.event_timer:
@@ -202,12 +202,12 @@ def main():
 
     if arguments.quiet:
         logging.disable()
-    # Waited for below; blocked here so that every thread started from here on inherits that.
+    # The signals are waited for below. Threads started from here on inherit the blocking.
     ends = {signal.SIGTERM, signal.SIGINT}
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
     log = open(arguments.record, "w", encoding="ascii") if arguments.record else None
     network = canopen.Network()
-    # A node's own identifiers only: Python is too slow for all that comes on a busy bus.
+    # Only the identifiers of the nodes: Python is too slow for all frames of a busy bus.
     own = [0x000, 0x080] + [0x600 + int(text.split(":")[0], 0) for text in arguments.nodes]
     filters = [{"can_id": identifier, "can_mask": 0x7FF, "extended": False} for identifier in own]
     network.connect(interface="socketcan", channel=arguments.interface, can_filters=filters)

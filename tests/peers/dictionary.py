@@ -2,7 +2,7 @@
 
 from canopen import objectdictionary as od
 
-# Name, index and type of the objects of CiA 404 (analogue inputs) that the peers know.
+# Name, index and type of the objects of CiA 404 (analogue inputs) that the peers use.
 ANALOGUE_INPUT = [
     ("AI sensor type", 0x6110, od.UNSIGNED16),
     ("AI input PV REAL32", 0x6130, od.REAL32),
@@ -40,7 +40,7 @@ def channels(name, index, data_type, values, access="ro"):
 
 
 def array(name, index, data_type):
-    """An object of a remote device, with as many sub-indices as that has."""
+    """An object of a remote device, with the same number of sub-indices."""
     entry = od.ODArray(name, index)
     entry.add_member(variable(f"{name} count", index, 0, od.UNSIGNED8))
     entry.add_member(variable(f"{name} 1", index, 1, data_type))
@@ -55,15 +55,15 @@ def communication(number):
 
 
 def mapping(number):
-    """The mapping parameters with every sub-index named, as an EDS file has them: what python-canopen writes to an
-    array ends at its present number of entries, which is 0 meanwhile."""
+    """The mapping parameters with each sub-index listed, as in an EDS file. python-canopen writes an array only up to
+    its present number of entries, which is 0 during a change."""
     entries = [(sub, od.UNSIGNED32 if sub else od.UNSIGNED8, None, "rw") for sub in range(9)]
     return record(f"TPDO {number} mapping", 0x1A00 + number - 1, entries)
 
 
 def remote_device(types):
-    """What a master knows beforehand of any measuring device with up to four TPDOs. `types` names the
-    CiA 404 objects to which this device gives a type of its own."""
+    """The object dictionary that a master uses for any measuring device with up to four TPDOs. `types` lists the
+    CiA 404 objects with a different type on this device."""
     dictionary = od.ObjectDictionary()
     objects = [
         variable("Device type", 0x1000, 0, od.UNSIGNED32),
@@ -71,7 +71,7 @@ def remote_device(types):
         variable("Device name", 0x1008, 0, od.VISIBLE_STRING),
         variable("Producer heartbeat time", 0x1017, 0, od.UNSIGNED16),
         array("Identity", 0x1018, od.UNSIGNED32),
-        # A maker's own process value, as one of the built-in devices maps it.
+        # A manufacturer-specific process value, as one of the built-in devices maps it.
         variable("Process value", 0x2090, 0, od.INTEGER32),
     ]
     objects += [array(name, index, types.get(index, kind)) for name, index, kind in ANALOGUE_INPUT]

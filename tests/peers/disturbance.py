@@ -1,5 +1,5 @@
-"""Garbage, a second master, heavy traffic, a full transmit queue and a lost link: none of them changes
-what was measured, or how long anything takes."""
+"""Garbage, a second master, heavy traffic, a full transmit queue and a lost link. None of them changes measured
+values or time-outs."""
 
 import contextlib
 import os
@@ -12,31 +12,31 @@ import time
 from harness import GIVE_UP, HERE, PATIENT, Wire, begins, devices, measured, rows_of, stands_in, wait_for
 from recording import SIMULATED, write_bench
 
-# Python-canopen devices, with the TPDOs that they send: identifier and length.
+# python-canopen devices with their TPDOs: identifier and length.
 FOREIGN = ("10:real32", "11:integer", "12:overload")
 FOREIGN_TPDOS = {(0x18A, 5), (0x18B, 4), (0x18C, 5)}
 SIMULATED_TPDOS = {(0x181, 5), (0x281, 5), (0x182, 4), (0x1FF, 4)} | {(code + 3, 8) for code in (0x180, 0x280, 0x380, 0x480)}
 
 
 def harms(identifier, data, nodes):
-    """Whether a device among `nodes` may carry the frame out: it would then not be garbage."""
+    """Whether a device of `nodes` may act on the frame. Then it is not garbage."""
     first = data[0] if data else 0
     if identifier == 0x000:
         return first in (1, 2, 128, 129, 130) and (len(data) < 2 or data[1] in {0, *nodes})
     if identifier & 0x780 == 0x600 and identifier & 0x7F in nodes:
-        # The start of a write.
+        # The request of a download.
         return first >> 5 in (1, 6)
     # LSS.
     return identifier == 0x7E5 and 0 < first < 0x60
 
 
 def garbage(nodes, tpdos, without=()):
-    """Frames of every length with every identifier, (identifier, data), but those that are no garbage: a
-    frame with the identifier and the length of a TPDO *is* that TPDO, whoever sent it."""
+    """Frames of each length with each identifier, (identifier, data), except valid ones: a frame with the
+    identifier and length of a TPDO *is* that TPDO, from any sender."""
     rng = random.Random(1)
     fillings = (lambda length: bytes(length), lambda length: b"\xff" * length, rng.randbytes)
     for identifier in range(0x800):
-        # Every identifier once; function codes of nodes that are there, of a neighbour and of nobody more often.
+        # Each identifier once; those of the nodes, of a neighbour and of a missing node more often.
         for filling in fillings if identifier & 0x7F in {0, 13, *nodes} else [rng.randbytes]:
             for length in range(9):
                 data = filling(length)
@@ -45,11 +45,11 @@ def garbage(nodes, tpdos, without=()):
 
 
 def pour(interface, nodes, tpdos, without=()):
-    """Sends the garbage, and what looks like the nodes' TPDOs and is none."""
+    """Sends the garbage, and frames similar to TPDOs of the nodes."""
     with Wire(interface) as wire:
         for number, (identifier, data) in enumerate(garbage(nodes, tpdos, without)):
             wire.send(identifier, data)
-            # Leaves the others some time.
+            # Gives the other processes some time.
             if number % 200 == 0:
                 time.sleep(0.005)
         for identifier, length in tpdos:
@@ -65,14 +65,14 @@ def pour(interface, nodes, tpdos, without=()):
                     wire.send(code + node | Wire.REMOTE, length=length)
                     wire.send(code + node | Wire.REMOTE | Wire.EXTENDED, length=length)
                     wire.send_fd(code + node, bytes(8 * length))
-        # Bus errors of every class, as a controller reports them.
+        # Bus errors of each class, as a controller reports them.
         for kind in range(10):
             for detail in (0, 0xFF):
                 wire.send(1 << kind | Wire.ERROR, bytes([detail] * 8))
 
 
 def survives(recording, rows=20):
-    """That rows go on coming."""
+    """Checks that rows are still written."""
     recording.await_rows(len(recording.rows()) + rows)
     assert recording.is_running()
 
@@ -86,14 +86,14 @@ def garbage_while_recording(cangauge, directory):
             survives(log)
             result = log.finish()
         rows = measured(result.rows())
-        # Boot-ups are among the garbage: until a node has been read again its TPDOs are not believed.
+        # The garbage contains boot-ups. TPDOs of a node are ignored until it was read again.
         for node in nodes:
             stands_in([row for row in rows if row[0] == str(node)], record(node))
     assert " 0 frames dropped" in result.err, result
 
 
 def garbage_while_sending_sync(cangauge, directory):
-    """Simulated devices; garbage that looks like SYNC makes them send, which is their right."""
+    """Simulated devices. Garbage with the identifier of SYNC makes them send, which is correct."""
     record = os.path.join(directory, "truth.csv")
     with cangauge.simulator(write_bench(directory, record), directory) as simulator:
         cangauge.run("scan", "1-3,127", "--timeout", "5s")
@@ -109,8 +109,8 @@ def garbage_while_sending_sync(cangauge, directory):
 
 
 def garbage_while_polling(cangauge, directory):
-    """SDO answers that are none. (Requests to the same nodes are a second master's: see below.) The devices
-    miss frames when so many come, so that some requests have to be repeated."""
+    """Invalid SDO answers. (Requests to the same nodes belong to a second master: see below.) The devices miss
+    frames under this load, so some requests are repeated."""
     with devices(cangauge.interface, directory, "10:real32", "11:integer", quiet=True):
         with cangauge.running("--timeout", "500ms", "--retries", "20", "log", "10,11", "--poll", "20ms", directory=directory) as log:
             log.await_rows(10)
@@ -121,12 +121,12 @@ def garbage_while_polling(cangauge, directory):
 
 
 def garbage_while_listening(cangauge, directory):
-    """--passive, which learns from what it sees."""
+    """--passive, which uses only received frames."""
     record = os.path.join(directory, "truth.csv")
     with cangauge.simulator(write_bench(directory, record), directory) as simulator:
         cangauge.run("scan", "127", "--timeout", "5s")
         with cangauge.running("log", "127", "--passive", "--device", "dps", directory=directory) as log:
-            # It sends nothing, so it shows that it listens by its first row.
+            # It sends nothing. Its first row shows that it listens.
             while not log.rows():
                 cangauge.run("nmt", "start", "127", "--no-wait")
                 assert log.is_running(), log.text("err")
@@ -143,7 +143,7 @@ def garbage_while_listening(cangauge, directory):
 
 @contextlib.contextmanager
 def rival(interface, *nodes):
-    """A second master that reads the same nodes."""
+    """Starts a second master that reads the same nodes."""
     command = [sys.executable, os.path.join(HERE, "rival.py"), interface, *map(str, nodes)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
     try:
@@ -159,7 +159,7 @@ def rival(interface, *nodes):
 
 
 def second_master(cangauge, directory):
-    """Two masters on one SDO channel: never a wrong value, and expedited reads always succeed."""
+    """Two masters on one SDO channel: no wrong value, and expedited reads always succeed."""
     def rounds(count, *arguments):
         return [cangauge.run("--timeout", "5s", *arguments, exit=None) for _ in range(count)]
 
@@ -170,7 +170,7 @@ def second_master(cangauge, directory):
                 for result in rounds(20, "sdo", "read", 10, object):
                     assert (result.exit, result.out) == (0, text), result
             results = rounds(20, "sdo", "read", 10, "1008")
-            # One server, two segmented transfers: it may have to say no, but not something else.
+            # Two segmented transfers on one server: an error is allowed, a wrong value is not.
             assert all(result.out == (name if result.exit == 0 else "") for result in results), [str(r) for r in results]
             print(f"       segmented: {sum(result.exit == 0 for result in results)} of {len(results)}")
             for r in results:
@@ -192,7 +192,7 @@ def second_master(cangauge, directory):
 
 @contextlib.contextmanager
 def traffic(interface, *arguments):
-    """cangen without a pause."""
+    """Runs cangen without pauses."""
     process = subprocess.Popen(["cangen", interface, "-g", "0", "-i", *arguments], stdin=subprocess.DEVNULL)
     try:
         yield process
@@ -203,9 +203,9 @@ def traffic(interface, *arguments):
 
 
 def heavy_traffic(cangauge, directory):
-    """As much as one CPU can send, all the time: deadlines stay where they are. If traffic put them off,
-    none of these would ever end."""
-    # Frames of nobody; TPDOs; answers of the very node that is asked for, to another question.
+    """Continuous traffic at the limit of one CPU does not delay deadlines. If it did, these commands would not
+    end."""
+    # Unrelated frames; TPDOs; answers of the requested node to another request.
     for arguments in (["-I", "123", "-L", "8"], ["-I", "1CD", "-L", "8"], ["-I", "5CD", "-L", "8", "-D", "4300100111223344"]):
         with traffic(cangauge.interface, *arguments):
             for command in (["sdo", "read", 77, "1000"], ["log", 77], ["read", 77]):
@@ -221,7 +221,7 @@ def heavy_traffic(cangauge, directory):
 
 @contextlib.contextmanager
 def slow_queue(interface, rate, limit):
-    """A transmit queue of a few frames on a slow wire."""
+    """Sets a short transmit queue and a slow bus."""
     subprocess.run(["tc", "qdisc", "replace", "dev", interface, "root", "tbf", "rate", rate, "burst", "100", "limit",
                     str(16 * limit)], check=True)
     try:
@@ -232,7 +232,7 @@ def slow_queue(interface, rate, limit):
 
 
 def full_queue(cangauge, directory, here, there):
-    """127 requests into a queue of ten frames: nobody is missed, and the kernel did refuse some."""
+    """127 requests through a queue of ten frames: all nodes are found, though the queue was full at times."""
     nodes = list(range(20, 120))
     bench = ",".join(f"{kind}@{node}" for kind, node in zip(["mh4", "dps", "d20", "mc1609"] * 25, nodes))
     with devices(there, directory, "10:real32", "11:integer"), cangauge.simulator(bench, directory, bus=there):
@@ -244,20 +244,20 @@ def full_queue(cangauge, directory, here, there):
         assert slow == fast, (slow, fast)
         assert refused > 0, "the queue was never full"
         print(f"       refused by the queue: {refused} frames")
-        # A queue that never empties: nobody acknowledges.
+        # The queue never empties: no node acknowledges.
         with slow_queue(here, "8bit", 2):
             result = cangauge.run("scan", exit=5, bus=here)
             assert "transmit queue is full" in result.err and "acknowledge" in result.err, result
 
 
 def nobody_acknowledges(cangauge, directory, here, there):
-    """A plug that is out for a while: log says that nothing comes, and goes on when it is back."""
+    """The cable is unplugged for a while: log reports it and continues afterwards."""
     with devices(there, directory, "10:real32", sync=1) as record:
         with cangauge.running("log", 10, "--sync", "20ms", directory=directory, bus=here) as log:
             log.await_rows(10)
             with slow_queue(here, "8bit", 2):
                 log.await_words("node 10: silent")
-                # Long enough for the queue to be given up, however fast the machine is.
+                # Long enough for the time-out of the queue on any machine.
                 time.sleep(2)
                 assert log.is_running(), log.text("err")
             survives(log)
@@ -271,8 +271,8 @@ def link(interface, state):
 
 
 def link_lost(cangauge, directory, here, there):
-    """The interface goes down while log records, and comes back: what was sent in between is missing, and
-    nothing else; it is said; the exit code is that of success."""
+    """The interface goes down and up during a recording. Only frames sent in between are missing, log reports it,
+    and the exit code is 0."""
     for arguments in ([], ["--sync", "20ms"], ["--poll", "20ms"]):
         sync = ["--sync"] == arguments[:1]
         with devices(there, directory, "10:real32", sync=1 if sync else 0) as record:
@@ -291,12 +291,12 @@ def link_lost(cangauge, directory, here, there):
             if arguments[:1] == ["--poll"]:
                 assert {row[:5] for row in rows} == {("10", "ch1", "-100", "bar", "ok")}, set(rows)
                 continue
-            # What was sent is unique, so that every row has its place in the record, and only one hole is there.
+            # All values are unique, so each row has one place in the record. There must be one gap.
             sent = record()
             places = [sent.index(row) for row in rows]
             holes = [place for place, following in zip(places, places[1:]) if following != place + 1]
             assert places[0] == 0 and places == sorted(places) and len(holes) <= 1, (arguments, places)
-    # Down from the beginning: nothing is recorded.
+    # The interface is down from the start: nothing is recorded.
     link(here, "down")
     try:
         result = cangauge.run("log", 10, exit=5, bus=here)
@@ -308,5 +308,5 @@ def link_lost(cangauge, directory, here, there):
 
 CHECKS = [garbage_while_recording, garbage_while_sending_sync, garbage_while_polling, garbage_while_listening, second_master,
           heavy_traffic]
-# These need two interfaces that are the ends of one wire.
+# These need two interfaces that are the ends of one bus.
 PAIR_CHECKS = [full_queue, nobody_acknowledges, link_lost]

@@ -1,4 +1,4 @@
-"""What the checks of cangauge against foreign peers have in common: the program, the devices, the wire.
+"""Common parts of the checks of cangauge with foreign peers: the program, the devices, the bus.
 
 Nothing here or in the checks waits for a length of time that a slow machine could outlast: what has to
 come is waited for until it comes, within GIVE_UP.
@@ -19,17 +19,17 @@ import time
 import traceback
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-# A machine that needs longer is taken for hung.
+# After this time the machine counts as hung.
 GIVE_UP = 120
-# The patience of cangauge where an answer has to come, however slow the machine.
+# The time-out of cangauge for expected answers; long enough for a slow machine.
 PATIENT = ["--timeout", "20s"]
 
-# Columns of layout "long" that say what was measured, without when.
+# The columns of layout "long" without the times.
 MEASURED = ["node", "signal", "value", "unit", "status", "raw"]
 
 
 class Result:
-    """How a run of cangauge ended."""
+    """The result of a run of cangauge."""
 
     def __init__(self, command, exit_code, out, err, seconds):
         self.command, self.exit, self.out, self.err, self.seconds = command, exit_code, out, err, seconds
@@ -54,17 +54,17 @@ class Cangauge:
         return [self.binary, "--bus", bus or self.interface, *map(str, arguments)]
 
     def run(self, *arguments, exit=0, bus=None):
-        """Runs it to its end; `exit` is the exit code that it must have, None for any."""
+        """Runs it and waits for its end. `exit` is the expected exit code; None allows any."""
         command = self.command(*arguments, bus=bus)
-        begun = time.monotonic()
+        started = time.monotonic()
         done = subprocess.run(command, capture_output=True, text=True, timeout=GIVE_UP, stdin=subprocess.DEVNULL)
-        result = Result(command, done.returncode, done.stdout, done.stderr, time.monotonic() - begun)
+        result = Result(command, done.returncode, done.stdout, done.stderr, time.monotonic() - started)
         assert exit is None or result.exit == exit, f"exit code {exit} expected\n{result}"
         return result
 
     @contextlib.contextmanager
     def running(self, *arguments, directory, bus=None):
-        """Runs it beside the caller, who may end it with Recording.finish()."""
+        """Starts it in the background. The caller may end it with Recording.finish()."""
         recording = Recording(self.command(*arguments, bus=bus), directory)
         try:
             yield recording
@@ -73,19 +73,19 @@ class Cangauge:
 
     @contextlib.contextmanager
     def simulator(self, bench, directory, bus=None):
-        """Simulated devices in a process of their own, on the interface as anybody else."""
+        """Simulated devices in a separate process, connected to the interface like any program."""
         with self.running("sim", bench, directory=directory, bus=bus) as simulator:
             wait_for(lambda: "simulating" in simulator.text("err"), lambda: f"no simulator: {simulator.text('err')}")
             yield simulator
 
 
 class Recording:
-    """A run of cangauge that goes on; what it writes lies in files."""
+    """A run of cangauge in the background. Its output goes to files."""
 
     def __init__(self, command, directory):
         self.command = command
         self.paths = {name: os.path.join(directory, f"{time.monotonic_ns()}.{name}") for name in ("out", "err")}
-        self.begun = time.monotonic()
+        self.started = time.monotonic()
         with open(self.paths["out"], "w") as out, open(self.paths["err"], "w") as err:
             self.process = subprocess.Popen(command, stdout=out, stderr=err, stdin=subprocess.DEVNULL)
 
@@ -99,22 +99,22 @@ class Recording:
         return rows_of(text[: text.rfind("\n") + 1])
 
     def await_rows(self, count):
-        """Waits until so many rows stand there."""
+        """Waits for this number of rows."""
         wait_for(lambda: len(self.rows()) >= count, lambda: f"{len(self.rows())} of {count} rows\n{self.text('err')}", self.process)
 
     def await_words(self, words):
-        """Waits until it has said this on stderr."""
+        """Waits for this text on stderr."""
         wait_for(lambda: words in self.text("err"), lambda: f"never said: {words}\n{self.text('err')}", self.process)
 
     def is_running(self):
         return self.process.poll() is None
 
     def finish(self, exit=0, end=signal.SIGINT):
-        """Ends it as Ctrl-C does (None: waits for its own end) and takes the result."""
+        """Ends it with Ctrl-C (None: waits until it ends) and returns the result."""
         if end:
             self.process.send_signal(end)
         self.process.wait(GIVE_UP)
-        seconds = time.monotonic() - self.begun
+        seconds = time.monotonic() - self.started
         result = Result(self.command, self.process.returncode, self.text("out"), self.text("err"), seconds)
         assert exit is None or result.exit == exit, f"exit code {exit} expected\n{result}"
         return result
@@ -130,7 +130,7 @@ class Recording:
 
 
 def wait_for(condition, complaint, process=None):
-    """Waits until something is so. `process` has to do it: when it has ended, it never will."""
+    """Waits for a condition. `process` makes it true, so the end of the process is a failure."""
     until = time.monotonic() + GIVE_UP
     while not condition():
         ended = process is not None and process.poll() is not None
@@ -144,14 +144,14 @@ def rows_of(text):
 
 
 def measured(rows, *nodes):
-    """What was measured, in order: tuples of MEASURED. With `nodes` only theirs."""
+    """The measured values in order: tuples of MEASURED. With `nodes`, only of these nodes."""
     return [tuple(row[name] for name in MEASURED) for row in rows if not nodes or int(row["node"]) in nodes]
 
 
 @contextlib.contextmanager
 def devices(interface, directory, *nodes, period=20, sync=0, heartbeat=0, quiet=False):
-    """python-canopen devices as device.py makes them. Gives a function that reads their record, as the
-    rows that cangauge should make of it."""
+    """python-canopen devices made by device.py. Yields a function that converts their record to the rows that
+    cangauge should print."""
     record = os.path.join(directory, f"{time.monotonic_ns()}.record")
     command = [sys.executable, os.path.join(HERE, "device.py"), "--record", record, "--period", str(period)]
     command += ["--heartbeat", str(heartbeat), *(["--sync", str(sync)] if sync else []), *(["--quiet"] if quiet else []), interface, *nodes]
@@ -174,8 +174,8 @@ def devices(interface, directory, *nodes, period=20, sync=0, heartbeat=0, quiet=
 
 
 def expected(kind, node, number):
-    """The row of the n-th TPDO of a device of device.py: written from its documentation, not from
-    cangauge's code."""
+    """The row for the n-th TPDO of a device of device.py. It follows the documentation, not the code of
+    cangauge."""
     if kind == "integer":
         value = 7 * number - 5000
         return (str(node), "ch1", f"{value / 1000:.3f}", "psi", "", wire("<i", value))
@@ -192,7 +192,7 @@ def wire(form, value):
 
 
 def begins(rows, record):
-    """That the rows are the beginning of the record: none missing, none invented, none changed."""
+    """Checks that the rows are the beginning of the record: none missing, added or changed."""
     assert rows, "no rows"
     assert len(rows) <= len(record), f"{len(rows)} rows of {len(record)} TPDOs"
     for number, (row, sent) in enumerate(zip(rows, record)):
@@ -200,7 +200,7 @@ def begins(rows, record):
 
 
 def stands_in(rows, record):
-    """That every row is of the record, in its order: none invented, none changed, none twice. Some may be missing."""
+    """Checks that each row is in the record, in the same order: none added, changed or repeated. Rows may be missing."""
     assert rows, "no rows"
     rest = iter(record)
     for number, row in enumerate(rows):
@@ -208,14 +208,14 @@ def stands_in(rows, record):
 
 
 class Wire:
-    """A raw CAN socket for what no well-behaved participant sends."""
+    """A raw CAN socket for frames that no correct participant sends."""
 
     ERROR, REMOTE, EXTENDED = socket.CAN_ERR_FLAG, socket.CAN_RTR_FLAG, socket.CAN_EFF_FLAG
 
     def __init__(self, interface):
         self.socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         self.socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
-        # Sends only.
+        # It only sends.
         self.socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, b"")
         self.socket.bind((interface,))
 
@@ -239,14 +239,14 @@ class Wire:
                 self.socket.send(frame)
                 return
             except OSError as error:
-                # No room in the queue: later.
+                # The queue is full: retry later.
                 if error.errno != 105:
                     raise
                 time.sleep(0.001)
 
 
 def run_checks(binary, interface, checks, names=()):
-    """Makes the checks, each given with its arguments, or those of them that are named; the exit status."""
+    """Runs the checks, each with its arguments, or only those named. Returns the exit status."""
     known = {check.__name__ for check, _ in checks}
     assert set(names) <= known, f"there are: {', '.join(sorted(known))}"
     os.environ.update(LC_ALL="C", TERM="dumb")
@@ -256,18 +256,18 @@ def run_checks(binary, interface, checks, names=()):
     for check, arguments in checks:
         if names and check.__name__ not in names:
             continue
-        begun = time.monotonic()
+        started = time.monotonic()
         with tempfile.TemporaryDirectory() as directory:
             try:
                 check(cangauge, directory, *arguments)
                 passed += 1
                 word = "ok    "
-            # Whatever went wrong, the next check is made.
+            # A failed check does not stop the next one.
             except Exception:
                 traceback.print_exc(file=sys.stdout)
                 failed.append(check.__name__)
                 word = "FAILED"
-        print(f"{word} {check.__name__} ({time.monotonic() - begun:.1f} s)", flush=True)
+        print(f"{word} {check.__name__} ({time.monotonic() - started:.1f} s)", flush=True)
     if failed:
         print(f"failed: {', '.join(failed)}")
     print(f"{passed} passed, {len(failed)} failed")

@@ -1,4 +1,4 @@
-"""autozero, store and restore: python-canopen as master of simulated devices, and as device of cangauge."""
+"""autozero, store and restore: python-canopen as master of simulated devices, and as device for cangauge."""
 
 import contextlib
 import struct
@@ -26,8 +26,8 @@ def network(interface):
 
 
 def asked(interface, work):
-    """What python-canopen gets of node 5. A connection of its own each time: it would take answers to cangauge, heard
-    meanwhile, for its own."""
+    """Reads from node 5 with python-canopen. Each call opens a connection: an open one would accept answers to
+    cangauge as its own."""
     with network(interface) as bus:
         node = bus.add_node(5, remote_device({}))
         node.sdo.RESPONSE_TIMEOUT = GIVE_UP
@@ -35,7 +35,7 @@ def asked(interface, work):
 
 
 def python_master_stores_and_restores(cangauge, directory):
-    """What python-canopen stores in a simulated device is there after a reset, and gone when it restores."""
+    """Settings that python-canopen stores remain after a reset, and are lost after a restore."""
     def ask(work):
         return asked(cangauge.interface, work)
 
@@ -57,21 +57,21 @@ def python_master_stores_and_restores(cangauge, directory):
         ask(lambda node: node.restore())
         assert ask(lambda node: node.sdo[0x1017].raw) == 300, "before the reset"
         assert after_reset() == (0, 3)
-        # A zero that python-canopen has set, cangauge stores and proves.
+        # python-canopen sets a zero offset; cangauge stores and verifies it.
         ask(lambda node: node.sdo.download(AUTOZERO, 1, b"zero"))
         offset = ask(lambda node: node.sdo.upload(OFFSET, 1))
         assert struct.unpack("<f", offset)[0] < 0, offset
         assert cangauge.run(*PATIENT, "store", 5, "--verify").out == "5  all  reset\n"
         after_reset()
         assert ask(lambda node: node.sdo.upload(OFFSET, 1)) == offset
-        # The other way round: what cangauge restores, python-canopen reads.
+        # In the other direction, cangauge restores and python-canopen reads.
         assert cangauge.run(*PATIENT, "restore", 5, "--reset").out == "5  all  reset\n"
         assert ask(lambda node: node.sdo.upload(OFFSET, 1)) == bytes(4)
         simulator.finish()
 
 
 class Transmitter:
-    """A python-canopen pressure transmitter with a zero, and with a list of the signatures that it got."""
+    """A python-canopen pressure transmitter with a zero offset and a list of the received signatures."""
 
     def __init__(self, bus):
         dictionary = od.ObjectDictionary()
@@ -102,7 +102,7 @@ class Transmitter:
         self.node.nmt.state = "PRE-OPERATIONAL"
 
     def commanded(self, _, data, __):
-        # A reset without a boot-up is all that python-canopen makes of it by itself.
+        # python-canopen itself only records the reset and sends no boot-up.
         if bytes(data) in (b"\x81\x05", b"\x81\x00"):
             self.boot()
 
@@ -123,25 +123,25 @@ class Transmitter:
             return shown.get(index)
 
     def take(self):
-        """The signatures since the last time."""
+        """The signatures since the previous call."""
         with self.lock:
             taken, self.signatures = self.signatures, []
             return taken
 
 
 def python_device_is_zeroed_and_stores(cangauge, directory):
-    """The frames that cangauge writes mean what a foreign device takes them for, each of them once."""
+    """A foreign device understands the writes of cangauge, and gets each once."""
     with network(cangauge.interface) as bus:
         device = Transmitter(bus)
         done = cangauge.run(*PATIENT, "autozero", 5, "--samples", 2, "--format", "json")
         assert done.json() == [{"node": 5, "channel": 1, "unit": "bar", "before": UNZEROED, "after": 0.0,
                                 "offset_before": 0.0, "offset": -UNZEROED, "stored": False}], done
         assert device.take() == [(AUTOZERO, 1, b"zero")]
-        # The line that it prints takes it back.
+        # The printed command undoes it.
         undo = next(line.split("undo: cangauge ")[1] for line in done.err.splitlines() if "undo" in line)
         cangauge.run(*PATIENT, *undo.split())
         assert device.offset == 0.0
-        # It has no group of its own for the application: everything is stored.
+        # It has no separate group "application": all settings are stored.
         done = cangauge.run(*PATIENT, "autozero", 5, "--samples", 2, "--store", "--format", "json")
         assert done.json()[0]["stored"] is True, done
         assert device.take() == [(AUTOZERO, 1, b"zero"), (STORE, 1, b"save")]

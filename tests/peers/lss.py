@@ -2,8 +2,8 @@
 
     lss.py BINARY IFACE [NAME...]
 
-Every service that python-canopen has, with devices that have a node-ID, with devices that have none, and
-with what a device refuses or does not know.
+Each service of python-canopen, with devices that have a node-ID, with devices without one, and
+with requests that a device rejects or does not support.
 
     tests/socketcan/vcan target/peers/bin/python tests/peers/lss.py target/debug/cangauge vcan0
 """
@@ -24,13 +24,13 @@ DPS = (0x362, 0x443150, 0x10000)
 
 
 class Master:
-    """python-canopen on one interface, and the boot-ups that it hears."""
+    """python-canopen on one interface, and the boot-ups that it receives."""
 
     def __init__(self, interface):
         self.network = canopen.Network()
         self.network.connect(channel=interface, interface="socketcan")
         self.lss = self.network.lss
-        # What has to be found out by silence is many bits.
+        # A fastscan waits for the time-out of many bits.
         self.lss.RESPONSE_TIMEOUT = 0.3
         self.boots = queue.Queue()
         for node in range(1, 128):
@@ -41,22 +41,22 @@ class Master:
             self.boots.put(identifier - 0x700)
 
     def booted(self, node):
-        """Waits for the boot-up of a node; no other may boot meanwhile."""
+        """Waits for the boot-up of a node; no other node may boot before."""
         found = self.boots.get(timeout=GIVE_UP)
         assert found == node, f"{found} booted and not {node}"
 
     def identity(self):
-        """What the slave in configuration state says of itself."""
+        """The LSS address and node-ID of the slave in configuration state."""
         return tuple(self.lss.inquire_lss_address(part) for part in (VENDOR, PRODUCT, REVISION, SERIAL))
 
     def identity_of(self, node):
-        """The same by SDO."""
+        """The LSS address, read by SDO."""
         sdo = self.network.add_node(node, canopen.ObjectDictionary()).sdo
         sdo.RESPONSE_TIMEOUT = GIVE_UP
         return tuple(int.from_bytes(sdo.upload(0x1018, sub), "little") for sub in (1, 2, 3, 4))
 
     def refused(self, call, *arguments):
-        """That a request is refused, or not answered; how it was."""
+        """Checks that a request is rejected or not answered; returns which one."""
         try:
             call(*arguments)
         except LssError as error:
@@ -66,7 +66,7 @@ class Master:
 
 @contextlib.contextmanager
 def bench(cangauge, directory, text):
-    """A master, and simulated devices that have just been switched on."""
+    """A master and simulated devices that were just switched on."""
     path = os.path.join(directory, "bench.toml")
     with open(path, "w", encoding="ascii") as file:
         file.write(text)
@@ -84,7 +84,7 @@ def device(kind, node=None, **more):
 
 
 def selectively(cangauge, directory):
-    """One of two alike is given another node-ID and bit rate, and keeps the node-ID after its reset."""
+    """One of two identical devices gets another node-ID and bit rate, and keeps the node-ID after a reset."""
     with bench(cangauge, directory, device("mh4", 5, serial=111) + device("mh4", 6, serial=222)) as master:
         assert {master.boots.get(timeout=GIVE_UP) for _ in range(2)} == {5, 6}
         identity = master.identity_of(6)
@@ -109,7 +109,7 @@ def selectively(cangauge, directory):
 
 
 def by_ranges(cangauge, directory):
-    """Identification by ranges, and of those without a node-ID."""
+    """Identifies slaves by ranges, and slaves without a node-ID."""
     with bench(cangauge, directory, device("mh4", 5, serial=111) + device("mc1609")) as master:
         master.booted(5)
         vendor, product, revision, serial = master.identity_of(5)
@@ -119,14 +119,14 @@ def by_ranges(cangauge, directory):
         assert master.lss.responses.get(timeout=GIVE_UP)[0] == 0x4F
         identify(vendor, product, revision, revision, serial, serial)
         assert master.lss.responses.get(timeout=GIVE_UP)[0] == 0x4F
-        # Not this one, and then somebody who answers: so nothing was on its way.
+        # No slave has this address. The next request is answered, so no late answer is counted.
         identify(vendor, product, revision, revision, serial + 1, highest)
         master.lss.send_identify_non_configured_remote_slave()
         assert master.lss.responses.get(timeout=GIVE_UP)[0] == 0x50
 
 
 def by_fastscan(cangauge, directory):
-    """Three without a node-ID, one after the other; one that has one is left alone."""
+    """Finds three devices without a node-ID; a device with a node-ID is not changed."""
     serials = {2: 100, 1: 101, 3: 0x80000001}
     unconfigured = "".join(device("mh4", serial=serial) for serial in serials.values())
     with bench(cangauge, directory, device("mh4", 77, serial=99) + unconfigured) as master:
@@ -134,7 +134,7 @@ def by_fastscan(cangauge, directory):
         found = set()
         for node in (11, 12, 13):
             is_found, identity = master.lss.fast_scan()
-            assert is_found, f"nobody before {node}"
+            assert is_found, f"no device found before {node}"
             assert tuple(identity[:2]) == MH4, identity
             found.add(identity[3])
             assert tuple(identity) == master.identity()
@@ -149,7 +149,7 @@ def by_fastscan(cangauge, directory):
 
 
 def what_a_device_does_not_do(cangauge, directory):
-    """A DPS knows no inquiries; another refuses to store."""
+    """A DPS does not answer inquiries; another device rejects storing."""
     with bench(cangauge, directory, device("dps", 127, serial=7) + device("mh4", 5, lss="{ refuse = { 0x17 = 1 } }")) as master:
         assert {master.boots.get(timeout=GIVE_UP) for _ in range(2)} == {5, 127}
         lss = master.lss
@@ -168,7 +168,7 @@ def what_a_device_does_not_do(cangauge, directory):
 
 
 def another_bit_rate(cangauge, directory):
-    """Silent for two delays, and there again: this interface has no bit rate."""
+    """The device is silent for two delays and then answers. The bit rate has no effect on this interface."""
     with bench(cangauge, directory, device("mh4", 5)) as master:
         master.booted(5)
         master.lss.send_switch_state_global(master.lss.CONFIGURATION_STATE)

@@ -1,12 +1,12 @@
-"""Asks a measuring device everything that a master asks, with python-canopen, and prints it as JSON.
+"""Reads a measuring device with python-canopen and prints the result as JSON.
 
     master.py [--sync] [--values N] [--type INDEX=TYPE]... IFACE NODE...
 
 For every node one line: device type, identity, name (segmented), unit, digits and value of each
-channel, the NMT states told by the heartbeat that it switches on, and N values of each valid TPDO
+channel, the NMT states shown by the heartbeat that it switches on, and N values of each valid TPDO
 (3) that comes by SYNC, sent here with --sync, or by itself. --type 6130=INTEGER32 is for devices
-that give an object of CiA 404 a type of their own. What it changed it puts back. Exit status 1 and
-a line on standard error when an answer is missing or wrong.
+that give an object of CiA 404 a different type. It restores what it changed. Exit status 1 and
+a line on standard error if an answer is missing or wrong.
 """
 
 import argparse
@@ -20,23 +20,23 @@ from canopen.sdo import SdoAbortedError
 from dictionary import ANALOGUE_INPUT, remote_device
 
 HEARTBEAT_MS = 100
-# A guest kernel on a busy machine may stand still for a while.
+# A guest kernel on a busy machine may pause for a while.
 PATIENCE = 10
 
 
 def optional(read):
-    """What the device answers, nothing where it has no such object."""
+    """The answer of the device; None if it has no such object."""
     try:
         return read()
     except SdoAbortedError as error:
-        # No object, no sub-index.
+        # The object or sub-index does not exist.
         if error.code in (0x06020000, 0x06090011):
             return None
         raise
 
 
 def inputs(node):
-    """The CiA 404 objects that the device has, by index: one value for each channel."""
+    """The CiA 404 objects of the device, by index: one value for each channel."""
     found = {}
     for _, index, _ in ANALOGUE_INPUT:
         count = optional(lambda: node.sdo[index][0].raw)
@@ -47,17 +47,17 @@ def inputs(node):
 
 
 def expect(node, state):
-    """Waits until the heartbeat tells this state."""
+    """Waits until the heartbeat shows this state."""
     for _ in range(20):
         if node.nmt.wait_for_heartbeat(PATIENCE) == state:
             return state
-    raise RuntimeError(f"node {node.id}: heartbeat never told {state}")
+    raise RuntimeError(f"node {node.id}: no heartbeat with {state}")
 
 
 def receive(network, tpdo, sync):
     """The values of the TPDO's next transmission."""
     with tpdo.receive_condition:
-        # Held while sending, so that the answer cannot come before it is waited for.
+        # The lock is held while sending, so that the answer cannot arrive before the wait starts.
         tpdo.is_received = False
         if sync and 1 <= tpdo.trans_type <= 240:
             for _ in range(tpdo.trans_type):
@@ -69,7 +69,7 @@ def receive(network, tpdo, sync):
 
 
 def tpdos(network, node, sync, count):
-    """Parameters and some values of the device's valid TPDOs."""
+    """The parameters and some values of the valid TPDOs."""
     found = []
     for number in node.tpdo:
         tpdo = node.tpdo[number]
@@ -91,7 +91,7 @@ def tpdos(network, node, sync, count):
 
 
 def ask(network, node, sync, count):
-    """Everything about one node."""
+    """All data of one node."""
     sdo = node.sdo
     answer = {
         "node": node.id,
@@ -119,7 +119,7 @@ def ask(network, node, sync, count):
 
 
 def own_type(text):
-    """Reads INDEX=TYPE, as 6130=INTEGER32."""
+    """Parses INDEX=TYPE, for example 6130=INTEGER32."""
     index, name = text.split("=")
     return int(index, 16), getattr(od, name)
 

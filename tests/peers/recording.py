@@ -1,4 +1,4 @@
-"""`log` of python-canopen and simulated devices: every row is held against the device's own record."""
+"""`log` with python-canopen and simulated devices: each row is compared with the record of the device."""
 
 import datetime
 import json
@@ -11,14 +11,14 @@ ALL = ("10:real32", "11:integer", "12:overload")
 SIMULATED = (("mh4", 1), ("d20", 2), ("mc1609", 3), ("dps", 127))
 
 
-def check_times(rows, begun, ended):
-    """That `time` and `elapsed_s` grow, agree, and lie within the run."""
+def check_times(rows, started, ended):
+    """Checks that `time` and `elapsed_s` increase, agree, and lie within the run."""
     times = [datetime.datetime.fromisoformat(row["time"]) for row in rows]
     elapsed = [float(row["elapsed_s"]) for row in rows]
     assert times == sorted(times) and elapsed == sorted(elapsed) and elapsed[0] == 0
-    assert begun <= times[0] and times[-1] <= ended, (begun, times[0], times[-1], ended)
+    assert started <= times[0] and times[-1] <= ended, (started, times[0], times[-1], ended)
     for time, seconds in zip(times, elapsed):
-        # Wall clocks may be set; a millisecond is for their being read one after the other.
+        # The clocks are read one after the other: one millisecond tolerance.
         assert abs((time - times[0]).total_seconds() - seconds) < 0.05, (time, seconds)
 
 
@@ -27,17 +27,17 @@ def now():
 
 
 def as_sent(cangauge, directory):
-    """By event timer: from the first TPDO after the start on, all of them, of three kinds of devices."""
+    """Event timer: all TPDOs from the first one after the start, for three kinds of devices."""
     with devices(cangauge.interface, directory, *ALL, heartbeat=100) as record:
-        begun = now()
+        started = now()
         result = cangauge.run("log", "10-12", "--count", 90)
-        check_times(result.rows(), begun, now())
+        check_times(result.rows(), started, now())
         rows = measured(result.rows())
         assert len(rows) == 90
         for node in (10, 11, 12):
             begins([row for row in rows if row[0] == str(node)], record(node))
         assert "0 frames dropped" in result.err, result
-        # Their states were known, so they are what they were.
+        # Their states were known, so they were restored.
         states = cangauge.run("--timeout", "2s", "nmt", "state", "10-12", "--format", "json").json()
         assert [state["state"] for state in states] == ["pre-operational"] * 3, states
 
@@ -63,7 +63,7 @@ def into_a_file(cangauge, directory):
         assert [(s["node"], s["signal"], s["unit"], s["count"], s["invalid"], s["min"], s["max"]) for s in signals] == \
             [(12, "ch1", "bar", len(rows), len(rows) - len(values), min(values), max(values))], told
         assert abs(signals[0]["mean"] - sum(values) / len(values)) < 1e-9, told
-        # An existing file is left alone.
+        # An existing file is not overwritten.
         cangauge.run("log", "12", "-o", path, "--count", 1, exit=2)
         assert open(path).read() == text
     with devices(cangauge.interface, directory, *ALL) as record:
@@ -78,13 +78,13 @@ def into_a_file(cangauge, directory):
 
 
 def on_sync(cangauge, directory):
-    """--sync: one row a SYNC and node, and TPDOs on every third SYNC."""
+    """--sync: one row for each SYNC and node, and TPDOs at every third SYNC."""
     with devices(cangauge.interface, directory, *ALL, sync=1) as record:
         result = cangauge.run("log", "10-12", "--sync", "20ms", "--count", 90)
         rows = measured(result.rows())
         begins(rows, record())
         assert len(rows) == 90
-        # Nothing comes without SYNC, and it is said why.
+        # Without SYNC no TPDO is sent, and the message says why.
         silent = cangauge.run("log", 10, "--duration", "500ms", exit=3)
         assert silent.out == "" and "SYNC" in silent.err and "--sync" in silent.err, silent
     with devices(cangauge.interface, directory, *ALL, sync=3) as record:
@@ -93,7 +93,7 @@ def on_sync(cangauge, directory):
 
 
 def by_polling(cangauge, directory):
-    """--poll: in PRE-OPERATIONAL the same value each time; while TPDOs count it up, values that grow."""
+    """--poll: the same value each time in PRE-OPERATIONAL; rising values while TPDOs increment it."""
     with devices(cangauge.interface, directory, "10:real32", "11:integer") as record:
         rows = measured(cangauge.run(*PATIENT, "log", "10,11", "--poll", "30ms", "--count", 20).rows())
         assert {row[:5] for row in rows} == {("10", "ch1", "-100", "bar", "ok"), ("11", "ch1", "-5", "psi", "ok")}, rows
@@ -103,12 +103,12 @@ def by_polling(cangauge, directory):
         sent = record(10)
         values = [float(row[2]) for row in rows]
         assert values == sorted(values) and values[0] < values[-1], values
-        # What it answers is what it sends next.
+        # The answer is the value of the next TPDO.
         assert set(rows) <= set(sent[1:]) | {rows[-1]}, (rows, sent)
 
 
 def ends(cangauge, directory):
-    """SIGTERM and a closed pipe are ends like any other; a node that disappears is named."""
+    """SIGTERM and a closed pipe end a recording normally; a node that stops sending is named."""
     with devices(cangauge.interface, directory, *ALL) as record:
         with cangauge.running("log", "10", directory=directory) as log:
             log.await_rows(5)
@@ -128,8 +128,8 @@ def ends(cangauge, directory):
 
 
 def simulated_devices(cangauge, directory):
-    """All four simulated devices at once, in another process: as sent with SYNC for those that wait for
-    it, overloads with their status."""
+    """All four simulated devices in another process: TPDOs at SYNC if configured so, and overloads with their
+    status."""
     record = os.path.join(directory, "truth.csv")
     bench = write_bench(directory, record)
     with cangauge.simulator(bench, directory) as simulator:
@@ -146,7 +146,7 @@ def simulated_devices(cangauge, directory):
 
 
 def write_bench(directory, record):
-    """All four devices; the pressure of the first is out of its range time and again."""
+    """All four devices; the pressure of the first leaves its range repeatedly."""
     path = os.path.join(directory, "bench.toml")
     with open(path, "w", encoding="ascii") as file:
         file.write(f'record = "{record}"\nseed = 5\n')

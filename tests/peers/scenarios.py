@@ -1,4 +1,4 @@
-"""Scenarios without number through the real program: a seed gives devices, faults, a command, an interruption.
+"""Runs random scenarios with the real program: a seed selects devices, faults, a command, an interruption.
 
     scenarios.py [--seed N] [--count N] [--seconds N] [--verbose] [--command NAME] [--forge NAME] BINARY HERE THERE
 
@@ -29,23 +29,23 @@ from scenario.probe import Probe
 from scenario.recording import rows_of
 from scenario.relay import Relay, stop
 
-# Longer than any command needs that gets an answer now and then.
+# Longer than any command takes while it gets some answers.
 DEADLINE = 90
 TOLD = 60
 
 
 class Look:
-    """What the devices hold, and their NMT states, at a moment."""
+    """The values and NMT states of the devices at one moment."""
 
     def __init__(self, held, states):
         self.held, self.states = held, states
 
 
 class Run:
-    """What there is to judge."""
+    """The result of one run, for the judges."""
 
     exit, out, err, overran, configuring = None, "", "", False, []
-    # Of a recording; whether its last line is whole.
+    # The rows of a recording, and whether its last line is complete.
     rows, is_whole = [], True
 
 
@@ -57,7 +57,7 @@ class Bed:
         self.relay, self.probe = Relay(here, there, forgery), Probe(there)
 
     def simulator(self, scenario, directory):
-        """Devices in a process of their own, started up."""
+        """Starts the devices in a separate process."""
         bench = os.path.join(directory, "bench.toml")
         with open(bench, "w", encoding="ascii") as file:
             file.write(scenario.bench(os.path.join(directory, "truth.csv")))
@@ -71,10 +71,10 @@ class Bed:
         return process
 
     def look(self, scenario):
-        """States first: who is stopped is woken, so that it can be asked."""
+        """Reads the states first. A stopped node is then started, so that it answers SDO."""
         devices = list(scenario.devices)
         if scenario.command == "set-id":
-            # One of them may have gone there.
+            # One of the devices may have moved to this node-ID.
             devices += [{**device, "node": scenario.wanted["new"]} for device in devices if device["node"] in (scenario.named[0], None)
                         and not scenario.at(scenario.wanted["new"])]
         states = self.probe.states(devices)
@@ -84,7 +84,7 @@ class Bed:
         return Look(self.probe.snapshot(devices), states)
 
     def happenings(self, scenario, simulator, program):
-        """What happens on the way, for the relay."""
+        """The events during the run, for the relay."""
         relay = self.relay
         acts = {"down": lambda _: relay.link("down"), "up": lambda _: relay.link("up"), "stopped": lambda _: stop(simulator, True),
                 "continued": lambda _: stop(simulator, False), "power": relay.device_resets, "cut": lambda _: relay.cut(True),
@@ -97,7 +97,7 @@ class Bed:
         return planned
 
     def execute(self, scenario, simulator, directory, name):
-        """Runs the command to its end."""
+        """Runs the command and waits for its end."""
         run, process = Run(), []
         paths = [os.path.join(directory, f"{name}.{end}") for end in ("out", "err", "csv")]
         line = [self.binary, "--bus", self.here, *scenario.line()]
@@ -109,7 +109,7 @@ class Bed:
         self.relay.open()
         with open(paths[0], "w") as out, open(paths[1], "w") as err:
             process.append(subprocess.Popen(line, stdout=out, stderr=err, stdin=subprocess.DEVNULL))
-            begun = time.monotonic()
+            started = time.monotonic()
             try:
                 process[0].wait(0.25)
             except subprocess.TimeoutExpired:
@@ -120,7 +120,7 @@ class Bed:
                     run.overran = True
                     process[0].kill()
                     process[0].wait()
-        run.exit, run.seconds = process[0].returncode, time.monotonic() - begun
+        run.exit, run.seconds = process[0].returncode, time.monotonic() - started
         self.calm(simulator)
         run.record, run.lines = list(self.relay.record), self.relay.lines()
         run.out, run.err = (open(path, encoding="utf-8", errors="replace").read() for path in paths[:2])
@@ -132,21 +132,21 @@ class Bed:
         return run
 
     def calm(self, simulator):
-        """Nothing goes wrong any more; what is on its way comes."""
+        """Ends all faults and waits for delayed frames."""
         self.relay.calm()
         stop(simulator, False)
         self.relay.link("up")
         until = time.monotonic() + 5
         while self.relay.delayed and time.monotonic() < until:
             time.sleep(0.02)
-        # Whoever is reset is away for 0.1 s.
+        # A device does not answer for 0.1 s after a reset.
         resets = any(identifier == 0 and data[:1] in (b"\x81", b"\x82") or kind and kind.startswith("power")
                      for _, _, kind, _, identifier, data in self.relay.record)
         time.sleep(0.25 if resets else 0.05)
         self.relay.close()
 
     def carry_out(self, scenario, directory):
-        """One scenario; the run and the complaints."""
+        """Runs one scenario. Returns the run and the complaints."""
         simulator = self.simulator(scenario, directory)
         told = []
         try:
@@ -178,7 +178,7 @@ class Bed:
         return run, told
 
     def again(self, scenario, simulator, directory, killed):
-        """The same command once more where nothing is wrong: it succeeds truly, or refuses honestly."""
+        """Runs the same command again without faults: it must succeed, or reject with a reason."""
         run = self.execute(scenario, simulator, directory, "again")
         run.before, run.after = killed.after, self.look(scenario)
         with Foreign(self.there) as foreign:
@@ -189,7 +189,7 @@ class Bed:
 
 
 def named(when, complaints, foreign):
-    """Complaints with what the judge itself could not read."""
+    """The complaints, and the objects that the judge could not read."""
     trouble = f" ({foreign.trouble})" if foreign.trouble else ""
     return [f"{when}{complaint}{trouble}" for complaint in complaints]
 
@@ -212,14 +212,14 @@ def main():
     count = options.count or (None if options.seconds else 1 if options.seed is not None else 100)
     print(f"from seed {seed}", flush=True)
     bed = Bed(options.binary, options.here, options.there, FORGERIES.get(options.forge))
-    begun, done, forged, failed, exits = time.monotonic(), 0, 0, [], collections.Counter()
+    started, done, forged, failed, exits = time.monotonic(), 0, 0, [], collections.Counter()
     seeds = (each for each in itertools.count(seed) if options.command in (None, Scenario(each).command))
-    while (count is None or done < count) and (options.seconds is None or time.monotonic() - begun < options.seconds):
+    while (count is None or done < count) and (options.seconds is None or time.monotonic() - started < options.seconds):
         scenario, since = Scenario(next(seeds)), time.monotonic()
         with tempfile.TemporaryDirectory() as directory:
             try:
                 run, told = bed.carry_out(scenario, directory)
-            # A judge that stumbles has not judged.
+            # An exception in a judge counts as a failure.
             except Exception:
                 run, told = None, [traceback.format_exc()]
         done += 1
@@ -234,7 +234,7 @@ def main():
                 print(f"exit {run.exit} after {run.seconds:.2f} s\n--- stdout\n{run.out[-2000:]}--- stderr\n{run.err}--- frames", *run.lines[-TOLD:], sep="\n")
             print(*(f"BROKEN {scenario.seed}: {complaint}" for complaint in told), sep="\n", flush=True)
     print(", ".join(f"{command} {code}: {number}" for (command, code), number in sorted(exits.items(), key=str)))
-    print(f"{done} scenarios from seed {seed} in {time.monotonic() - begun:.0f} s, {len(failed)} failed {failed or ''}")
+    print(f"{done} scenarios from seed {seed} in {time.monotonic() - started:.0f} s, {len(failed)} failed {failed or ''}")
     if options.forge:
         print(f"{options.forge}: forged in {forged}")
     bed.relay.end()

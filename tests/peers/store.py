@@ -2,7 +2,7 @@
 
     store.py {canopen|durand} --files DIR [--heartbeat MS] IFACE NODE
 
-2000h is DIR/2000, read anew for every upload and replaced by every download; 2001h is the same of
+2000h is DIR/2000, read again for each upload and replaced by each download; 2001h is the same of
 DIR/2001 and read only, 2002h an UNSIGNED32 and 2003h zeros that take longer than anybody waits.
 Prints "ready" once it has booted, and ends on SIGTERM.
 

@@ -1,4 +1,4 @@
-"""The files of `log` as pandas reads them without options: numbers as numbers, missing as missing, and a plot.
+"""pandas reads the files of `log` without options: numbers as numbers, missing values as NaN, and a plot.
 
     tables.py PROGRAM
 """
@@ -44,13 +44,13 @@ def check_long(table, cells):
     assert all(is_text(table[name]) for name in ("signal", "unit", "status", "raw")), table.dtypes
     overloaded = table["status"] == "overload-high"
     assert overloaded.sum() == 10 and table["value"][overloaded].isna().all() and table["value"].isna().sum() == 10
-    assert (table["node"][table["status"].isna()] == 127).all(), "the DPS tells no status"
+    assert (table["node"][table["status"].isna()] == 127).all(), "the DPS sends no status"
     for cell, value in zip(cells, table["value"]):
         assert cell["value"] == "" or float(cell["value"]) == value
     times = pandas.to_datetime(table["time"])
     assert str(times.dtype).endswith("UTC]") and times.is_monotonic_increasing, times.dtype
     apart = (times - times[0]).dt.total_seconds() - table["elapsed_s"]
-    assert apart.abs().max() < 1e-6, "both columns tell the same"
+    assert apart.abs().max() < 1e-6, "both columns agree"
 
 
 def check_wide(table):
@@ -90,7 +90,7 @@ def main():
         plot(table, path("plot.svg"))
         same = pandas.read_json(log("wide.json", "--layout", "wide", "--format", "json"), lines=True)
         assert list(same.columns) == list(table.columns) and same.shape == table.shape
-        # pandas reads numbers of JSON faster than exactly, unless it is told to.
+        # By default pandas rounds numbers in JSON; precise_float reads them exactly.
         apart = same["5.pressure [bar]"].fillna(-1) - table["5.pressure [bar]"].fillna(-1)
         assert apart.abs().max() < 1e-12, apart
         german = log("german.csv", "--layout", "wide", "--delimiter", ";", "--decimal", ",", "--bom")

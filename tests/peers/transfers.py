@@ -28,18 +28,18 @@ from harness import GIVE_UP, HERE, PATIENT, Recording, run_checks, wait_for
 from values import VALUES
 
 NODE = 42
-# Nobody has this node-ID.
+# No device has this node-ID.
 ABSENT = 77
-# Around what an expedited frame, a segment, the threshold of --block auto and a sub-block hold.
+# Sizes near the limits of an expedited frame, a segment, the threshold of --block auto and a sub-block.
 SIZES = [0, 1, 4, 5, 7, 8, 28, 29, 889, 890]
-# What takes a Python server, a millisecond or two a segment, some ten seconds.
+# A transfer of about ten seconds with a Python server, at one or two milliseconds per segment.
 LARGE = 100_000
-# What takes the simulator as long.
+# A transfer of the same duration with the simulator.
 HUGE = 1_000_000
-# Longer than anybody waits: for transfers that are broken off.
+# A size that takes too long, for transfers that are aborted.
 ENDLESS = 16 << 20
 MODES = ["auto", "always", "never"]
-# One try only: what is asked after an error has to work at once.
+# No retries: a request after an error must succeed at once.
 ONCE = ["--retries", 0, *PATIENT]
 
 READ_ONLY, NO_OBJECT, NO_SUB_INDEX, LENGTH = "0x06010002", "0x06020000", "0x06090011", "0x06070010"
@@ -47,17 +47,17 @@ NO_DATA, NO_SUCH_COMMAND, MEMORY = "0x08000024", "0x05040001", "0x05040005"
 
 
 def content(size, seed):
-    """Bytes that no other transfer has."""
+    """Bytes that differ from those of any other transfer."""
     return random.Random(f"{size} {seed}").randbytes(size)
 
 
 class Wire:
-    """The SDO frames of one node, as they come."""
+    """The SDO frames of one node, in order of arrival."""
 
     def __init__(self, interface, node=NODE):
         self.request, self.requests, self.count = 0x600 + node, [], 0
         self.socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-        # SO_RCVBUFFORCE: the guest's limit is lower than what a sub-block of a busy guest needs.
+        # SO_RCVBUFFORCE: the limit of the guest is too low for a sub-block on a busy guest.
         self.socket.setsockopt(socket.SOL_SOCKET, 33, 8 << 20)
         filters = struct.pack("=IIII", self.request, 0x7FF, 0x580 + node, 0x7FF)
         self.socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, filters)
@@ -71,7 +71,7 @@ class Wire:
         self.socket.close()
 
     def drain(self):
-        """Takes what has come; requests are kept."""
+        """Reads the waiting frames and keeps the requests."""
         with contextlib.suppress(BlockingIOError):
             while True:
                 identifier, length, data = struct.unpack("=IB3x8s", self.socket.recv(16))
@@ -82,7 +82,7 @@ class Wire:
 
 
 class Store:
-    """A device that store.py makes, and its files."""
+    """A device made by store.py, and its files."""
 
     def __init__(self, cangauge, directory, peer, *options):
         self.cangauge, self.directory, self.peer = cangauge, directory, peer
@@ -104,7 +104,7 @@ class Store:
             assert status == 0, f"store.py: exit status {status}"
 
     def kill(self):
-        """As when its power is cut."""
+        """Ends it, as a power failure does."""
         self.process.kill()
         self.process.wait(GIVE_UP)
 
@@ -141,7 +141,7 @@ def held(path):
 
 
 def first_request(path, index):
-    """The command byte of the last request for an object in a trace: the way that was taken."""
+    """The command byte of the last request for an object in a trace. It shows the kind of transfer."""
     wanted = struct.pack("<HB", index, 0).hex().upper()
     frames = [line.split()[-1] for line in open(path, encoding="ascii") if f" {0x600 + NODE:03X}#" in line]
     commands = [frame.split("#")[1] for frame in frames]
@@ -149,7 +149,7 @@ def first_request(path, index):
 
 
 def table(cangauge, directory, peer, blocks):
-    """Every size, both ways, in every mode."""
+    """Each size, in both directions, in each mode."""
     files = Files(directory)
     with Store(cangauge, directory, peer) as store:
         for mode in MODES:
@@ -158,7 +158,7 @@ def table(cangauge, directory, peer, blocks):
                 trace = files.new()
                 arguments = ["--trace", trace, "sdo", "write", NODE, "2000", "--block", mode, "--input", files.new(sent)]
                 if mode == "always" and not blocks:
-                    # Refused before anything is transferred, so the object holds what it held.
+                    # Rejected before any data was transferred, so the object is unchanged.
                     before = store.read(0x2000)
                     refused = cangauge.run(*PATIENT, *arguments, exit=4)
                     assert NO_SUCH_COMMAND in refused.err, refused
@@ -172,27 +172,27 @@ def table(cangauge, directory, peer, blocks):
                 assert (asked[0] >> 5 == 6) == in_blocks, f"{mode}: {size} bytes written: {asked}"
                 assert len(asked) == (2 if mode == "auto" and in_blocks and not blocks else 1), asked
             for size in SIZES:
-                # DOMAIN is asked for in blocks, where the type is not known only what shows itself to be large.
+                # DOMAIN is read in blocks. An object of unknown type is read in blocks only if it is large.
                 for of_type in ([], ["--type", "d"]):
                     sent = content(size, f"{mode} up {of_type}")
                     store.write(0x2000, sent)
                     trace, path = files.new(), files.new()
                     arguments = ["--trace", trace, "sdo", "read", NODE, "2000", "--block", mode, "--output", path, *of_type]
                     if size == 0 and peer == "canopen":
-                        # It calls no bytes no data.
+                        # It reports "no data" for an empty object.
                         refused = cangauge.run(*PATIENT, *arguments, exit=4)
                         assert NO_DATA in refused.err and not os.path.exists(path), refused
                         continue
                     result = cangauge.run(*PATIENT, *arguments)
                     assert held(path) == sent, f"{mode} {of_type}: {size} bytes read\n{result}"
-                    # durand says of a last segment that is full that nothing of it counts.
+                    # durand declares a full last segment completely unused.
                     odd = peer == "durand" and size > 0 and size % 7 == 0 and uses_blocks(mode, size, of_type)
                     assert ("unused" in result.err) == odd and (odd or result.err == ""), result
                     asked = first_request(trace, 0x2000)
                     wanted = [5] if mode == "always" or mode == "auto" and of_type else [2]
                     wanted += [5] if mode == "auto" and not of_type and size >= 889 else []
                     assert [command >> 5 for command in asked] == wanted, f"{mode} {of_type}: {size}: {asked}"
-        # Large ones, each way once in segments and once in blocks where there are any.
+        # Large objects, in each direction once in segments and once in blocks, if supported.
         for mode in ("never", "auto") if blocks else ("auto",):
             sent = content(LARGE, mode)
             cangauge.run(*PATIENT, "sdo", "write", NODE, "2000", "--block", mode, "--input", files.new(sent))
@@ -203,12 +203,12 @@ def table(cangauge, directory, peer, blocks):
 
 
 def uses_blocks(mode, size, of_type):
-    """Whether durand answers a read in blocks: it may answer in the usual way up to the threshold."""
+    """Whether durand answers a read in blocks: up to the threshold it may answer in segments."""
     return mode == "always" or mode == "auto" and size > (28 if of_type else 888)
 
 
 def python_canopen_device(cangauge, directory):
-    """Expedited and segmented. It refuses downloads in blocks, and answers uploads in blocks in segments."""
+    """Expedited and segmented. It rejects block downloads, and answers block uploads in segments."""
     table(cangauge, directory, "canopen", blocks=False)
 
 
@@ -267,7 +267,7 @@ default = 0
 
 @contextlib.contextmanager
 def simulated(cangauge, directory):
-    """A simulated device that knows all ways, in a process of its own."""
+    """A simulated device with all kinds of transfer, in a separate process."""
     with open(os.path.join(directory, "store.toml"), "w", encoding="ascii") as file:
         file.write(SIMULATED)
     bench = os.path.join(directory, "bench.toml")
@@ -294,7 +294,7 @@ class PythonMaster:
         self.network.disconnect()
 
     def settle(self):
-        """Passes over what others were answered, which this master hears too."""
+        """Discards answers to other masters, which this master receives too."""
         self.sdo.send_request(struct.pack("<BHB4x", 0x40, 0x2002, 0))
         while self.sdo.responses.get(timeout=GIVE_UP)[1:4] != b"\x02\x20\x00":
             pass
@@ -306,13 +306,13 @@ class PythonMaster:
     def write(self, index, data, blocks=False):
         with self.sdo.open(index, 0, "wb", buffering=0, size=len(data), block_transfer=blocks) as file:
             if blocks and not data:
-                # Left to itself it ends the transfer without a segment.
+                # By default it ends the transfer without a segment.
                 file.send(b"", end=True)
             for at in range(0, len(data), 4 if not blocks and len(data) <= 4 else 7):
                 file.write(data[at:at + 7])
 
     def refusal(self, action):
-        """The abort code that an action is refused with."""
+        """The abort code with which an action is rejected."""
         try:
             action()
         except SdoAbortedError as error:
@@ -321,7 +321,7 @@ class PythonMaster:
 
 
 def python_master_of_a_simulated_device(cangauge, directory):
-    """Every size, both ways, in segments and in blocks; what the one writes the other reads."""
+    """Each size, in both directions, in segments and in blocks. One program writes, the other reads."""
     files = Files(directory)
     with simulated(cangauge, directory), PythonMaster(cangauge.interface) as master:
         assert master.read(0x2000) == b"as delivered" == master.read(0x2000, blocks=True)
@@ -329,7 +329,7 @@ def python_master_of_a_simulated_device(cangauge, directory):
             for blocks in (False, True):
                 sent, path = content(size, f"python {blocks}"), files.new()
                 master.write(0x2000, sent, blocks)
-                # The other way of the two, and cangauge.
+                # Read with the other kind of transfer, and with cangauge.
                 assert master.read(0x2000, not blocks) == sent, f"{size} bytes, blocks {blocks}"
                 cangauge.run(*PATIENT, "sdo", "read", NODE, "2000", "--output", path)
                 assert held(path) == sent, f"{size} bytes, blocks {blocks}"
@@ -339,12 +339,12 @@ def python_master_of_a_simulated_device(cangauge, directory):
             master.settle()
             for blocks in (False, True):
                 assert master.read(0x2000, blocks) == sent, f"{size} bytes, blocks {blocks}"
-        # A Python client is slow: no more than this, and each way once.
+        # A Python client is slow: this size only, once in each direction.
         for blocks in (False, True):
             sent = content(LARGE, f"python {blocks}")
             master.write(0x2000, sent, blocks)
             assert master.read(0x2000, not blocks) == sent, f"{LARGE} bytes, blocks {blocks}"
-        # After every refusal the next transfer works at once, in both ways.
+        # After each rejection the next transfer succeeds at once, in both directions.
         for blocks in (False, True):
             for data in (b"ab", bytes(9), bytes(2000)):
                 for index, code in ((0x2001, READ_ONLY), (0x3000, NO_OBJECT), (0x2002, None)):
@@ -356,7 +356,7 @@ def python_master_of_a_simulated_device(cangauge, directory):
 
 
 def huge_transfers_of_a_simulated_device(cangauge, directory):
-    """A million bytes there and back, in every mode that the guest is fast enough for."""
+    """A million bytes in both directions, in each mode for which the guest is fast enough."""
     files = Files(directory)
     with simulated(cangauge, directory):
         for mode, size in (("auto", HUGE), ("always", LARGE), ("never", LARGE)):
@@ -373,7 +373,7 @@ def huge_transfers_of_a_simulated_device(cangauge, directory):
 
 
 def refusals(cangauge, files, blocks):
-    """Every refusal in every mode; after each the server does the next transfer at once."""
+    """Each rejection in each mode. After each one the server accepts the next transfer at once."""
     def run(*arguments, words, exit=4):
         result = cangauge.run(*PATIENT, "sdo", *arguments, exit=exit)
         lines = result.err.splitlines()
@@ -393,7 +393,7 @@ def refusals(cangauge, files, blocks):
                 continue
             run("write", NODE, "2001", "--input", data, *how, words=["write 0x2001", READ_ONLY])
             run("write", NODE, "3000", "--input", data, *how, words=["write 0x3000", NO_OBJECT])
-            # "Does not match the length": what a CiA 301 server says more exactly is 12h, too long, or 13h.
+            # "Length does not match"; a server may send the specific codes 12h (too long) or 13h (too short).
             run("write", NODE, "2002", "--input", data, *how, words=["write 0x2002", "0x0607001"])
         run("read", NODE, "3000", "--type", "d", *how, words=["read 0x3000", NO_OBJECT])
         run("read", NODE, "3000", *how, words=["read 0x3000", NO_OBJECT])
@@ -417,7 +417,7 @@ def after_refusals(cangauge, directory):
 
 
 def interrupt(cangauge, directory, object, arguments):
-    """Ctrl-C in the middle of a transfer; the server hears of it."""
+    """Ctrl-C during a transfer; the server gets an abort."""
     with Wire(cangauge.interface) as wire:
         run = Recording(cangauge.command(*PATIENT, "sdo", *arguments), directory)
         try:
@@ -433,17 +433,17 @@ def interrupt(cangauge, directory, object, arguments):
 
 
 def interrupted(cangauge, directory, files, long, size, ways):
-    """Ctrl-C in the middle of a read of the object `long` and of a write of so many bytes, each way; after
-    each the server does the next transfer at once, in every way it knows."""
+    """Ctrl-C during a read of the object `long` and during a write of this size, for each kind of transfer. After each
+    one the server accepts the next transfer at once."""
     for mode in ways:
         before, output = content(100, "before"), files.new()
         cangauge.run(*ONCE, "sdo", "write", NODE, "2000", "--input", files.new(before))
         interrupt(cangauge, directory, long, ["read", NODE, f"{long:04X}", "--block", mode, "--output", output])
-        # What came is no result.
+        # Partial data is not printed.
         assert not os.path.exists(output)
         holds(cangauge, files, before)
         interrupt(cangauge, directory, 0x2000, ["write", NODE, "2000", "--block", mode, "--input", files.new(bytes(size))])
-        # What was not sent to its end is not there.
+        # A partial write has no effect.
         holds(cangauge, files, before)
         for after in ("auto", "never"):
             interrupt(cangauge, directory, long, ["read", NODE, f"{long:04X}", "--block", mode, "--output", output])
@@ -453,7 +453,7 @@ def interrupted(cangauge, directory, files, long, size, ways):
 
 
 def holds(cangauge, files, data, *how):
-    """That a read, tried once, brings this."""
+    """Checks the result of a read without retries."""
     path = files.new()
     cangauge.run(*ONCE, "sdo", "read", NODE, "2000", "--output", path, *how)
     assert held(path) == data, how
@@ -467,13 +467,13 @@ def after_ctrl_c(cangauge, directory):
     with Store(cangauge, directory, "durand"):
         interrupted(cangauge, directory, files, 0x2003, ENDLESS, ["never", "always"])
     with simulated(cangauge, directory):
-        # What it takes at most; still several seconds.
+        # The largest size that it accepts; it still takes several seconds.
         cangauge.run(*PATIENT, "sdo", "write", NODE, "2003", "--input", files.new(content(HUGE, "long")))
         interrupted(cangauge, directory, files, 0x2003, HUGE, ["never", "always"])
 
 
 def types(cangauge, directory):
-    """Every type, both ways: what cangauge writes as python-canopen reads it, and the other way round."""
+    """Each type in both directions: cangauge writes and python-canopen reads, and the reverse."""
     with Store(cangauge, directory, "canopen") as store:
         for name in dict.fromkeys(name for _, name, _, _ in VALUES):
             texts = [(sub, text) for sub, (_, of_type, _, text) in enumerate(VALUES, start=1) if of_type == name]
@@ -490,13 +490,13 @@ def types(cangauge, directory):
 
 
 def nmt_without_heartbeat(cangauge, directory):
-    """What nothing tells is null; a boot-up tells, a probe tells, and SDO tells that it is stopped."""
+    """An unknown state is null; a boot-up, a probe or a missing SDO answer (stopped) determines it."""
     def nmt(*command, timeout="20s", **options):
         result = cangauge.run("--timeout", timeout, "nmt", *command, "--format", "json", **options)
         return [(line["state"], line["by"]) for line in result.json()]
 
     def silent(*command, **options):
-        """A command that is in vain, and takes its time for it."""
+        """Runs a command that fails after its time-out."""
         return nmt(*command, timeout="3s", **options)
 
     with Store(cangauge, directory, "canopen"):
@@ -515,7 +515,7 @@ def nmt_without_heartbeat(cangauge, directory):
         assert nmt("state", NODE) == [("stopped", "heartbeat")]
         assert nmt("preop", NODE, "--confirm") == [("pre-operational", "heartbeat")]
         cangauge.run("--timeout", "1s", "nmt", "start", f"{NODE},{ABSENT}", "--confirm", exit=7)
-    # durand stops answering SDO when it is stopped, as it has to.
+    # durand does not answer SDO when it is stopped, as required.
     with Store(cangauge, directory, "durand"):
         assert silent("start", NODE) == [(None, "none")]
         for command in ("reset", "reset-comm"):
@@ -526,14 +526,14 @@ def nmt_without_heartbeat(cangauge, directory):
 
 
 def nmt_watch(cangauge, directory):
-    """Boot-ups, changes, a loss and the return of a device, in their order."""
+    """Boot-ups, state changes, the loss and the return of a device, in order."""
     with cangauge.running("nmt", "watch", "--format", "json", directory=directory) as watch:
         def seen():
             text = watch.text("out")
             lines = [json.loads(line) for line in text[:text.rfind("\n") + 1].splitlines()]
             events, state = [], None
             for event, told in [(line["event"], line["state"]) for line in lines if line["node"] == NODE]:
-                # When the guest stood still a heartbeat was late: lost and back, and perhaps changed.
+                # If the guest paused, a heartbeat is late: the node is lost and back, perhaps in another state.
                 if event == "back" and events[-1] == ("lost", None):
                     events.pop()
                     event = "state" if told != state else None
@@ -542,10 +542,10 @@ def nmt_watch(cangauge, directory):
             return events
 
         def await_seen(*events):
-            """Waits until these have come, and nothing else."""
+            """Waits for exactly these events."""
             wait_for(lambda: seen() == list(events), lambda: f"{seen()}\n{watch.text('err')}", watch.process)
 
-        # It watches once it has opened the bus: a device that nobody needs proves it.
+        # A heartbeat of an extra node shows that it has opened the bus and watches.
         wait_for(lambda: sees(cangauge, watch), lambda: watch.text("err"), watch.process)
         story = [("boot-up", None), ("state", "pre-operational")]
         with Store(cangauge, directory, "canopen", "--heartbeat", "200") as store:
@@ -554,7 +554,7 @@ def nmt_watch(cangauge, directory):
                 cangauge.run("nmt", command, NODE, "--no-wait")
                 story.append(("state", state))
                 await_seen(*story)
-            # Learned by now: it is missed without having been asked for its period.
+            # The heartbeat period is known by now: the loss is reported without reading 1017h.
             store.kill()
             story.append(("lost", None))
             await_seen(*story)
@@ -564,7 +564,7 @@ def nmt_watch(cangauge, directory):
 
 
 def sees(cangauge, watch):
-    """Sends a heartbeat of a node that does not exist, and looks whether it was seen."""
+    """Sends a heartbeat of a node that does not exist, and checks whether it was reported."""
     subprocess.run(["cansend", cangauge.interface, f"{0x700 + ABSENT:03X}#05"], check=True)
     time.sleep(0.05)
     return f'"node":{ABSENT}' in watch.text("out").replace(" ", "")

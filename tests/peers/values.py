@@ -1,4 +1,4 @@
-"""A value or more of every data type: how python-canopen holds it, and how cangauge writes it.
+"""Values of each data type, in python-canopen and in cangauge.
 
 Of TIME_OF_DAY and TIME_DIFFERENCE python-canopen knows nothing but the bytes; they are put together
 here from CiA 301, 7.1.6.5 and 7.1.6.6: milliseconds (28 bits), then days (16 bits).
@@ -25,7 +25,7 @@ def real32(number):
 
 
 def integers():
-    """Both ends, zero and something in the middle, of every width that there is."""
+    """The limits, zero and a middle value of each width."""
     for bits in range(8, 65, 8):
         low, high = -(1 << bits - 1), (1 << bits - 1) - 1
         for sign, name, values in (("u", "UNSIGNED", (0, 1, 0x5A, 2 * high + 1)), ("i", "INTEGER", (low, -1, 0, high))):
@@ -34,7 +34,7 @@ def integers():
                 yield code, f"{sign}{bits}", value, str(value)
 
 
-# Type, its name in cangauge, the value in Python, the text in cangauge.
+# The type, its name in cangauge, the value in Python, the text in cangauge.
 VALUES = [
     (od.BOOLEAN, "b", True, "1"),
     (od.BOOLEAN, "b", False, "0"),
