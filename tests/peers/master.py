@@ -21,7 +21,7 @@ from dictionary import ANALOGUE_INPUT, remote_device
 
 HEARTBEAT_MS = 100
 # A guest kernel on a busy machine may pause for a while.
-PATIENCE = 10
+TIMEOUT = 10
 
 
 def optional(read):
@@ -49,7 +49,7 @@ def inputs(node):
 def expect(node, state):
     """Waits until the heartbeat shows this state."""
     for _ in range(20):
-        if node.nmt.wait_for_heartbeat(PATIENCE) == state:
+        if node.nmt.wait_for_heartbeat(TIMEOUT) == state:
             return state
     raise RuntimeError(f"node {node.id}: no heartbeat with {state}")
 
@@ -62,7 +62,7 @@ def receive(network, tpdo, sync):
         if sync and 1 <= tpdo.trans_type <= 240:
             for _ in range(tpdo.trans_type):
                 network.sync.transmit()
-        tpdo.receive_condition.wait(PATIENCE)
+        tpdo.receive_condition.wait(TIMEOUT)
         if not tpdo.is_received:
             raise RuntimeError(f"{tpdo.name}: nothing came")
         return [entry.raw for entry in tpdo.map]
@@ -105,7 +105,7 @@ def ask(network, node, sync, count):
     try:
         if sdo[0x1017].raw != HEARTBEAT_MS:
             raise RuntimeError(f"node {node.id}: 1017h does not hold what was written")
-        before = node.nmt.wait_for_heartbeat(PATIENCE)
+        before = node.nmt.wait_for_heartbeat(TIMEOUT)
         node.nmt.state = "OPERATIONAL"
         states = [before, expect(node, "OPERATIONAL")]
         answer["tpdos"] = tpdos(network, node, sync, count)
@@ -137,7 +137,7 @@ def main():
     try:
         for number in arguments.nodes:
             node = network.add_node(number, remote_device(dict(arguments.type)))
-            node.sdo.RESPONSE_TIMEOUT = PATIENCE
+            node.sdo.RESPONSE_TIMEOUT = TIMEOUT
             print(json.dumps(ask(network, node, arguments.sync, arguments.values)), flush=True)
     except (RuntimeError, canopen.SdoCommunicationError, SdoAbortedError, canopen.nmt.NmtError) as error:
         print(f"master.py: {error}", file=sys.stderr)

@@ -31,7 +31,7 @@ from scenario.relay import Relay, stop
 
 # Longer than any command takes while it gets some answers.
 DEADLINE = 90
-TOLD = 60
+SHOWN_FRAMES = 60
 
 
 class Look:
@@ -148,7 +148,7 @@ class Bed:
     def carry_out(self, scenario, directory):
         """Runs one scenario. Returns the run and the complaints."""
         simulator = self.simulator(scenario, directory)
-        told = []
+        problems = []
         try:
             fresh = scenario.fresh = self.look(scenario)
             for device in scenario.devices:
@@ -161,31 +161,31 @@ class Bed:
             self.probe.leave_configuration()
             run.after = self.look(scenario)
             with Foreign(self.there) as foreign:
-                told += named("", judge.claim(scenario, run, foreign), foreign)
+                problems += named("", judge.claim(scenario, run, foreign), foreign)
             if run.exit == -9:
-                told += self.again(scenario, simulator, directory, run)
+                problems += self.again(scenario, simulator, directory, run)
             self.probe.reset(sum(bool(device["node"]) for device in scenario.devices))
             run.reset = Look(self.probe.snapshot(scenario.devices), {})
             if run.exit == 0:
                 with Foreign(self.there) as foreign:
-                    told += named("after a reset: ", judge.claims.after_reset(scenario, run, foreign), foreign)
-            told += judge.judge(scenario, run)
+                    problems += named("after a reset: ", judge.claims.after_reset(scenario, run, foreign), foreign)
+            problems += judge.judge(scenario, run)
         finally:
             simulator.send_signal(signal.SIGINT)
             simulator.wait(20)
         if scenario.command == "log":
-            told += judge.rows(scenario, run, rows_of(open(os.path.join(directory, "truth.csv"), encoding="utf-8").read()))
-        return run, told
+            problems += judge.rows(scenario, run, rows_of(open(os.path.join(directory, "truth.csv"), encoding="utf-8").read()))
+        return run, problems
 
     def again(self, scenario, simulator, directory, killed):
         """Runs the same command again without faults: it must succeed, or reject with a reason."""
         run = self.execute(scenario, simulator, directory, "again")
         run.before, run.after = killed.after, self.look(scenario)
         with Foreign(self.there) as foreign:
-            told = named("", judge.claim(scenario, run, foreign), foreign)
+            problems = named("", judge.claim(scenario, run, foreign), foreign)
         if run.exit not in judge.EXITS - {5, 130} or "panicked" in run.err:
-            told.append(f"exit code {run.exit}: {run.err}")
-        return [f"the same again: {complaint}" for complaint in told]
+            problems.append(f"exit code {run.exit}: {run.err}")
+        return [f"the same again: {complaint}" for complaint in problems]
 
 
 def named(when, complaints, foreign):
@@ -218,21 +218,21 @@ def main():
         scenario, since = Scenario(next(seeds)), time.monotonic()
         with tempfile.TemporaryDirectory() as directory:
             try:
-                run, told = bed.carry_out(scenario, directory)
+                run, problems = bed.carry_out(scenario, directory)
             # An exception in a judge counts as a failure.
             except Exception:
-                run, told = None, [traceback.format_exc()]
+                run, problems = None, [traceback.format_exc()]
         done += 1
         exits[scenario.command, run and run.exit] += 1
         forged += bool(bed.relay.forged)
         if options.verbose:
             print(f"{scenario.seed} exit {run and run.exit} {time.monotonic() - since:.1f} s: {' '.join(scenario.arguments)}", flush=True)
-        if told:
+        if problems:
             failed.append(scenario.seed)
             print(scenario)
             if run:
-                print(f"exit {run.exit} after {run.seconds:.2f} s\n--- stdout\n{run.out[-2000:]}--- stderr\n{run.err}--- frames", *run.lines[-TOLD:], sep="\n")
-            print(*(f"BROKEN {scenario.seed}: {complaint}" for complaint in told), sep="\n", flush=True)
+                print(f"exit {run.exit} after {run.seconds:.2f} s\n--- stdout\n{run.out[-2000:]}--- stderr\n{run.err}--- frames", *run.lines[-SHOWN_FRAMES:], sep="\n")
+            print(*(f"BROKEN {scenario.seed}: {complaint}" for complaint in problems), sep="\n", flush=True)
     print(", ".join(f"{command} {code}: {number}" for (command, code), number in sorted(exits.items(), key=str)))
     print(f"{done} scenarios from seed {seed} in {time.monotonic() - started:.0f} s, {len(failed)} failed {failed or ''}")
     if options.forge:

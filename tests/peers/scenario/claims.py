@@ -1,8 +1,8 @@
-"""Exit code 0 only if the devices hold what was asked for: looked up with python-canopen, also after a reset
-where it was stored.
+"""Exit code 0 requires that the devices contain the requested values. This is read with python-canopen, and again after
+a reset if the values were stored.
 
-Each takes the scenario, the run and the foreign judge, and gives complaints. What another master changed, or
-a device that lost its power in between, is not asked for.
+Each function takes the scenario, the run and the foreign judge, and returns complaints. Values that another master
+changed, or that a device lost with its power, are not checked.
 """
 
 import json
@@ -18,13 +18,13 @@ def rows(run):
 
 
 def complaints(scenario, run, foreign):
-    """What is claimed and is not so; nothing where nothing is claimed."""
+    """The claims of the program that are wrong; empty if it claims nothing."""
     claim = CLAIMS.get(scenario.command)
     return claim(scenario, run, foreign) if claim else []
 
 
 def after_reset(scenario, run, foreign):
-    """The same once the devices have started again, for what was stored."""
+    """The same check of stored values after a restart of the devices."""
     options = scenario.arguments
     if scenario.command == "set-id" and scenario.wanted["stored"]:
         return set_id(scenario, run, foreign)
@@ -50,11 +50,11 @@ def heartbeat(scenario, foreign, wanted):
 
 def sdo_read(scenario, run, foreign):
     node, place = scenario.named[0], scenario.wanted["object"]
-    told, found = bytes.fromhex(rows(run)[0]["raw"][2:]), foreign.read(node, place)
+    printed, found = bytes.fromhex(rows(run)[0]["raw"][2:]), foreign.read(node, place)
     width = kinds.objects(scenario.at(node)["kind"])[place].width
     if place == (0x1017, 0) and scenario.was_written_by_others(node):
         return []
-    return [] if found is not None and told == found[:width] else [f"read {told.hex()}, and it is {found and found.hex()}"]
+    return [] if found is not None and printed == found[:width] else [f"read {printed.hex()}, and it is {found and found.hex()}"]
 
 
 def sdo_write(scenario, _, foreign):
@@ -66,19 +66,19 @@ def sdo_write(scenario, _, foreign):
 
 
 def nmt(scenario, run, _):
-    """What is said to be confirmed; a boot-up says PRE-OPERATIONAL also of who starts by himself."""
+    """Checks confirmed states. A boot-up confirms PRE-OPERATIONAL, also for a device that starts on its own."""
     if "--no-wait" in scenario.arguments or scenario.is_commanded_by_others() or scenario.is_disordered():
         return []
-    told = []
+    problems = []
     for row in rows(run):
         state, node = row["state"], row["node"]
-        # What proves that a node is stopped is its silence, and so is a cable that is out.
+        # A missing answer proves that a node is stopped. An unplugged cable has the same effect.
         if row["by"] in ("none", "boot-up", "sdo") or state is None or run.after.states.get(node) == state:
             continue
-        told.append(f"node {node} is {run.after.states.get(node)}, not {state} by {row['by']}")
+        problems.append(f"node {node} is {run.after.states.get(node)}, not {state} by {row['by']}")
     if "--confirm" in scenario.arguments:
-        told += [f"not confirmed: {row}" for row in rows(run) if row["by"] == "none"]
-    return told
+        problems += [f"not confirmed: {row}" for row in rows(run) if row["by"] == "none"]
+    return problems
 
 
 def pdo_map(scenario, _, foreign):
@@ -86,12 +86,12 @@ def pdo_map(scenario, _, foreign):
     kind, offset = scenario.at(node)["kind"], scenario.wanted["pdo"] - 1
     if scenario.restarts(node) and "--store" not in scenario.arguments:
         return []
-    told = []
+    problems = []
 
     def compare(place, right):
         found = foreign.number(kind, node, place)
         if found != right:
-            told.append(f"{place[0]:04X}h:{place[1]} is {found}, not {right}")
+            problems.append(f"{place[0]:04X}h:{place[1]} is {found}, not {right}")
 
     if wanted["code"] is not None:
         compare((0x1800 + offset, 2), wanted["code"])
@@ -103,8 +103,8 @@ def pdo_map(scenario, _, foreign):
             compare((0x1A00 + offset, sub), word)
     cob_id = foreign.number(kind, node, (0x1800 + offset, 1))
     if cob_id is None or cob_id >> 31 and not run_before(scenario, node, (0x1800 + offset, 1)) >> 31:
-        told.append(f"its COB-ID is {cob_id}")
-    return told
+        problems.append(f"its COB-ID is {cob_id}")
+    return problems
 
 
 def run_before(scenario, node, place):
@@ -116,18 +116,18 @@ def autozero(scenario, run, foreign):
     if "--dry-run" in scenario.arguments or scenario.restarts(node):
         return []
     way = kinds.description(scenario.at(node)["kind"])["autozero"][0]
-    told, (row, *_) = [], rows(run)
+    problems, (row, *_) = [], rows(run)
     kind, place = scenario.at(node)["kind"], kinds.at(way["offset"])
     signal = next(signal for signal in kinds.signals(kind) if signal["channel"] == way["channel"])
     scale = scaled(foreign, kind, node, signal)
     found = foreign.number(kind, node, place)
     if found is None or not math.isclose(found * (1 if kinds.objects(kind)[place].type == "r32" else scale), row["offset"], rel_tol=1e-5, abs_tol=1e-6):
-        told.append(f"the offset is {found} by {scale}, not {row['offset']}")
+        problems.append(f"the offset is {found} by {scale}, not {row['offset']}")
     reading = foreign.number(kind, node, kinds.at(signal["value"]))
     start, end = ends(kind, way["channel"])
     if reading is None or abs(reading * scale) > 0.001 * (end - start):
-        told.append(f"reads {reading} by {scale} after it")
-    return told
+        problems.append(f"reads {reading} by {scale} after it")
+    return problems
 
 
 def ends(kind, number):
@@ -136,7 +136,7 @@ def ends(kind, number):
 
 
 def scaled(foreign, kind, node, signal):
-    """What one step of an integer value is worth."""
+    """The size of one step of an integer value."""
     if kinds.objects(kind)[kinds.at(signal["value"])].type == "r32":
         return 1
     digits = foreign.number(kind, node, kinds.at(signal["digits"])) if "digits" in signal else None
@@ -167,57 +167,57 @@ def limits(scenario, _, foreign):
     kind = scenario.at(node)["kind"]
     if scenario.restarts(node):
         return []
-    told, base = [], kinds.at(signal["value"])[0] & 0xF000
+    problems, base = [], kinds.at(signal["value"])[0] & 0xF000
     for index, name in ((0x134, "low"), (0x135, "high")):
         found = foreign.number(kind, node, (base + index, signal["channel"]))
         if found is None or not math.isclose(found * scaled(foreign, kind, node, signal), scenario.wanted[name]):
-            told.append(f"{base + index:04X}h is {found}, not {scenario.wanted[name]}")
-    return told
+            problems.append(f"{base + index:04X}h is {found}, not {scenario.wanted[name]}")
+    return problems
 
 
 def read(scenario, run, foreign):
-    told = []
+    problems = []
     for row in rows(run):
         device = scenario.at(row["node"])
         signal = next(signal for signal in kinds.signals(device["kind"]) if signal["name"] == row["signal"])
         found = foreign.number(device["kind"], row["node"], kinds.at(signal["value"]))
         scale = scaled(foreign, device["kind"], row["node"], signal)
         if row["value"] is not None and (found is None or not math.isclose(found * scale, row["value"], rel_tol=1e-6, abs_tol=1e-9)):
-            told.append(f"{row} and it is {found} by {scale}")
-    return told
+            problems.append(f"{row} and it is {found} by {scale}")
+    return problems
 
 
 def scan(scenario, run, _):
     found = {row["node"]: row for row in rows(run)}
     there = {device["node"]: device for device in scenario.devices}
-    told = [f"nobody has node {node}" for node in found if node not in there]
+    problems = [f"no device has node {node}" for node in found if node not in there]
     for node in found.keys() & there.keys():
         serial, device = found[node].get("serial"), there[node]
         if serial is not None and serial != device["serial"]:
-            told.append(f"node {node} is {device['serial']}, not {serial}")
+            problems.append(f"node {node} is {device['serial']}, not {serial}")
         if found[node].get("device") not in (None, device["kind"]):
-            told.append(f"node {node} is {device['kind']}, not {found[node]['device']}")
+            problems.append(f"node {node} is {device['kind']}, not {found[node]['device']}")
     if not scenario.is_troubled() and found.keys() != there.keys() & set(scenario.named):
-        told.append(f"found {sorted(found)}")
-    return told
+        problems.append(f"found {sorted(found)}")
+    return problems
 
 
 def check(scenario, run, _):
-    # A recording without a single invalid value is not asked for here: values hold still.
+    # Values are constant, so a recording without invalid values is not required here.
     return [] if scenario.wanted["holds"] == (run.exit == 0) else [f"exit {run.exit}, and it holds: {scenario.wanted['holds']}"]
 
 
 def set_id(scenario, run, foreign):
-    """Who has the serial number has the new node-ID, and nobody else the old one."""
+    """The device with the serial number has the new node-ID, and no device has the old one."""
     new, old = scenario.wanted["new"], scenario.wanted["old"]
     if scenario.restarts(old or new) and not scenario.wanted["stored"]:
         return []
-    told, serial = [], foreign.read(new, (0x1018, 4))
+    problems, serial = [], foreign.read(new, (0x1018, 4))
     if serial is None or int.from_bytes(serial, "little") != scenario.wanted["serial"]:
-        told.append(f"node {new} is {serial}")
+        problems.append(f"node {new} is {serial}")
     if old not in (None, new) and foreign.read(old, (0x1018, 4), 0.5) is not None:
-        told.append(f"somebody still has node {old}")
-    return told
+        problems.append(f"a device still has node {old}")
+    return problems
 
 
 CLAIMS = {"sdo read": sdo_read, "sdo write": sdo_write, "nmt": nmt, "pdo map": pdo_map, "autozero": autozero, "unit": unit, "filter": damping,

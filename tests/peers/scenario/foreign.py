@@ -1,4 +1,4 @@
-"""python-canopen as the judge of what was asked for."""
+"""python-canopen as an independent judge of the result."""
 
 import canopen
 from canopen.sdo import SdoAbortedError, SdoCommunicationError
@@ -7,11 +7,11 @@ from scenario import kinds
 
 
 class Foreign:
-    """A network on the devices' side, for a while: it would take the answers to the probe for its own."""
+    """A network on the side of the devices. It is short-lived: it would accept answers to the probe as its own."""
 
     def __init__(self, interface):
         self.interface = interface
-        # Why the last read failed that did.
+        # The reason of the last failed read.
         self.trouble = None
 
     def __enter__(self):
@@ -22,12 +22,12 @@ class Foreign:
     def __exit__(self, *_):
         self.network.disconnect()
 
-    def read(self, node, place, patience=5):
-        """The bytes of an object, text too; None where it is refused or nobody answers."""
+    def read(self, node, place, timeout=5):
+        """The bytes of an object, also for text; None if the read is rejected or not answered."""
         if node not in self.network:
             self.network.add_node(canopen.RemoteNode(node, canopen.ObjectDictionary()))
         client = self.network[node].sdo
-        client.RESPONSE_TIMEOUT = patience
+        client.RESPONSE_TIMEOUT = timeout
         try:
             return bytes(client.upload(*place))
         except (SdoAbortedError, SdoCommunicationError) as error:

@@ -1,7 +1,7 @@
-"""What a wrong program would do, done in its place by the relay, to see that the judges notice.
+"""The relay simulates a wrong program, to check that the judges notice it.
 
 A forgery gets the direction, identifier and data of every frame, and gives the frames that go on in its
-place, (direction, identifier, data), or None where it leaves the frame alone. None of it stands in the
+place, (direction, identifier, data), or None if it does not change the frame. None of it stands in the
 record as a fault.
 """
 
@@ -23,17 +23,17 @@ def acknowledged(direction, identifier, data, signatures):
 
 
 def unwritten(direction, identifier, data):
-    """A write that is said to be done without having been."""
+    """A write is acknowledged without effect."""
     return acknowledged(direction, identifier, data, False)
 
 
 def unsigned(direction, identifier, data):
-    """A store, a restore, a zero that is said to be done without having been."""
+    """A store, restore or zero is acknowledged without effect."""
     return acknowledged(direction, identifier, data, True)
 
 
 def not_put_back(direction, identifier, data):
-    """The way back to PRE-OPERATIONAL is forgotten."""
+    """The command back to PRE-OPERATIONAL is missing."""
     return [] if direction == OUT and identifier == 0 and data and data[0] == 0x80 else None
 
 
@@ -47,22 +47,22 @@ def is_tpdo(direction, identifier, data):
 
 
 def invented(direction, identifier, data):
-    """A measured value that nobody sent."""
+    """A measured value that no device sent."""
     return [(direction, identifier, bytes([data[0] ^ 1]) + data[1:])] if is_tpdo(direction, identifier, data) else None
 
 
 def twice(direction, identifier, data):
-    """Each measured value twice."""
+    """Each measured value arrives twice."""
     return 2 * [(direction, identifier, data)] if is_tpdo(direction, identifier, data) else None
 
 
 def stray(direction, identifier, data, number=itertools.count()):
-    """A start for everybody, now and then."""
+    """Occasionally, a start command for all nodes."""
     return [(OUT, 0, b"\x01\x00"), (direction, identifier, data)] if direction == OUT and next(number) % 20 == 7 else None
 
 
 def astray(direction, identifier, data):
-    """Each write changes another object, too."""
+    """Each write also changes another object."""
     if is_download(direction, identifier, data) and data[1:4] != b"\x17\x10\x00":
         return [(OUT, identifier, b"\x2b\x17\x10\x00\x4d\x00\x00\x00"), (direction, identifier, data)]
     return None

@@ -1,11 +1,11 @@
-"""What must always hold, whatever went wrong."""
+"""The rules that hold for each run, whatever faults occurred."""
 
 import re
 
 from scenario import claims, recording, wire
 
 EXITS = {0, 1, 2, 3, 4, 5, 6, 7, 8, 130}
-# What a command that writes may change; what is not here changes nothing.
+# The objects that each command may change. Commands that are not listed change nothing.
 CHANGES = {
     "pdo map": lambda index: 0x1800 <= index < 0x1C00,
     "autozero": lambda index: index & 0xFF0 == 0x120,
@@ -13,7 +13,7 @@ CHANGES = {
     "filter": lambda index: index in (0x61A0, 0x61A1, 0x2023),
     "limits": lambda index: 0x133 <= index & 0xFFF <= 0x136,
     "restore": lambda _: True,
-    # COB-IDs that are made of the node-ID.
+    # COB-IDs that contain the node-ID.
     "set-id": lambda index: index == 0x1014 or 0x1800 <= index < 0x1A00 or index in (0x2003, 0x2320, 0x2321),
     "set-bitrate": lambda index: index in (0x2004, 0x2320, 0x2321),
     "probe": lambda index: False,
@@ -23,73 +23,73 @@ HEARTBEAT = (0x1017, 0)
 
 
 def judge(scenario, run):
-    """The rules that were broken, in words, by what stands there right after the command."""
-    told = ends(scenario, run) + wire.judge(scenario, run.record)
-    told += others(scenario, run) + own(scenario, run) + states(scenario, run) + configuring(scenario, run)
-    told += mapping(scenario, run)
-    return told
+    """The broken rules as text, from the state right after the command."""
+    problems = ends(scenario, run) + wire.judge(scenario, run.record)
+    problems += others(scenario, run) + own(scenario, run) + states(scenario, run) + configuring(scenario, run)
+    problems += mapping(scenario, run)
+    return problems
 
 
 def ends(scenario, run):
-    told = []
+    problems = []
     if run.overran:
-        told.append("does not end")
+        problems.append("does not end")
     if "panicked" in run.err or run.exit == 101:
-        told.append("panics")
+        problems.append("panics")
     interrupted = scenario.signal and scenario.signal[0] != "SIGKILL"
     killed = scenario.signal and scenario.signal[0] == "SIGKILL"
     if run.exit not in EXITS and not (run.exit == -9 and (killed or run.overran)):
-        told.append(f"exit code {run.exit}")
+        problems.append(f"exit code {run.exit}")
     if run.exit == 130 and not interrupted:
-        told.append("nobody interrupted it")
+        problems.append("it was not interrupted")
     if run.exit == 130 and run.rows:
-        told.append("a recording has a result")
+        problems.append("a recording has a result")
     if run.exit == 5 and "down" not in scenario.kinds_of_trouble():
-        told.append("the bus works")
+        problems.append("the bus works")
     if not run.overran and run.exit and run.exit > 0 and not run.err.strip() and run.exit != 1:
-        told.append("says nothing")
+        problems.append("there is no error message")
     if not scenario.is_troubled() and run.exit == 3 and all(scenario.at(node) for node in scenario.named) and not may_be_silent(scenario):
-        told.append("everybody answers")
-    return told
+        problems.append("all devices answer")
+    return problems
 
 
 def may_be_silent(scenario):
-    """TPDOs that wait for something; states that nothing tells; the new node-ID, which is free."""
+    """Objects and states to ignore: waiting TPDOs, unknown states, the new node-ID, which is free."""
     return scenario.command in ("log", "check", "set-id", "nmt", "probe")
 
 
 def differences(before, after, ignored=lambda place: False):
-    """What was there before and is another thing now."""
+    """The objects that have changed."""
     return [f"{place[0]:04X}h:{place[1]} was {old.hex()} and is {after[place].hex()}" for place, old in before.items()
             if old is not None and after.get(place) is not None and after[place] != old and not ignored(place)]
 
 
 def others(scenario, run):
-    """Who was not named holds what it held, and is in the state that it was in."""
-    told = []
+    """A device that was not named keeps its values and its state."""
+    problems = []
     for node, before in run.before.held.items():
         if node in scenario.named:
             continue
         meddled = scenario.was_written_by_others(node)
-        told += [f"node {node} was not named: {difference}" for difference in
+        problems += [f"node {node} was not named: {difference}" for difference in
                  differences(before, run.after.held[node], lambda place: meddled and place == HEARTBEAT)]
-        told += [f"node {node} was not named, after a reset: {difference}"
+        problems += [f"node {node} was not named, after a reset: {difference}"
                  for difference in differences(run.fresh.held[node], run.reset.held[node])]
         states = run.before.states[node], run.after.states[node]
         if not scenario.is_commanded_by_others(node) and None not in states and states[0] != states[1]:
-            told.append(f"node {node} was not named: {states[0]} and now {states[1]}")
-    return told
+            problems.append(f"node {node} was not named: {states[0]} and now {states[1]}")
+    return problems
 
 
 def own(scenario, run):
-    """Who was named has changed in nothing but what the command is about."""
-    told = []
+    """A named device has changed only in objects of the command."""
+    problems = []
     for node in set(scenario.named) & run.before.held.keys():
         before, after = run.before.held[node], run.after.held[node]
         may = CHANGES.get(scenario.command, lambda index: False) if wire.writes(scenario) else lambda index: False
         resets = scenario.command in ("nmt", "store", "restore", *wire.LSS)
         free = scenario.was_written_by_others(node) or resets
-        # A heartbeat that was switched on for a moment is off again only if its own frames got through.
+        # A heartbeat that was switched on briefly is off again only if the frames for that arrived.
         if scenario.command in ("probe", "pdo map", "store", "restore") and (lost(run) or run.exit == -9):
             free = True
 
@@ -97,26 +97,26 @@ def own(scenario, run):
             target = scenario.wanted.get("object") if scenario.command == "sdo write" else None
             return place == target or may(place[0]) or free and place == HEARTBEAT
 
-        told += [f"node {node}: {difference}" for difference in differences(before, after, ignored)]
+        problems += [f"node {node}: {difference}" for difference in differences(before, after, ignored)]
         if not wire.writes(scenario):
-            told += [f"node {node}, after a reset: {difference}"
+            problems += [f"node {node}, after a reset: {difference}"
                      for difference in differences(run.fresh.held[node], run.reset.held[node])]
-        # By the program's own words.
+        # According to the output of the program.
         if "nothing was changed" in run.err and not scenario.was_written_by_others(node) and not resets:
-            told += [f"node {node}, and nothing was changed: {difference}" for difference in differences(before, after)]
-    return told
+            problems += [f"node {node}, and nothing was changed: {difference}" for difference in differences(before, after)]
+    return problems
 
 
 def lost(run):
-    """Whether anything that the program sent did not get there as it was, or its interface was down."""
+    """Whether a frame of the program was lost or changed, or its interface was down."""
     return any(direction == wire.OUT and kind or kind == "down" for _, direction, kind, *_ in run.record)
 
 
 def states(scenario, run):
-    """What was switched on the way is put back."""
+    """NMT states that the command changed are restored."""
     if scenario.command == "nmt" or run.exit == -9:
         return []
-    told = []
+    problems = []
     switches = wire.commands(scenario)
     for node in set(scenario.named) & run.before.states.keys():
         before, after = run.before.states[node], run.after.states[node]
@@ -125,21 +125,21 @@ def states(scenario, run):
         if switches and (not is_told(scenario, node) or lost(run) or scenario.is_disordered() or
                          {"lose", "cut", "garble", "truncate", "stopped"} & scenario.kinds_of_trouble()):
             continue
-        # What could not be put back is said of that node.
+        # A state that could not be restored is reported for this node.
         said = [line for line in run.err.splitlines() if re.search(rf"\b{node}\b", line)]
         if not re.search("not put back|stays?\b|state|left", "\n".join(said)):
-            told.append(f"node {node} was {before} and is {after}")
-    return told
+            problems.append(f"node {node} was {before} and is {after}")
+    return problems
 
 
 def is_told(scenario, node):
-    """Whether a heartbeat told the state all the time."""
+    """Whether heartbeats showed the state all the time."""
     device = scenario.at(node)
     return device is not None and (HEARTBEAT in device["set"] or device["unsaved"]) and scenario.command not in wire.LSS
 
 
 def configuring(scenario, run):
-    """Nobody is left in LSS configuration state, unless it could not be helped."""
+    """No slave is left in LSS configuration state, unless it was unavoidable."""
     if scenario.command not in wire.LSS or run.exit == -9 or not run.configuring or lost(run):
         return []
     excused = scenario.is_commanded_by_others() or any(device["lss"] for device in scenario.devices) or "stopped" in scenario.kinds_of_trouble()
@@ -147,7 +147,7 @@ def configuring(scenario, run):
 
 
 def mapping(scenario, run):
-    """`pdo map` that failed has left the old mapping or the new one, or says how it was left and what mends it."""
+    """After a failed `pdo map` the device has the old or the new mapping, or the message names the state and a remedy."""
     node, wanted = scenario.named[0], scenario.wanted
     if scenario.command != "pdo map" or run.exit in (0, -9) or scenario.restarts(node) or node not in run.before.held:
         return []
@@ -164,7 +164,7 @@ def rows(scenario, run, truth):
 
 
 def claim(scenario, run, foreign):
-    """What an exit code of success says, looked up."""
+    """Checks the claims of a successful exit code."""
     if run.exit != 0 and scenario.command != "check" or scenario.command == "check" and run.exit not in (0, 1):
         return []
     return claims.complaints(scenario, run, foreign)

@@ -1,4 +1,4 @@
-"""What the judges know of the simulated devices: their objects, from the description files."""
+"""The objects of the simulated devices, from the description files, for the judges."""
 
 import functools
 import os
@@ -9,7 +9,7 @@ from harness import HERE
 
 KINDS = ("mh4", "d20", "dps", "mc1609", "hydac", "jumo")
 WIDTHS = {"u8": 1, "i8": 1, "b": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "r32": 4}
-# Those that change by themselves, or act when written.
+# Objects that change on their own, or that start an action when written.
 UNSTEADY = {0x1003, 0x1010, 0x1011}
 
 
@@ -38,7 +38,7 @@ def description(kind):
 
 @functools.cache
 def objects(kind):
-    """All of a kind, by (index, sub)."""
+    """All objects of a device kind, by (index, sub)."""
     found = {}
     for entry in description(kind)["object"]:
         index, _, subs = entry["at"].partition(":")
@@ -51,14 +51,14 @@ def objects(kind):
 
 @functools.cache
 def kept(kind):
-    """What can be written and holds what was written: numbers only."""
+    """The objects that keep a written value: numbers only."""
     return [thing for thing in objects(kind).values()
             if thing.access == "rw" and thing.is_plain and thing.width and thing.index not in UNSTEADY]
 
 
 @functools.cache
 def plain(kind):
-    """Those of `kept` that may be written with any number, as far as they are concerned."""
+    """The objects of `kept` that accept any number."""
     meaning = {0x125, 0x131, 0x132, 0x1A0}
     return [thing for thing in kept(kind) if thing.type in ("u8", "u16", "u32") and thing.index & 0xFFF not in meaning
             and thing.index != 0x1014 and not 0x1800 <= thing.index < 0x6000]
@@ -66,7 +66,7 @@ def plain(kind):
 
 @functools.cache
 def steady(kind):
-    """What can be read and is what it is."""
+    """The readable objects with constant values."""
     return [thing for thing in objects(kind).values() if thing.access == "const" or thing.access == "ro" and thing.index < 0x1003
             and thing.index != 0x1001 or thing in kept(kind)]
 
@@ -82,7 +82,7 @@ def at(text):
 
 
 def number(kind, place, raw):
-    """What the bytes of an object mean, unscaled."""
+    """The unscaled value of the bytes of an object."""
     thing = objects(kind)[place]
     raw = raw[: thing.width]
     if thing.type == "r32":

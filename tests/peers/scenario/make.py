@@ -1,4 +1,4 @@
-"""From a seed to a scenario: a bench, what goes wrong, a command, and how it is interrupted."""
+"""Makes a scenario from a seed: a bench, faults, a command and its interruption."""
 
 import random
 
@@ -6,7 +6,7 @@ from scenario import kinds
 from scenario.relay import IN, OUT
 
 UNITS = {"pressure": ("bar", "psi", "MPa", "kPa", "mbar"), "temperature": ("degC", "degF", "K")}
-# Mapping entries and what they become; the fixed ones are refused, or are as wanted.
+# Mapping entries and their replacements; fixed mappings are rejected, or already as requested.
 ITEMS = {
     "mh4": {"pressure": 0x61300120, "pressure.status": 0x61500108, "temperature": 0x61300220, "0x9130:1/32": 0x91300120},
     "d20": {"0x6130:1/32": 0x61300120, "0x2090:0/32": 0x20900020},
@@ -19,7 +19,7 @@ LSS_SERVICES = (0x11, 0x13, 0x17, 0x43, 0x4B, 0x5E)
 
 
 class Scenario:
-    """Everything that a seed decides."""
+    """All data that a seed determines."""
 
     def __init__(self, seed):
         self.seed = seed
@@ -31,7 +31,7 @@ class Scenario:
         if rng.random() < 0.75:
             trouble(rng, self)
         if not self.is_troubled():
-            # Whoever has nothing in the way must not fail because the machine is slow.
+            # A command without faults must not fail on a slow machine.
             self.timing = (1000, 1)
 
     def is_troubled(self):
@@ -50,22 +50,22 @@ class Scenario:
         return bool({"double", "delay", "stopped"} & self.kinds_of_trouble())
 
     def was_written_by_others(self, node):
-        """Whether another master wrote to it (1017h, nothing else), or took away what was not stored."""
+        """Whether another master wrote to it (only 1017h), or a reset discarded unsaved values."""
         return self.restarts(node) or any(act == "writes" and frame[0] == 0x600 + node for _, act, frame in self.rival)
 
     def is_commanded_by_others(self, node=None):
-        """Whether another master sends NMT commands, or a device starts again by itself."""
+        """Whether another master sends NMT commands, or a device restarts on its own."""
         commands = [frame[1][1] for _, act, frame in self.rival if act == "commands"]
         commands += [of for _, what, of in self.happenings if what == "power"]
         return bool(commands) if node is None else bool({0, node} & set(commands))
 
     def restarts(self, node):
-        """Whether it starts again, and not because of the program."""
+        """Whether it restarts for a reason other than the program."""
         resets = {frame[1][1] for _, act, frame in self.rival if act == "commands" and frame[1][0] in (0x81, 0x82)}
         return bool({0, node} & (resets | {of for _, what, of in self.happenings if what == "power"}))
 
     def line(self):
-        """The command line behind the bus."""
+        """The command line after the bus option."""
         timeout, retries = self.timing
         return ["--timeout", f"{timeout}ms", "--retries", str(retries), *self.arguments]
 
@@ -89,10 +89,10 @@ class Scenario:
 
     def __str__(self):
         timeout, retries = self.timing
-        told = [f"seed {self.seed}: {' '.join(self.line())}"]
-        told += [f"    device {device}" for device in self.devices]
-        told += [f"    faults {self.faults} loss {self.loss} happenings {self.happenings} rival {self.rival}"]
-        return "\n".join([*told, f"    signal {self.signal}"])
+        lines = [f"seed {self.seed}: {' '.join(self.line())}"]
+        lines += [f"    device {device}" for device in self.devices]
+        lines += [f"    faults {self.faults} loss {self.loss} happenings {self.happenings} rival {self.rival}"]
+        return "\n".join([*lines, f"    signal {self.signal}"])
 
 
 def device(rng, place):
@@ -107,13 +107,13 @@ def device(rng, place):
                            f'refuse = {{ "{rng.choice((0x11, 0x13, 0x17))}" = 1 }}', "endless_fastscan = true"))]
     made = {
         "kind": kind,
-        # Never two the same: all different modulo 11.
+        # No two serial numbers are equal: all differ modulo 11.
         "node": rng.choice((1, 5, 7, 33, 80)) + 11 * place,
         "serial": 1000 + place,
         "start": rng.random() < 0.2,
         "latency": rng.choice((0, 0, 0, 0, 0, 1, 1, 3, 3, 20)),
         "set": settings,
-        # Written to 1017h before the command, and not stored.
+        # The value written to 1017h before the command, and not stored.
         "unsaved": rng.choice((60, 150)) if rng.random() < 0.2 else None,
         "lss": lss,
         "channels": [],
@@ -125,14 +125,14 @@ def device(rng, place):
 
 
 def timed(rng, device):
-    """It sends by its timer, not on SYNC."""
+    """Makes the device send by its event timer, not at SYNC."""
     device["set"][0x1800, 5] = rng.choice((20, 50, 100))
     if device["kind"] in ("mh4", "d20"):
         device["set"][0x1800, 2] = 254
 
 
 def hold_still(scenario, share=None):
-    """Measured values do not change, so that what was read can be read again. With `share`, near zero."""
+    """Makes measured values constant, so that a read can be repeated. With `share`, near zero."""
     for device in scenario.devices:
         device["overload"] = None
         for channel in kinds.description(device["kind"])["sim"]["channel"]:
@@ -143,7 +143,7 @@ def hold_still(scenario, share=None):
 
 
 def some(rng, scenario):
-    """Nodes that are there, or seldom one that is not."""
+    """Existing nodes, and rarely a missing one."""
     nodes = [device["node"] for device in scenario.devices if rng.random() < 0.7] or [scenario.devices[0]["node"]]
     if rng.random() < 0.04:
         nodes.append(99)
@@ -155,7 +155,7 @@ def listed(nodes):
 
 
 def command(rng, scenario):
-    """Name, arguments, named nodes, and what is wanted."""
+    """The name, the arguments, the named nodes and the requested values."""
     one = rng.choice(scenario.devices)
     node, kind = one["node"], one["kind"]
     name = rng.choice(("sdo read", "sdo write", "sdo write", "nmt", "nmt", "pdo map", "pdo map", "autozero", "store", "restore", "unit",
@@ -173,10 +173,10 @@ def command(rng, scenario):
     if name == "nmt":
         what = rng.choice(("start", "stop", "preop", "reset", "reset-comm"))
         nodes = some(rng, scenario)
-        everybody = rng.random() < 0.1
+        all_nodes = rng.random() < 0.1
         options = rng.choice(([], [], ["--confirm"], ["--confirm"], ["--no-wait"]))
-        return name, ["nmt", what, "all" if everybody else listed(nodes), "--format", "json", *options], \
-            [device["node"] for device in scenario.devices] if everybody else nodes, {"what": what, "all": everybody}
+        return name, ["nmt", what, "all" if all_nodes else listed(nodes), "--format", "json", *options], \
+            [device["node"] for device in scenario.devices] if all_nodes else nodes, {"what": what, "all": all_nodes}
     if name == "pdo map":
         items = rng.sample(sorted(ITEMS[kind]), rng.randint(0, min(2, len(ITEMS[kind]))))
         code = rng.choice((None, None, ("sync:1", 1), ("sync:5", 5), ("event", 255), ("254", 254)))
@@ -277,14 +277,14 @@ def log(rng, scenario):
         how = how + [option for node in nodes if scenario.at(node) for option in ("--device", f"{node}={scenario.at(node)['kind']}")]
     ends = rng.choice((["--count", str(rng.choice((1, 10, 40)))], ["--duration", f"{rng.choice((300, 700, 1500))}ms"]))
     if ends[0] == "--count":
-        # Without values nothing else would end it.
+        # Without values the recording would not end.
         ends += ["--duration", "3s"]
     return "log", ["log", listed(nodes), *how, *ends], nodes, \
         {"poll": "--poll" in how, "file": rng.random() < 0.4, "passive": "--passive" in how, "count": int(ends[1]) if ends[0] == "--count" else None}
 
 
 def when(rng, command):
-    """A moment in milliseconds after the first frame; early ones more often, but in what takes its time."""
+    """A moment in milliseconds after the first frame. Early moments are more frequent, except for long commands."""
     moments = (100, 600, 1500, 2500) if command in ("log", "check") else (3, 20, 100, 600, 1500)
     return round(rng.uniform(0, rng.choice(moments)), 1)
 

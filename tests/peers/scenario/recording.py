@@ -1,46 +1,46 @@
-"""Every row of a recording is a value that was sent, in order, none twice."""
+"""Each row of a recording is a value that was sent, in order, without repetitions."""
 
 import csv
 
 from scenario.relay import IN
 
-# As the simulator's record has them.
+# The columns of the record of the simulator.
 COLUMNS = ("node", "signal", "value", "unit", "status", "raw")
 
 
 def rows_of(table):
-    """The whole lines of a table; one that a kill cut off is no row."""
+    """The complete lines of a table; a truncated last line is not a row."""
     whole = table[: table.rfind("\n") + 1]
     return [tuple(row[column] for column in COLUMNS) for row in csv.DictReader(whole.splitlines())]
 
 
 def judge(scenario, run, truth):
     rows = run.rows
-    told = []
+    problems = []
     count = scenario.wanted["count"]
     if count is not None and len(rows) > count:
-        told.append(f"{len(rows)} rows of {count}")
+        problems.append(f"{len(rows)} rows of {count}")
     if run.exit == 0 and count is not None and len(rows) < count and not scenario.is_troubled() and run.seconds < 3:
-        told.append(f"{len(rows)} rows of {count}, and it ended")
+        problems.append(f"{len(rows)} rows of {count}, and it ended")
     if not run.is_whole and run.exit != -9:
-        told.append("the last line is cut off")
+        problems.append("the last line is cut off")
     if scenario.wanted["poll"]:
-        return told + polled(rows, run.record)
-    return told + sent(scenario, rows, truth)
+        return problems + polled(rows, run.record)
+    return problems + sent(scenario, rows, truth)
 
 
 def polled(rows, record):
-    """Each is an answer of its node."""
+    """Each row is an answer of its node."""
     answers = {}
     for _, direction, _, _, identifier, data in record:
         if direction == IN and data and 0x580 < identifier < 0x600 and len(data) == 8 and data[0] >> 5 == 2:
             for end in range(5, 9):
                 answers.setdefault(identifier & 0x7F, set()).add(data[4:end])
-    return [f"nobody answered {row}" for row in rows if bytes.fromhex(row[5][2:]) not in answers.get(int(row[0]), ())][:1]
+    return [f"no node answered {row}" for row in rows if bytes.fromhex(row[5][2:]) not in answers.get(int(row[0]), ())][:1]
 
 
 def sent(scenario, rows, truth):
-    """As they stand in the record; what could not be read (a unit, the digits) may be empty."""
+    """Compares rows with the record. Values that could not be read (a unit, the digits) may be empty."""
     disordered = scenario.is_disordered()
     rest, twice = list(truth), 8 * sum(kind == "double" for _, _, kind, _ in scenario.faults)
     troubled = scenario.is_troubled()

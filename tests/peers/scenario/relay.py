@@ -1,8 +1,8 @@
-"""The wire between the program and the devices: a relay that forwards both ways, keeps a record, and makes
+"""The bus between the program and the devices: a relay that forwards in both directions, keeps a record, and makes
 what goes wrong.
 
 Frames that the program sends are all that arrive on its side: the relay does not hear itself. So its record
-tells what came from the program, and what came from the devices or from another master on their side.
+shows which frames are from the program, and which are from the devices or another master on their side.
 """
 
 import errno
@@ -20,12 +20,12 @@ import time
 
 FRAME = struct.Struct("=IB3x8s")
 REMOTE, EXTENDED = socket.CAN_RTR_FLAG, socket.CAN_EFF_FLAG
-# Directions: what the program sends, what it receives.
+# The directions: sent and received by the program.
 OUT, IN = "out", "in"
 
 
 def can_socket(interface, own=False):
-    """A raw socket for classic frames, with room for what comes while nobody reads."""
+    """A raw socket for classic frames, with a large receive buffer."""
     sock = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
     sock.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, int(own))
@@ -39,13 +39,13 @@ def pack(identifier, data):
 
 
 def unpack(raw):
-    """Identifier with its flags, and data: None for a remote frame."""
+    """The identifier with its flags, and the data: None for a remote frame."""
     identifier, length, data = FRAME.unpack(raw)
     return identifier, None if identifier & REMOTE else data[:length]
 
 
 def text(identifier, data):
-    """As candump writes it."""
+    """The frame as candump writes it."""
     number = identifier & 0x1FFFFFFF
     name = f"{number:08X}" if identifier & EXTENDED else f"{number:03X}"
     return f"{name}#{'R' if data is None else data.hex().upper()}"
@@ -60,13 +60,13 @@ class Relay(threading.Thread):
 
     def __init__(self, here, there, forgery=None):
         super().__init__(daemon=True)
-        # Of scenario/forge.py; how many frames it changed.
+        # The forgery (see scenario/forge.py), and the number of frames that it changed.
         self.forgery, self.forged = forgery, 0
         self.interface = here
         self.sides = {OUT: can_socket(here), IN: can_socket(there)}
         self.rival = can_socket(there)
         self.lock = threading.Lock()
-        # Held while something happens, so that nothing does behind calm().
+        # Locked during a fault, so that no fault happens after calm().
         self.acting = threading.Lock()
         self.ticket = itertools.count()
         self.wake_reader, self.wake_writer = os.pipe()
@@ -75,7 +75,7 @@ class Relay(threading.Thread):
         self.start()
 
     def begin(self, faults, loss, seed, happenings):
-        """A new record, new faults; `loss` tells how many frames of a hundred vanish each way."""
+        """Starts a new record with new faults; `loss` is the percentage of frames lost in each direction."""
         with self.lock:
             self.faults = {(direction, number): (kind, ms) for direction, number, kind, ms in faults}
             self.loss, self.random = dict(loss), random.Random(seed)
@@ -87,7 +87,7 @@ class Relay(threading.Thread):
             self.forged = 0
             self.first = None
             self.is_cut = False
-            # What waits in the sockets is of the last scenario.
+            # The frames that wait in the sockets are from the previous scenario.
             for side in self.sides.values():
                 drain(side)
 
@@ -95,17 +95,17 @@ class Relay(threading.Thread):
         self.is_open = True
 
     def close(self):
-        """Nothing is forwarded any more, and what was delayed is lost."""
+        """Stops forwarding. Delayed frames are lost."""
         with self.lock:
             self.is_open, self.delayed, self.happenings = False, [], []
 
     def calm(self):
-        """No more faults; what was delayed still comes."""
+        """Ends all faults. Delayed frames are still delivered."""
         with self.acting, self.lock:
             self.faults, self.loss, self.happenings, self.is_cut = {}, {}, [], False
 
     def begin_now(self):
-        """A program that sends nothing has begun, too."""
+        """Counts the run as started even if the program has not sent a frame."""
         with self.lock:
             self.first = self.first or time.monotonic()
         os.write(self.wake_writer, b"!")
@@ -144,7 +144,7 @@ class Relay(threading.Thread):
             except BlockingIOError:
                 return
             except OSError as error:
-                # The interface went down: told once, and nothing else is lost.
+                # The interface went down. The kernel reports it once, and no other frame is lost.
                 if error.errno != errno.ENETDOWN:
                     raise
                 continue
@@ -176,7 +176,7 @@ class Relay(threading.Thread):
             copies = 2
         elif kind == "delay":
             at += ms / 1000
-            # What the program sends keeps its order: a queue is slow as a whole.
+            # Frames of the program keep their order: a slow queue delays all of them.
             if direction == OUT:
                 self.stalled[OUT] = at
         elif kind == "garble":
@@ -222,7 +222,7 @@ class Relay(threading.Thread):
                     self.record.append((time.monotonic(), "", remark, 0, None, None))
                 act()
 
-    # What may happen.
+    # The possible events.
 
     def cut(self, is_cut):
         self.is_cut = is_cut
@@ -231,25 +231,25 @@ class Relay(threading.Thread):
         subprocess.run(["ip", "link", "set", self.interface, state], check=True)
 
     def rival_sends(self, identifier, data):
-        """Another master, on the devices' side: the program hears it and the answers."""
+        """Another master on the side of the devices: the program receives its frames and the answers."""
         self.rival.send(pack(identifier, data))
 
     def device_resets(self, node):
-        """As if its power failed: nobody else hears why."""
+        """Simulates a power failure of a device; the program does not see the command."""
         self.sides[IN].send(pack(0, bytes([0x81, node])))
 
     def lines(self, last=None):
-        """The record, one line a frame."""
+        """The record, one line for each frame."""
         first = self.record[0][0] if self.record else 0
-        told = []
+        lines = []
         for at, direction, kind, ms, identifier, data in self.record[-last:] if last else self.record:
             if identifier is None:
-                told.append(f"{(at - first) * 1000:9.1f}  -- {kind}")
+                lines.append(f"{(at - first) * 1000:9.1f}  -- {kind}")
             else:
                 arrow = {OUT: "->", IN: "<-"}[direction]
                 fault = f"  {kind} {ms or ''}" if kind else ""
-                told.append(f"{(at - first) * 1000:9.1f}  {arrow} {text(identifier, data)}{fault}")
-        return told
+                lines.append(f"{(at - first) * 1000:9.1f}  {arrow} {text(identifier, data)}{fault}")
+        return lines
 
 
 def drain(sock):
@@ -264,10 +264,10 @@ def drain(sock):
 
 
 def garbled(identifier, data, turned):
-    """Another frame that a receiver can tell from a true one, or the same where there is none.
+    """A changed frame that a receiver can recognise as wrong, or the same frame if that is not possible.
 
-    Only command bytes and, towards the program, object addresses: of data bytes that change nobody could
-    notice anything; a request with another address would be a true request."""
+    Changes only command bytes and, towards the program, object addresses. No receiver could notice changed data
+    bytes, and a request with another address would be a valid request."""
     number = identifier & 0x7FF
     if identifier & (REMOTE | EXTENDED) or not data:
         return data
@@ -280,7 +280,7 @@ def garbled(identifier, data, turned):
 
 
 def truncated(identifier, data, length):
-    """A frame that is shorter, where that can be noticed: TPDOs, and SDO answers whose address is not whole."""
+    """A truncated frame, if a receiver can notice it: TPDOs, and SDO answers without a complete address."""
     number = identifier & 0x7FF
     if identifier & (REMOTE | EXTENDED) or not data or not (0x180 <= number < 0x580 or 0x580 < number < 0x600):
         return data
@@ -288,5 +288,5 @@ def truncated(identifier, data, length):
 
 
 def stop(process, is_stopped):
-    """The simulator hangs, or goes on."""
+    """Stops or continues the simulator."""
     process.send_signal(signal.SIGSTOP if is_stopped else signal.SIGCONT)

@@ -1,9 +1,9 @@
-"""What the program may put on the wire: nothing that could change a device that it was not to touch."""
+"""The frames that the program may send: none that could change a device outside the command."""
 
 from scenario.relay import EXTENDED, OUT, text
 
 LSS = {"set-id", "set-bitrate"}
-# These write by SDO, and nobody else does.
+# Only these commands write by SDO.
 WRITES = {"sdo write", "pdo map", "autozero", "store", "restore", "unit", "filter", "limits", "set-id", "set-bitrate", "minmax",
           "errors", "probe", "startup"}
 SPECIFIERS = {"start": 1, "stop": 2, "preop": 0x80, "reset": 0x81, "reset-comm": 0x82}
@@ -20,7 +20,7 @@ def writes(scenario):
 
 
 def commands(scenario):
-    """Whether it may send NMT commands to those whom it names."""
+    """Whether the command may send NMT commands to the named nodes."""
     options = scenario.arguments
     records = scenario.command == "log" and not {"--poll", "--no-nmt", "--passive"} & set(options)
     judges = scenario.command == "check" and "--for" in options and "--poll" not in options
@@ -49,23 +49,23 @@ def is_allowed(scenario, identifier, data):
     if number == 0x7E5:
         return scenario.command in LSS
     if number & 0x780 == 0x600 and data:
-        # Uploads, aborts, and what goes on with them. Who might be where one wants to go is asked, too.
+        # Uploads, aborts and segments. A new node-ID is also checked for another device.
         if data[0] >> 5 in (2, 3, 4, 5):
             asks = scenario.command in LSS or scenario.command == "scan"
-            everybody = scenario.command == "nmt" and scenario.wanted["all"]
-            return node in named or asks or everybody
+            all_nodes = scenario.command == "nmt" and scenario.wanted["all"]
+            return node in named or asks or all_nodes
         return node in named and writes(scenario)
     return False
 
 
 def judge(scenario, record):
-    """The first frame that must not be, if there is one."""
+    """The first forbidden frame, if there is one."""
     for _, direction, _, _, identifier, data in record:
         if direction == OUT and not is_allowed(scenario, identifier, data):
-            return [f"touches nobody else: {text(identifier, data)}"]
+            return [f"frame to another node: {text(identifier, data)}"]
     return []
 
 
 def sent(record, numbers):
-    """The frames of the program with these identifiers: what became of each, and its data."""
+    """The frames of the program with these identifiers: the fate and the data of each."""
     return [(kind, data) for _, direction, kind, _, identifier, data in record if direction == OUT and identifier in numbers]
