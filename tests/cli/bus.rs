@@ -79,6 +79,6 @@ fn one_sensor_alone_is_asked_only_with_active() {
         done.stderr
     );
     let done = bench.run("bus detect --active").prints("100000\n");
-    assert!(done.stderr.contains("nothing valid is heard: asking"), "{}", done.stderr);
+    assert!(done.stderr.contains("no valid frame: now asking"), "{}", done.stderr);
     assert!(done.frames.contains(&"606#4000100000000000".to_owned()));
 }

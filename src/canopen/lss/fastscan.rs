@@ -193,22 +193,7 @@ impl Fastscan {
                 self.phase = if bit % CHECK_EVERY == 0 { Phase::Check(bit) } else { Phase::Bit(bit - 1) };
             }
             Phase::Check(bit) if answered => self.phase = bit.checked_sub(1).map_or(Phase::Advance, Phase::Bit),
-            Phase::Check(bit) => {
-                self.tries += 1;
-                if self.tries >= TRIES {
-                    return self.unsettled();
-                }
-                self.extensions += 1;
-                if self.tries % 2 == 1 {
-                    let (above, top) = (bit + CHECK_EVERY, bit + CHECK_EVERY - 1);
-                    self.number &= u32::MAX.checked_shl(above.into()).unwrap_or(0);
-                    self.phase = Phase::Bit(top);
-                } else {
-                    // The previous check may have been passed by a late answer, or slaves answer slowly.
-                    self.has_several_answers = true;
-                    self.search();
-                }
-            }
+            Phase::Check(bit) => return self.on_failed_check(bit),
             Phase::Advance if answered => {
                 self.extensions = 0;
                 self.known[usize::from(self.part.number())] = Some(self.number);
@@ -231,6 +216,25 @@ impl Fastscan {
                 self.has_several_answers = true;
                 self.phase = Phase::AllSlaves;
             }
+        }
+        Progress::Continue
+    }
+
+    /// No slave has the bits found so far, from `bit` upwards: finds them again.
+    fn on_failed_check(&mut self, bit: u8) -> Progress {
+        self.tries += 1;
+        if self.tries >= TRIES {
+            return self.unsettled();
+        }
+        self.extensions += 1;
+        if self.tries % 2 == 1 {
+            let (above, top) = (bit + CHECK_EVERY, bit + CHECK_EVERY - 1);
+            self.number &= u32::MAX.checked_shl(above.into()).unwrap_or(0);
+            self.phase = Phase::Bit(top);
+        } else {
+            // The previous check may have been passed by a late answer, or slaves answer slowly.
+            self.has_several_answers = true;
+            self.search();
         }
         Progress::Continue
     }

@@ -201,7 +201,7 @@ fn real(text: &str, digits: usize) -> Option<Reading<Scalar>> {
         (true, _) => f64::from_bits(value),
         (false, _) => value.to_string().parse().ok()?,
     };
-    let how = if hex.len() == digits { "is taken for the bit pattern of" } else { "is read as" };
+    let how = if hex.len() == digits { "is read as the bit pattern of" } else { "is read as" };
     Some(Reading { value: Scalar::Real(number), doubt: Some(format!("{} {how} {number}", quoted(text))) })
 }
 

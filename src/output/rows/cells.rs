@@ -80,8 +80,11 @@ impl Times {
                     use std::fmt::Write as _;
                     self.text.clear();
                     self.second = None;
+                    // RFC 3339 has no years beyond 9999, and `system_time` ends there.
+                    if wall > Wall::LAST {
+                        return Err(io::Error::other("a time after the year 9999"));
+                    }
                     let whole = Wall::at(Duration::from_secs(since.as_secs())).system_time();
-                    // RFC 3339 has no years beyond 9999.
                     write!(self.text, "{}", humantime::format_rfc3339_seconds(whole)).map_err(io::Error::other)?;
                     self.text.pop();
                     self.second = Some(since.as_secs());
