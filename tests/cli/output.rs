@@ -24,11 +24,7 @@ fn a_reader_that_has_gone_is_a_quiet_success() {
         // A recording that has not reached its --count is not complete.
         if line.contains("--count") {
             let done = bench.end(child).exit(8);
-            assert!(
-                done.stderr.contains("cangauge: the output was closed before the end: "),
-                "{line}: {}",
-                done.stderr
-            );
+            assert!(done.stderr.contains("the output was closed before the end: "), "{line}: {}", done.stderr);
             continue;
         }
         let done = bench.end(child).exit(0);
