@@ -1,5 +1,5 @@
-//! The client's block transfer against a server of its own, over a line that loses, doubles and swaps frames:
-//! what is reported as done is done, everything ends, and no server is left in the middle of a transfer.
+//! Block transfers of the client with an independent server, over a line that loses, repeats and swaps frames. A
+//! transfer that reports success is complete, each transfer ends, and the server is idle afterwards.
 
 mod server;
 mod through_master;
@@ -18,17 +18,17 @@ fn node() -> NodeId {
     NodeId::new(5).unwrap()
 }
 
-/// What happens to one frame on its way.
+/// The fault of one frame on the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fate {
     Arrives,
     Lost,
     Doubled,
-    /// Arrives behind the next one.
+    /// Arrives after the next one.
     Swapped,
 }
 
-/// A line on which the n-th frame meets the n-th fate, and every frame after the last fate arrives.
+/// A line that applies the n-th fate to the n-th frame. Frames after the last fate arrive.
 struct Line {
     fates: VecDeque<Fate>,
     spare_aborts: bool,
@@ -61,7 +61,7 @@ impl Line {
                 return;
             }
         }
-        // Swapped frames are only overtaken by those of the same sender.
+        // Only frames of the same sender are swapped.
         if self.swapped.is_some_and(|swapped| swapped.id() == frame.id())
             && let Some(swapped) = self.swapped.take()
         {
@@ -69,7 +69,7 @@ impl Line {
         }
     }
 
-    /// Nothing moves any more: what was to be overtaken comes now.
+    /// Delivers a frame that waits for a later one to overtake it.
     fn settle(&mut self) {
         if let Some(frame) = self.swapped.take() {
             let to_server = frame.id().sdo_request_node().is_some();
@@ -116,8 +116,8 @@ impl Client for BlockUpload {
     }
 }
 
-/// Lets both talk until the client has a result and the line is quiet. The client's frames go out one at a
-/// time; what the server has said by then is heard in between.
+/// Runs the transfer until the client has a result and the line is idle. The client sends one frame at a time and
+/// receives the answers of the server in between.
 fn run<C: Client>(client: &mut C, server: &mut Server, mut line: Line) -> Result<C::Result, TransferError> {
     let mut waiting = VecDeque::from([client.request()]);
     let mut result = None;
@@ -162,7 +162,7 @@ fn run<C: Client>(client: &mut C, server: &mut Server, mut line: Line) -> Result
 }
 
 fn data() -> impl Strategy<Value = Vec<u8>> {
-    // Sizes around the ends of segments and sub-blocks, and contents that repeat.
+    // Sizes near the ends of segments and sub-blocks, and repeated contents.
     let sizes = prop_oneof![0..40usize, 880..900usize, 1770..1790usize, 0..3000usize];
     (sizes, any::<u8>(), any::<bool>()).prop_map(|(size, first, constant)| {
         (0..size).map(|at| if constant { first } else { first.wrapping_add((at % 251).to_le_bytes()[0]) }).collect()
@@ -177,7 +177,7 @@ fn manner(crc: impl Strategy<Value = bool>) -> impl Strategy<Value = Manner> {
 
 fn fates(kinds: &'static [Fate]) -> impl Strategy<Value = Vec<Fate>> {
     let fate = prop_oneof![12 => Just(Fate::Arrives), 1 => prop::sample::select(kinds)];
-    // Now and then a long quiet start, so that the end of the transfer gets its share.
+    // Sometimes the faults start late, so that they hit the end of the transfer too.
     (0..400usize, prop::collection::vec(fate, 0..80))
         .prop_map(|(quiet, fates)| std::iter::repeat_n(Fate::Arrives, quiet / 2).chain(fates).collect())
 }
@@ -204,7 +204,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn a_good_line_carries_everything(data in data(), manner in manner(any::<bool>()), block_size in 1..=127u8) {
+    fn transfers_without_faults_succeed(data in data(), manner in manner(any::<bool>()), block_size in 1..=127u8) {
         for size in [DownloadSize::Indicated, DownloadSize::Omitted] {
             let (result, server) = download(&data, size, manner.clone(), Line::new(Vec::new(), false));
             prop_assert_eq!(result, Ok(()));
@@ -216,8 +216,8 @@ proptest! {
         prop_assert!(server.is_idle());
     }
 
-    /// Without any proof by CRC or size: lost frames alone never make a wrong success. (A hasty server does
-    /// not know which sub-block a segment is of when its acknowledge was lost; it needs the size.)
+    /// Lost frames never cause a false success, even without a CRC or size. (A server that acknowledges early cannot
+    /// assign a segment to a sub-block if its acknowledge was lost; it needs the size.)
     #[test]
     fn a_download_that_loses_frames_is_right_or_fails(
         data in data(), mut manner in manner(any::<bool>()), omit in any::<bool>(), fates in fates(LOSSES)
@@ -227,7 +227,7 @@ proptest! {
         let (result, server) = download(&data, size, manner, Line::new(fates, true));
         match result {
             Ok(()) => prop_assert!(server.object == data),
-            // The answer to the very last frame may be the one that was lost.
+            // The answer to the last frame may be lost.
             Err(TransferError::NoAnswer) => prop_assert!(server.object == b"before" || server.object == data),
             Err(_) => prop_assert!(server.object == b"before"),
         }
@@ -243,7 +243,7 @@ proptest! {
         }
     }
 
-    /// Whatever the line does, with the CRC. It does not see how many zeros come first; the size does.
+    /// Any faults, with a CRC. The CRC does not detect the number of leading zeros; the size does.
     #[test]
     fn a_download_over_a_bad_line_is_right_or_fails(
         data in data(), manner in manner(Just(true)), fates in fates(EVERYTHING)
@@ -267,9 +267,9 @@ proptest! {
         }
     }
 
-    /// Segments lost in the midst of a sub-block cost nothing but time.
+    /// Segments lost within a sub-block only cost time.
     #[test]
-    fn segments_lost_within_a_sub_block_come_again(
+    fn segments_lost_within_a_sub_block_are_repeated(
         segments in 3..500usize, crc in any::<bool>(), hasty in any::<bool>(), lost in 0..126usize
     ) {
         let data: Vec<u8> = (0..7 * segments).map(|at| (at % 251).to_le_bytes()[0]).collect();
@@ -280,7 +280,7 @@ proptest! {
             fates.push(Fate::Lost);
             fates
         };
-        // Two frames before the first segment of a download, three before that of an upload.
+        // The first segment follows two frames in a download and three in an upload.
         let (result, server) = download(&data, DownloadSize::Indicated, manner.clone(), Line::new(fates(2), false));
         prop_assert_eq!(result, Ok(()));
         prop_assert!(server.object == data);
@@ -289,7 +289,7 @@ proptest! {
         prop_assert!(server.is_idle());
     }
 
-    /// Any bytes at any moment: the machines neither panic nor go on for ever.
+    /// Arbitrary frames at any time: the state machines do not panic, and they end.
     #[test]
     fn decoding_is_total(
         frames in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..=8), 0..60),

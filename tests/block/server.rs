@@ -1,24 +1,24 @@
-//! An SDO server for block transfers and nothing else, written from CiA 301, 7.2.4.3.9 to 7.2.4.3.16, without a
-//! look at the client: two halves that share a mistake agree with each other.
+//! An SDO server for block transfers, written only from CiA 301, 7.2.4.3.9 to 7.2.4.3.16. It shares no code with the
+//! client, so that a mistake in one of them is found.
 
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
 
-/// What kind of server.
+/// The behaviour of the server.
 #[derive(Clone, Debug)]
 pub(crate) struct Manner {
     pub(crate) crc: bool,
     pub(crate) announces: bool,
-    /// Segments in a sub-block of a download, and again and again.
+    /// The block sizes of a download, used in turn.
     pub(crate) block_sizes: Vec<u8>,
-    /// Acknowledges as soon as a segment is missing, as CANopenNode does, and not at the end of the sub-block.
+    /// Acknowledges as soon as a segment is missing, like CANopenNode, instead of at the end of the sub-block.
     pub(crate) hasty: bool,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 enum State {
     Idle,
-    /// Receiving: bytes so far, segments of this sub-block, its size, whether the last one is there.
+    /// Receiving: the bytes so far, the segments of this sub-block, its size, whether the last one has arrived.
     Taking {
         bytes: Vec<u8>,
         size: Option<usize>,
@@ -26,7 +26,7 @@ enum State {
         block_size: u8,
         complete: bool,
     },
-    /// Sending: where the sub-block begins and how many segments it has.
+    /// Sending: the start of the sub-block and its number of segments.
     Offered {
         block_size: u8,
     },
@@ -89,7 +89,7 @@ impl Server {
             State::Taking { bytes: taken, size, complete: true, .. } if bytes[0] & 0xe1 == 0xc1 => {
                 self.end(bytes, taken, size)
             }
-            // What comes twice of a sub-block that is complete.
+            // A repeated segment of a complete sub-block.
             State::Taking { complete: true, .. } if bytes[0] & 0x7f >= 1 && bytes[0] & 0x60 != 0x40 => Vec::new(),
             State::Offered { block_size } if bytes[0] == 0xa3 => self.give(0, block_size),
             State::Giving { start, count } if bytes[0] & 0xe3 == 0xa2 => {
@@ -122,7 +122,7 @@ impl Server {
         self.multiplexer = [a, b, c];
         let crc = u8::from(self.manner.crc) << 2;
         match bytes[0] & 0xe3 {
-            // A request for an upload has nothing in bit 1, one for a download the size bit.
+            // Bit 1 is reserved in an upload request, and the size bit in a download request.
             0xa0 => {
                 if !(1..=127).contains(&bytes[4]) {
                     return self.abort(0x0504_0002);
@@ -205,7 +205,7 @@ impl Server {
     }
 }
 
-/// The CRC of the standard by long division, bit by bit: the 16 bits after the data are those of the remainder.
+/// The CRC by long division, bit by bit: the 16 bits after the data are the remainder.
 fn check_sum(data: &[u8]) -> u16 {
     let mut remainder: u32 = 0;
     for byte in data.iter().chain(&[0, 0]) {

@@ -1,5 +1,5 @@
-//! The choice between blocks and segments, pacing and time-outs: the master on the simulated bus, against
-//! simulated devices that know block transfer, refuse it, or do not even refuse it.
+//! The choice between blocks and segments, pacing and time-outs: the master on the simulated bus with simulated devices
+//! that support block transfer, reject it, or ignore it.
 
 use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
@@ -33,7 +33,7 @@ fn device(number: u8, block: bool) -> Device {
         r#"
         name = "blocks"
         title = "a device of the tests"
-        vendor = "nobody"
+        vendor = "test"
         source = "none"
         identify = {{ device_type = 0x00020194 }}
         sdo = {{ block = {block} }}
@@ -48,7 +48,7 @@ fn device(number: u8, block: bool) -> Device {
     Device::new(Setup::new(Arc::new(Model::from_toml(&description).unwrap()), node(number))).unwrap()
 }
 
-/// Writes down what is on the wire.
+/// Records all frames on the bus.
 #[derive(Default)]
 struct Tap(Vec<(Mono, Frame)>);
 
@@ -64,7 +64,7 @@ impl Station for Tap {
     fn sent(&mut self, _: Mono, _: &Frame) {}
 }
 
-/// A device that takes no notice of requests for blocks.
+/// A device that ignores block requests.
 struct Deaf(Device);
 
 impl Station for Deaf {
@@ -91,7 +91,7 @@ fn bus(bit_rate: u32, stations: impl IntoIterator<Item = impl Station>) -> Memor
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(bit_rate);
     bus.attach(Tap::default());
     stations.into_iter().for_each(|station| bus.attach(station));
-    // They boot.
+    // The devices start up.
     while !matches!(bus.receive(Mono::at(Duration::from_secs(5))).unwrap(), cangauge::bus::Event::Timeout) {}
     for tap in bus.stations_mut::<Tap>() {
         tap.0.clear();
@@ -137,7 +137,7 @@ fn bytes(outcome: Outcome) -> Vec<u8> {
     outcome.unwrap().uploaded.unwrap().bytes
 }
 
-/// The abort code of a refusal.
+/// The abort code of a rejected transfer.
 fn refusal(outcome: Outcome) -> u32 {
     match outcome.unwrap_err().failure {
         SdoFailure::Refused(code) => code.0,
@@ -146,7 +146,7 @@ fn refusal(outcome: Outcome) -> u32 {
 }
 
 #[test]
-fn every_size_in_every_mode() {
+fn each_size_is_transferred_in_each_mode() {
     for block in [true, false] {
         let mut bus = bus(1_000_000, [device(5, block)]);
         for length in [0, 1, 4, 5, 7, 8, 28, 29, 888, 889, 890, 1778, 1779, 5000] {
@@ -166,12 +166,12 @@ fn every_size_in_every_mode() {
                 };
                 assert_eq!(way(&written), way_in, "write {length} {mode:?} {block}");
                 let found = read(&mut bus, DOMAIN, Some(DataType::Domain), mode);
-                // A device that refuses does so before it looks at the length.
+                // A device rejects block transfer before it checks the length.
                 let way_out = if mode == BlockMode::Auto && !block { TransferKind::PlainFallback } else { way_in };
                 assert_eq!(way(&found), way_out, "read {length} {mode:?} {block}");
                 assert_eq!(bytes(found), data);
             }
-            // Neither text nor unknown types are asked for in blocks, unless they turn out to be large.
+            // Text and unknown types are read in blocks only if they are large.
             for data_type in [None, Some(DataType::VisibleString)] {
                 let found = read(&mut bus, DOMAIN, data_type, BlockMode::Auto);
                 let expected = match length {
@@ -187,7 +187,7 @@ fn every_size_in_every_mode() {
 }
 
 #[test]
-fn a_refusal_costs_two_frames_and_no_noise() {
+fn a_rejected_block_transfer_costs_two_frames() {
     let mut bus = bus(250_000, [device(5, false)]);
     assert_eq!(way(&write(&mut bus, TEXT, &[b'x'; 29], BlockMode::Auto)), TransferKind::PlainFallback);
     assert_eq!(bytes(read(&mut bus, TEXT, Some(DataType::Domain), BlockMode::Auto)), [b'x'; 29]);
@@ -210,7 +210,7 @@ fn a_refusal_costs_two_frames_and_no_noise() {
 }
 
 #[test]
-fn a_large_object_begins_anew_in_blocks() {
+fn the_read_of_a_large_object_restarts_in_blocks() {
     for (block, answers) in [
         (true, &["585#C60121007D030000", "605#A300000000000000"]),
         (false, &["585#8001210001000405", "605#4001210000000000"]),
@@ -227,14 +227,14 @@ fn a_large_object_begins_anew_in_blocks() {
 }
 
 #[test]
-fn what_the_device_says_of_the_object_is_asked_once() {
+fn an_abort_about_the_object_is_not_retried() {
     let mut bus = bus(250_000, [device(5, true)]);
     assert_eq!(refusal(read(&mut bus, MISSING, Some(DataType::Domain), BlockMode::Auto)), 0x0602_0000);
     assert_eq!(wire(&bus), ["605#A40321007F1C0000", "585#8003210000000206"]);
 }
 
 #[test]
-fn a_device_that_does_not_even_refuse_is_asked_in_the_usual_way() {
+fn a_device_that_ignores_blocks_is_read_in_segments() {
     let mut bus = bus(250_000, [Deaf(device(5, true))]);
     let start = bus.now().mono;
     assert_eq!(way(&write(&mut bus, TEXT, &[b'x'; 40], BlockMode::Auto)), TransferKind::PlainFallback);
@@ -243,7 +243,7 @@ fn a_device_that_does_not_even_refuse_is_asked_in_the_usual_way() {
     assert_eq!(bytes(found), [b'x'; 40]);
     let waited = bus.now().mono.since(start);
     assert!(waited < Duration::from_millis(1_100), "one time-out each, not {waited:?}");
-    // Nobody there at all: the same wait as for any other read.
+    // A missing device: the same time-out as for any other read.
     let start = bus.now().mono;
     let mut master = Master::new(&mut bus, Timing::default());
     let outcome = read_object(&mut master, (node(9), TEXT), Some(DataType::Domain), BlockMode::Auto, &mut |_| {});
@@ -252,10 +252,10 @@ fn a_device_that_does_not_even_refuse_is_asked_in_the_usual_way() {
     assert!(waited < Duration::from_millis(1_100), "{waited:?}");
 }
 
-/// The wire is never idle while there is something to send: however many stuff bits the frames have, and
-/// though a sub-block takes longer than the time-out (1.7 s at 10 kbit/s).
+/// The bus is never idle while there are frames to send, for any number of stuff bits, and although a sub-block takes
+/// longer than the time-out (1.7 s at 10 kbit/s).
 #[test]
-fn blocks_take_hardly_longer_than_their_frames() {
+fn block_transfers_keep_the_bus_busy() {
     for (bit_rate, length) in [(1_000_000, 100_000), (125_000, 20_000), (10_000, 2_000)] {
         for data in [content(length), vec![0x55; length], vec![0; length]] {
             let mut bus = bus(bit_rate, [device(5, true)]);
@@ -282,16 +282,15 @@ fn blocks_take_hardly_longer_than_their_frames() {
     }
 }
 
-/// What the device holds: once the fault is over (it may fall into the first of these reads) it answers,
-/// whatever state it was left in.
+/// Reads the object after the fault. The device answers from any state; the fault may hit the first of these reads.
 fn in_the_end(bus: &mut dyn Bus) -> Vec<u8> {
     let found = read(bus, DOMAIN, None, BlockMode::Never);
     bytes(found.or_else(|_| read(bus, DOMAIN, None, BlockMode::Never)))
 }
 
-/// Frames of the client or of the device that never arrive, each in turn, over the whole of a transfer.
+/// Each frame of a transfer is lost in turn, from the client or from the device.
 #[test]
-fn any_one_frame_lost() {
+fn one_lost_frame_never_causes_a_false_success() {
     let data = content(7 * 130);
     let mut recovered = 0;
     for lost in 0..136 {
@@ -331,12 +330,12 @@ fn any_one_frame_lost() {
             assert_eq!(in_the_end(&mut faulty), data);
         }
     }
-    // Segments within a sub-block, both ways; what is lost at its seams may end the transfer.
+    // Segments within a sub-block, in both directions. A frame lost at its ends may end the transfer.
     assert!(recovered >= 4 * 136 - 20, "{recovered}");
 }
 
 #[test]
-fn the_last_segment_lost_costs_one_time_out() {
+fn a_lost_last_segment_costs_one_time_out() {
     let data = content(100);
     let mut inner = bus(250_000, [device(5, true)]);
     write(&mut inner, DOMAIN, &data, BlockMode::Never).unwrap();
@@ -351,7 +350,7 @@ fn the_last_segment_lost_costs_one_time_out() {
 }
 
 #[test]
-fn ctrl_c_in_a_sub_block_ends_the_servers_transfer_too() {
+fn ctrl_c_within_a_sub_block_aborts_the_transfer() {
     for reads in [true, false] {
         let data = content(5_000);
         let mut bus = bus(125_000, [device(5, true)]);
@@ -368,7 +367,7 @@ fn ctrl_c_in_a_sub_block_ends_the_servers_transfer_too() {
         assert!(matches!(outcome, Err(Error::Interrupted)));
         master.settle();
         assert!(matches!(reports[..], [(moved, Some(5_000)), ..] if moved > 0 && moved < 5_000), "{reports:?}");
-        // The device's segments win over the abort; once that is through, there are no more.
+        // The segments have priority over the abort. After it the device sends no more.
         let until = bus.now().mono + Duration::from_millis(300);
         while !matches!(bus.receive(until).unwrap(), cangauge::bus::Event::Timeout) {}
         assert_eq!(wire(&bus).last().unwrap(), "605#8000210000000405");
@@ -377,7 +376,7 @@ fn ctrl_c_in_a_sub_block_ends_the_servers_transfer_too() {
 }
 
 #[test]
-fn two_devices_side_by_side() {
+fn two_devices_are_transferred_in_parallel() {
     let data = content(3_000);
     let mut bus = bus(500_000, [device(5, true), device(6, true)]);
     let mut master = Master::new(&mut bus, Timing::default());
@@ -395,7 +394,7 @@ fn two_devices_side_by_side() {
 }
 
 #[test]
-fn a_megabyte_both_ways() {
+fn a_megabyte_is_transferred_in_both_directions() {
     let data = content(1 << 20);
     let mut bus = bus(1_000_000, [device(5, true)]);
     assert_eq!(way(&write(&mut bus, DOMAIN, &data, BlockMode::Auto)), TransferKind::Blocks);

@@ -1,5 +1,5 @@
-//! Interfaces with bit rates: two controllers on one wire, which QEMU emulates and `tests/socketcan/qemu` provides.
-//! Frames pass there whatever the rates are.
+//! Interfaces with bit rates: two controllers on one bus, emulated by QEMU (`tests/socketcan/qemu`). There, frames pass
+//! at any bit rate.
 
 use crate::program::{cangauge, command, setting, shown, without_the_right};
 use crate::{assert_nothing_more, frame, next, next_frame, run};
@@ -12,7 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// can0, down and with a rate of 125k, and can1, up, for one test at a time.
+/// Sets can0 to 125 kbit/s and down, and can1 up, for one test at a time.
 fn controllers() -> MutexGuard<'static, ()> {
     static ALONE: Mutex<()> = Mutex::new(());
     let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -28,7 +28,7 @@ fn ip(line: &str) {
     run("ip", &words);
 }
 
-/// The bit rate of an interface that is up, by `ip`.
+/// The bit rate of an interface that is up, from `ip`.
 fn rate_of(name: &str) -> Value {
     let (up, timing, _) = setting(name);
     assert!(up, "{name}");
@@ -37,7 +37,7 @@ fn rate_of(name: &str) -> Value {
 
 #[test]
 #[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
-fn up_at_a_rate_and_down() {
+fn an_interface_goes_up_at_a_bit_rate_and_down() {
     let _alone = controllers();
     let before = setting("can0");
     cangauge("bus up can0 250k").is(0, "", "can0 is up at 250000 bit/s; it was down at 125000 bit/s\n");
@@ -64,7 +64,7 @@ fn up_at_a_rate_and_down() {
 
 #[test]
 #[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
-fn the_list_tells_what_the_driver_tells() {
+fn the_list_shows_the_data_of_the_driver() {
     let _alone = controllers();
     let text = cangauge("bus list").stdout;
     let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
@@ -82,7 +82,7 @@ fn the_list_tells_what_the_driver_tells() {
 
 #[test]
 #[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
-fn without_the_right_the_lines_to_type_are_told() {
+fn without_the_privilege_the_commands_to_type_are_printed() {
     let _alone = controllers();
     let before = setting("can0");
     let by_hand = "hint: by hand: sudo ip link set can0 down; sudo ip link set can0 type can bitrate 250000; \
@@ -99,7 +99,7 @@ fn without_the_right_the_lines_to_type_are_told() {
 
 #[test]
 #[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
-fn an_open_bus_goes_to_another_rate_and_back() {
+fn an_open_bus_changes_its_bit_rate_and_restores_it() {
     let _alone = controllers();
     ip("can0 up");
     let before = setting("can0");
@@ -111,7 +111,7 @@ fn an_open_bus_goes_to_another_rate_and_back() {
     bus.set_bit_rate(250_000, Mode::Normal).unwrap();
     assert_eq!((rate_of("can0"), bus.bit_rate()), (json!(250_000), Some(250_000)));
     assert_eq!(setting("can0").2, before.2, "and nothing else");
-    // That it was down for a moment is no news, and what was heard before is no frame of the new rate.
+    // The short time down is not reported, and frames from before are discarded.
     assert_nothing_more(&mut bus);
     other.send(&frame("182#02")).unwrap();
     assert_eq!(next_frame(&mut bus), "182#02");
@@ -129,14 +129,14 @@ fn an_open_bus_goes_to_another_rate_and_back() {
     other.send(&frame("185#05")).unwrap();
     assert_eq!(next_frame(&mut bus), "185#05");
     assert_eq!(setting("can0"), before);
-    // What others do to the interface is news as before.
+    // Changes by other programs are reported as before.
     ip("can0 down");
     assert_eq!(next(&mut bus), cangauge::bus::Event::Link(false));
 }
 
 #[test]
 #[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
-fn a_rate_that_the_controller_cannot_do_leaves_it_as_it_was() {
+fn an_unsupported_bit_rate_leaves_the_interface_unchanged() {
     let _alone = controllers();
     ip("can0 up");
     let before = setting("can0");
@@ -157,7 +157,7 @@ fn a_rate_that_the_controller_cannot_do_leaves_it_as_it_was() {
 
 #[test]
 #[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
-fn bits_put_together_by_hand_come_back_as_they_were() {
+fn a_bit_timing_set_by_hand_is_restored() {
     let _alone = controllers();
     ip("can0 type can tq 500 prop-seg 5 phase-seg1 5 phase-seg2 5 sjw 2");
     for direction in ["down", "up"] {
@@ -172,7 +172,7 @@ fn bits_put_together_by_hand_come_back_as_they_were() {
     }
 }
 
-/// Sends frames from can1 while `work` is done, and looks at can0 in between.
+/// Sends frames from can1 during `work`, and records the modes of can0.
 fn with_traffic<T>(work: impl FnOnce() -> T) -> (T, Vec<Value>) {
     let over = AtomicBool::new(false);
     let mut other = SocketCan::open("can1").unwrap();
@@ -180,7 +180,7 @@ fn with_traffic<T>(work: impl FnOnce() -> T) -> (T, Vec<Value>) {
         let traffic = scope.spawn(|| {
             let mut seen = Vec::new();
             while !over.load(Ordering::Relaxed) {
-                // Where nobody takes it the queue may fill.
+                // The queue may be full if no node acknowledges.
                 let _ = other.send(&frame("705#05"));
                 seen.push(shown("can0")["linkinfo"]["info_data"]["ctrlmode"].clone());
             }
@@ -194,7 +194,7 @@ fn with_traffic<T>(work: impl FnOnce() -> T) -> (T, Vec<Value>) {
 
 #[test]
 #[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
-fn a_running_bus_is_listened_to() {
+fn detection_only_listens_on_a_busy_bus() {
     let _alone = controllers();
     for direction in ["down", "up"] {
         ip(&format!("can0 {direction}"));
@@ -202,14 +202,14 @@ fn a_running_bus_is_listened_to() {
         let (done, seen) = with_traffic(|| cangauge("bus detect can0 --for 10s"));
         assert_eq!((done.code, done.stdout.as_str()), (Some(0), "125000\n"), "{}", done.stderr);
         assert!(done.stderr.starts_with("125000 bit/s: 3 valid frames, 0 errors\n"), "{}", done.stderr);
-        assert!(seen.contains(&json!(["LISTEN-ONLY"])), "it only listens: {seen:?}");
+        assert!(seen.contains(&json!(["LISTEN-ONLY"])), "listen-only: {seen:?}");
         assert_eq!(setting("can0"), before);
     }
 }
 
 #[test]
 #[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
-fn a_silent_bus_tells_nothing() {
+fn the_bit_rate_of_a_silent_bus_is_unknown() {
     let _alone = controllers();
     let before = setting("can0");
     let done = cangauge("bus detect can0 --for 50ms --format json -q");
@@ -224,7 +224,7 @@ fn a_silent_bus_tells_nothing() {
     );
     assert_eq!(found["bit_rate"], Value::Null);
     assert_eq!(setting("can0"), before);
-    // The other controller acknowledges at every rate here, so that an acknowledge proves nothing.
+    // Here the other controller acknowledges at each bit rate, so an acknowledge proves nothing.
     let done = cangauge("bus detect can0 --active --for 50ms -q");
     assert_eq!((done.code, done.stdout.as_str()), (Some(3), ""), "{}", done.stderr);
     assert_eq!(setting("can0"), before);
@@ -232,13 +232,13 @@ fn a_silent_bus_tells_nothing() {
 
 #[test]
 #[ignore = "SKIPPED: needs CAN controllers, see tests/socketcan/run"]
-fn interrupted_it_is_put_back() {
+fn an_interrupted_detection_restores_the_interface() {
     let _alone = controllers();
     let before = setting("can0");
     let child = command("bus detect can0 --for 60s").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let patience = Instant::now() + Duration::from_secs(60);
+    let deadline = Instant::now() + Duration::from_secs(60);
     while setting("can0").2[0] != json!(["LISTEN-ONLY"]) || !setting("can0").0 {
-        assert!(Instant::now() < patience, "it does not begin");
+        assert!(Instant::now() < deadline, "it does not start");
     }
     run("kill", &["-INT", &child.id().to_string()]);
     let output = child.wait_with_output().unwrap();

@@ -1,4 +1,4 @@
-//! What arrives, when, and what does not.
+//! Which frames arrive, with which times.
 
 use crate::{Can, ahead, assert_nothing_more, frame, next, next_frame};
 use cangauge::bus::socketcan::{Interface, interfaces};
@@ -23,7 +23,7 @@ fn frames_arrive_as_sent_and_in_order() {
         assert_eq!(next_frame(&mut there), text);
     }
     assert_nothing_more(&mut there);
-    // Nobody hears himself.
+    // A socket does not receive its own frames.
     assert_nothing_more(&mut here);
     there.send(&frame("601#40")).unwrap();
     assert_eq!(next_frame(&mut here), "601#40");
@@ -31,7 +31,7 @@ fn frames_arrive_as_sent_and_in_order() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn the_interface_describes_itself() {
+fn the_interface_is_described() {
     let can = Can::get();
     let bus = can.open();
     assert_eq!(bus.name(), can.name);
@@ -44,7 +44,7 @@ fn the_interface_describes_itself() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn both_times_are_those_of_the_reception() {
+fn both_times_are_those_of_the_arrival() {
     let can = Can::get();
     let (mut sender, mut bus) = (can.open(), can.open());
     let mut moments = vec![bus.now()];
@@ -53,11 +53,11 @@ fn both_times_are_those_of_the_reception() {
         std::thread::sleep(Duration::from_millis(60));
         moments.push(bus.now());
     }
-    // All three are read now, long after they came.
+    // All three are read now, long after their arrival.
     for pair in moments.windows(2) {
         let Event::Frame(Received { at, .. }) = next(&mut bus) else { panic!("no frame") };
         assert!(pair[0].wall <= at.wall && at.wall <= pair[1].wall, "{at:?} not within {pair:?}");
-        // The two clocks are read one after the other, so the monotonic time may be off by that.
+        // The two clocks are read one after the other, so the monotonic time may differ by this time.
         let slack = Duration::from_millis(2);
         assert!(pair[0].mono - slack <= at.mono && at.mono <= pair[1].mono + slack, "{at:?} not within {pair:?}");
         assert!(pair[1].mono.since(at.mono) > Duration::from_millis(50), "{at:?}: the time of reading?");
@@ -66,7 +66,7 @@ fn both_times_are_those_of_the_reception() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn only_what_the_filters_want() {
+fn only_frames_that_match_the_filters_arrive() {
     let can = Can::get();
     let (mut sender, mut bus) = (can.open(), can.open());
     let mut heard = |filters: &Filters| {
@@ -86,7 +86,7 @@ fn only_what_the_filters_want() {
     assert_eq!(heard(&Filters::Only(vec![extended, extended])), ["00000181#02"]);
     assert_eq!(heard(&Filters::Only(vec![CanId::Standard(0x182), standard])), ["181#01", "182#03"]);
     assert_eq!(heard(&Filters::Only(vec![])), [""; 0]);
-    // More than the kernel takes.
+    // More filters than the kernel accepts.
     let many = (0x181..=0x181 + 1200u16).step_by(2).map(CanId::Standard).chain([extended]).collect();
     assert_eq!(heard(&Filters::Only(many)), ["181#01", "00000181#02"]);
     assert_eq!(heard(&Filters::All).len(), 6);
@@ -106,7 +106,7 @@ fn can_fd_frames_have_no_effect() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn error_frames_are_faults_whatever_the_filters() {
+fn error_frames_are_faults_with_any_filter() {
     let can = Can::get();
     let mut bus = can.open();
     bus.listen(&Filters::Only(vec![CanId::SYNC])).unwrap();
@@ -136,7 +136,7 @@ impl Write for Memory {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn a_trace_is_what_candump_writes() {
+fn a_trace_equals_the_log_of_candump() {
     let can = Can::get();
     let mut sender = can.open();
     let file = Memory::default();
@@ -146,7 +146,7 @@ fn a_trace_is_what_candump_writes() {
     let mut candump =
         Command::new("candump").args(["-L", "-n", &count, &can.name]).stdout(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(candump.stdout.take().unwrap()).lines();
-    // candump does not say when it listens, the kernel does.
+    // candump does not report when it listens, but the kernel does.
     let listeners = || {
         let list = std::fs::read_to_string("/proc/net/can/rcvlist_all").unwrap();
         list.lines().filter(|line| line.contains(&format!(" {} ", can.name)) && line.ends_with("raw")).count()

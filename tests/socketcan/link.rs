@@ -1,4 +1,4 @@
-//! Interfaces that are missing, down, come back; signals; deadlines.
+//! Missing and recreated interfaces, link changes, signals, deadlines.
 
 use crate::{Can, ahead, assert_nothing_more, frame, next, next_frame, run};
 use cangauge::bus::socketcan::SocketCan;
@@ -15,7 +15,7 @@ fn refused(name: &str) -> BusError {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn why_an_interface_cannot_be_opened() {
+fn errors_name_why_an_interface_cannot_be_opened() {
     let can = Can::get();
     for name in ["nosuchcan", "", "a-name-longer-than-any-interface", "a/b"] {
         assert!(matches!(refused(name), BusError::NoInterface(of) if of == name), "{name}");
@@ -36,7 +36,7 @@ fn the_link_goes_down_and_comes_back() {
     assert_eq!(next(&mut bus), Event::Link(false));
     assert_nothing_more(&mut bus);
     assert!(matches!(bus.send(&frame("000#8000")), Err(BusError::Down(of)) if of == can.name));
-    // The one who sends first learns of it by sending, and is told all the same.
+    // The first call to send gets the error; the link event is also reported.
     assert!(matches!(other.send(&frame("000#8000")), Err(BusError::Down(_))));
     assert_eq!(next(&mut other), Event::Link(false));
     can.switch("up");
@@ -51,12 +51,12 @@ fn the_link_goes_down_and_comes_back() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn down_and_up_between_two_looks() {
+fn down_and_up_between_two_calls_is_reported() {
     let can = Can::get();
     let (mut bus, mut other) = (can.open(), can.open());
     can.switch("down");
     can.switch("up");
-    assert!(matches!(other.send(&frame("181#01")), Err(BusError::Down(_))), "the news comes with the first call");
+    assert!(matches!(other.send(&frame("181#01")), Err(BusError::Down(_))), "the first call reports it");
     other.send(&frame("181#01")).unwrap();
     assert_eq!(next(&mut bus), Event::Link(false));
     assert_eq!(next(&mut bus), Event::Link(true));
@@ -65,7 +65,7 @@ fn down_and_up_between_two_looks() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn an_interface_that_is_removed_and_made_again() {
+fn a_recreated_interface_is_opened_again() {
     let _can = Can::get();
     run("ip", &["link", "add", "dev", "gone0", "type", "vcan"]);
     run("ip", &["link", "set", "gone0", "up"]);
@@ -76,7 +76,7 @@ fn an_interface_that_is_removed_and_made_again() {
     assert_nothing_more(&mut bus);
     assert!(matches!(bus.send(&frame("080#")), Err(BusError::NoInterface(of)) if of == "gone0"));
     assert_nothing_more(&mut bus);
-    // Another of the same name is found: first down, then up.
+    // A new interface of the same name is found: first down, then up.
     run("ip", &["link", "add", "dev", "gone0", "type", "vcan"]);
     let deadline = ahead(&bus, 500);
     assert_eq!(bus.receive(deadline).unwrap(), Event::Timeout);
@@ -86,7 +86,7 @@ fn an_interface_that_is_removed_and_made_again() {
     let mut other = SocketCan::open("gone0").unwrap();
     other.send(&frame("182#02")).unwrap();
     other.send(&frame("181#01")).unwrap();
-    assert_eq!(next_frame(&mut bus), "181#01", "what is wanted is what was wanted");
+    assert_eq!(next_frame(&mut bus), "181#01", "the filters are unchanged");
     bus.send(&frame("183#03")).unwrap();
     assert_eq!(next_frame(&mut other), "183#03");
     run("ip", &["link", "del", "gone0"]);
@@ -94,7 +94,7 @@ fn an_interface_that_is_removed_and_made_again() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn never_before_the_deadline() {
+fn a_wait_never_ends_before_the_deadline() {
     let can = Can::get();
     let mut bus = can.open();
     for micros in [0, 1, 300, 900, 1000, 1700, 10_300, 50_000] {
@@ -102,7 +102,7 @@ fn never_before_the_deadline() {
         assert_eq!(bus.receive(deadline).unwrap(), Event::Timeout);
         let late = bus.now().mono.since(deadline);
         assert!(bus.now().mono >= deadline);
-        // Says only that the wait is not counted in whole seconds: machines are slow at times.
+        // Checks only that the wait is not rounded to seconds, because machines may be slow.
         assert!(late < Duration::from_secs(2), "{micros} µs became {late:?} more");
     }
     assert_eq!(bus.receive(Mono::START).unwrap(), Event::Timeout);
@@ -110,7 +110,7 @@ fn never_before_the_deadline() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn what_is_there_comes_with_a_deadline_in_the_past() {
+fn waiting_frames_are_received_with_a_deadline_in_the_past() {
     let can = Can::get();
     let (mut sender, mut bus) = (can.open(), can.open());
     assert_nothing_more(&mut bus);
@@ -132,12 +132,12 @@ fn a_signal_ends_a_wait_once() {
     assert_eq!(next(&mut bus), Event::Interrupted);
     raiser.join().unwrap().unwrap();
     assert_nothing_more(&mut bus);
-    // The bus stays in use for tidying up.
+    // The bus can still be used for cleaning up.
     bus.send(&frame("000#8000")).unwrap();
     raise().unwrap();
     assert_eq!(next(&mut bus), Event::Interrupted);
     assert_nothing_more(&mut bus);
-    // Another bus of the same process is told too, of both.
+    // Another bus of the same process gets both signals, too.
     assert_eq!(next(&mut other), Event::Interrupted);
     assert_eq!(next(&mut other), Event::Interrupted);
     assert_eq!(next_frame(&mut other), "000#8000");

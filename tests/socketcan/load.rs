@@ -1,4 +1,4 @@
-//! More frames than fit: in the receive buffer, in the send queue, in the time until a deadline.
+//! Too many frames: for the receive buffer, for the transmit queue, for a deadline.
 
 use crate::{Can, ahead, assert_nothing_more, frame, run};
 use cangauge::bus::{Bus, BusError, Event, Filters};
@@ -8,12 +8,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// A frame that carries a number.
+/// A frame that contains a number.
 fn numbered(id: u16, number: u32) -> Frame {
     Frame::new(CanId::Standard(id), &number.to_le_bytes()).unwrap()
 }
 
-/// Sends, waiting while the queue is full.
+/// Sends a frame, and waits while the queue is full.
 fn send(bus: &mut dyn Bus, frame: &Frame) {
     while let Err(error) = bus.send(frame) {
         assert!(matches!(error, BusError::QueueFull), "{error:?}");
@@ -21,7 +21,7 @@ fn send(bus: &mut dyn Bus, frame: &Frame) {
     }
 }
 
-/// The numbers received and the count of those said to be lost, until nothing more is there.
+/// Receives all frames. Returns their numbers, and the reported number of lost frames.
 fn drain(bus: &mut dyn Bus) -> (Vec<u32>, u32) {
     let (mut numbers, mut lost) = (Vec::new(), 0);
     loop {
@@ -47,7 +47,7 @@ fn every_lost_frame_is_counted() {
     for burst in [COUNT, 10, 1000] {
         for number in 0..burst {
             send(&mut sender, &numbered(0x181, sent + number));
-            // Frames that are not wanted do not count, lost or not.
+            // Frames that do not match the filters are not counted.
             send(&mut sender, &numbered(0x182, number));
         }
         sent += burst;
@@ -62,33 +62,33 @@ fn every_lost_frame_is_counted() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn frames_that_were_lost_last_are_counted_when_asked() {
+fn drops_after_the_last_frame_are_counted_on_request() {
     const COUNT: u32 = 100_000;
     let can = Can::get();
     let (mut sender, mut bus) = (can.open(), can.open());
     sender.listen(&Filters::Only(Vec::new())).unwrap();
     assert_eq!(bus.late_drops(), 0);
-    let buffer = bus.receive_buffer().expect("the kernel tells it");
-    assert!(!buffer.is_small(), "root may have what it wants: {buffer:?}");
+    let buffer = bus.receive_buffer().expect("the kernel reports it");
+    assert!(!buffer.is_small(), "root gets the requested size: {buffer:?}");
     for number in 0..COUNT {
         send(&mut sender, &numbered(0x181, number));
     }
-    // No frame comes after those that were lost, and so nothing tells of them.
-    let (numbers, told) = drain(&mut bus);
+    // No frame arrives after the lost ones, so no event reports them.
+    let (numbers, reported) = drain(&mut bus);
     let late = bus.late_drops();
     assert!(late > 0, "nothing was lost: the buffer held {COUNT} frames");
-    assert_eq!((u32::try_from(numbers.len()).unwrap() + told + late, bus.late_drops()), (COUNT, 0));
-    // What comes later does not tell them again.
+    assert_eq!((u32::try_from(numbers.len()).unwrap() + reported + late, bus.late_drops()), (COUNT, 0));
+    // Later frames do not report them again.
     send(&mut sender, &numbered(0x181, COUNT));
     assert_eq!(drain(&mut bus), (vec![COUNT], 0));
 }
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn a_full_send_queue_says_so_and_empties() {
+fn a_full_transmit_queue_is_reported_and_empties() {
     let can = Can::get();
     let (mut sender, mut bus) = (can.open(), can.open());
-    // 32 kbit/s and a queue of a few frames, as a slow bus has.
+    // 32 kbit/s and a short queue, as on a slow bus.
     let queue = ["qdisc", "replace", "dev", &can.name, "root", "tbf", "rate", "32kbit", "burst", "100", "limit", "160"];
     run("tc", &queue);
     let mut refused = 0;
@@ -108,11 +108,11 @@ fn a_full_send_queue_says_so_and_empties() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn traffic_that_nobody_wants_extends_no_deadline() {
+fn filtered_traffic_does_not_delay_a_deadline() {
     let can = Can::get();
     let stop = Arc::new(AtomicBool::new(false));
     let mut bus = can.open();
-    // More than the kernel takes, so that the program has to throw the rest away.
+    // More filters than the kernel accepts, so the program discards the other frames.
     bus.listen(&Filters::Only((0x200..=0x200 + 600).map(CanId::Standard).collect())).unwrap();
     let (mut sender, stopped) = (can.open(), Arc::clone(&stop));
     let flood = std::thread::spawn(move || {
@@ -123,7 +123,7 @@ fn traffic_that_nobody_wants_extends_no_deadline() {
     for _ in 0..20 {
         let deadline = ahead(&bus, 5);
         let event = bus.receive(deadline).unwrap();
-        // A drop is no wonder under such load.
+        // Drops may occur under this load.
         assert!(matches!(event, Event::Timeout | Event::Dropped(_)), "{event:?}");
         let late = bus.now().mono.since(deadline);
         assert!(late < Duration::from_secs(2), "{late:?} late");

@@ -1,7 +1,7 @@
-//! `cangauge log` on a kernel's CAN: whatever happens on the way, the file holds what was sent. What happens to files
-//! and pipes is in `log_files`.
+//! `cangauge log` with SocketCAN: after each disturbance the file contains the sent values. Faults of files and pipes
+//! are in `log_files`.
 //!
-//! The frames carry numbers, so that every row that is missing, doubled or out of order shows.
+//! The frames contain increasing numbers, so that missing, repeated and reordered rows are found.
 
 use crate::program::command;
 use crate::{Can, run};
@@ -18,8 +18,8 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// However slow the machine.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// The time-out for a slow machine.
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Sends numbered TPDOs of a DPS: 6130h:1, an i32.
 struct Sender {
@@ -33,7 +33,7 @@ impl Sender {
         Sender { bus: SocketCan::open(interface).unwrap(), node, next: 0 }
     }
 
-    /// Sends the next number; `false` where the interface does not take it.
+    /// Sends the next number; `false` if the interface rejects it.
     fn send(&mut self) -> bool {
         let frame = Frame::new(CanId::Standard(0x180 + self.node), &self.next.to_le_bytes()).unwrap();
         let is_sent = self.bus.send(&frame).is_ok();
@@ -41,7 +41,7 @@ impl Sender {
         is_sent
     }
 
-    /// A thousand a second for this long.
+    /// Sends a thousand frames per second for this time.
     fn send_for(&mut self, length: Duration) {
         let until = Instant::now() + length;
         while Instant::now() < until {
@@ -50,7 +50,7 @@ impl Sender {
         }
     }
 
-    /// As fast as the interface takes them.
+    /// Sends as fast as the interface accepts frames.
     fn send_many(&mut self, count: u32) {
         let end = self.next + count;
         while self.next < end {
@@ -61,14 +61,14 @@ impl Sender {
     }
 }
 
-/// A recording of the DPS with some node-IDs, which sends nothing itself.
+/// A recording of DPS devices with these node-IDs. It sends nothing itself.
 struct Log {
     child: Child,
     folder: TempDir,
     file: PathBuf,
 }
 
-/// How a recording ended.
+/// The result of a recording.
 struct Ended {
     code: Option<i32>,
     stderr: String,
@@ -87,11 +87,11 @@ impl Log {
         Log { child, folder, file }
     }
 
-    /// Sends until the file has a row: from then on nothing may be missing.
+    /// Sends until the file has a row. After that no row may be missing.
     fn warm_up(&self, sender: &mut Sender) {
-        let begun = Instant::now();
+        let started = Instant::now();
         while read(&self.file).lines().count() < 2 {
-            assert!(begun.elapsed() < PATIENCE, "no row");
+            assert!(started.elapsed() < TIMEOUT, "no row");
             sender.send();
             sleep(Duration::from_millis(5));
         }
@@ -113,42 +113,42 @@ fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_default()
 }
 
-/// The rows of a file that is whole: all their cells.
+/// The cells of all rows of a complete file.
 #[track_caller]
 fn rows(text: &str) -> Vec<Vec<&str>> {
-    assert!(text.ends_with('\n'), "a last row without its end");
+    assert!(text.ends_with('\n'), "the last row is truncated");
     whole_rows(text)
 }
 
-/// The rows of a file of which the last may have been cut off.
+/// The complete rows of a file whose last row may be truncated.
 #[track_caller]
 fn whole_rows(text: &str) -> Vec<Vec<&str>> {
     let end = text.rfind('\n').map_or(0, |end| end + 1);
     let mut lines = text[..end].lines();
     assert_eq!(lines.next(), Some("time,elapsed_s,node,signal,value,unit,status,raw"));
     let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
-    assert!(rows.iter().all(|row| row.len() == 8 && row[7].len() == 10), "every row is whole");
+    assert!(rows.iter().all(|row| row.len() == 8 && row[7].len() == 10), "all rows are complete");
     rows
 }
 
-/// The numbers that the rows of a node carry.
+/// The numbers in the rows of a node.
 fn numbers(rows: &[Vec<&str>], node: u16) -> Vec<u32> {
     let node = node.to_string();
     let own = rows.iter().filter(|row| row[2] == node);
     own.map(|row| u32::from_str_radix(&row[7][2..], 16).unwrap().swap_bytes()).collect()
 }
 
-/// What is missing in numbers that must rise.
+/// The gaps in numbers that must increase.
 #[track_caller]
 fn holes(numbers: &[u32]) -> Vec<Range<u32>> {
-    assert!(numbers.is_sorted_by(|a, b| a < b), "doubled, or out of order");
+    assert!(numbers.is_sorted_by(|a, b| a < b), "repeated or out of order");
     let pairs = numbers.windows(2).filter(|pair| pair[1] != pair[0] + 1);
     pairs.map(|pair| pair[0] + 1..pair[1]).collect()
 }
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn a_signal_ends_the_file_with_the_last_frame_that_came() {
+fn after_a_signal_the_file_ends_with_the_last_received_frame() {
     let can = Can::get();
     for name in ["INT", "TERM"] {
         let log = Log::start(&can.name, "5");
@@ -167,7 +167,7 @@ fn a_signal_ends_the_file_with_the_last_frame_that_came() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn the_link_goes_down_and_up_in_the_middle() {
+fn a_recording_continues_after_link_losses() {
     let can = Can::get();
     let log = Log::start(&can.name, "5");
     let mut sender = Sender::new(&can.name, 5);
@@ -175,7 +175,7 @@ fn the_link_goes_down_and_up_in_the_middle() {
     for _ in 0..2 {
         sender.send_for(Duration::from_millis(300));
         can.switch("down");
-        // The news of the link is one error, which a call of the sender gets.
+        // The kernel reports the link change once, to one call of the sender.
         while sender.send() {}
         sender.send_for(Duration::from_millis(300));
         can.switch("up");
@@ -193,7 +193,7 @@ fn the_link_goes_down_and_up_in_the_middle() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn the_interface_is_deleted_and_made_again() {
+fn a_recording_continues_on_a_recreated_interface() {
     let _can = Can::get();
     let make = || {
         run("ip", &["link", "add", "dev", "log0", "type", "vcan"]);
@@ -209,11 +209,11 @@ fn the_interface_is_deleted_and_made_again() {
     sleep(Duration::from_millis(300));
     make();
     let mut sender = Sender { next: sender.next + 1000, ..Sender::new("log0", 5) };
-    // It is looked for five times a second.
-    let begun = Instant::now();
+    // The program looks for the interface five times per second.
+    let started = Instant::now();
     let rows_before = read(&log.file).lines().count();
     while read(&log.file).lines().count() <= rows_before + usize::try_from(last).unwrap() / 1000 {
-        assert!(begun.elapsed() < PATIENCE, "it does not come back");
+        assert!(started.elapsed() < TIMEOUT, "it does not come back");
         sender.send_for(Duration::from_millis(50));
     }
     sender.send_for(Duration::from_millis(500));
@@ -229,7 +229,7 @@ fn the_interface_is_deleted_and_made_again() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn the_wall_clock_is_set_back() {
+fn elapsed_time_is_correct_if_the_wall_clock_is_set_back() {
     let can = Can::get();
     let log = Log::start(&can.name, "5");
     let mut sender = Sender::new(&can.name, 5);
@@ -244,7 +244,7 @@ fn the_wall_clock_is_set_back() {
     let rows = rows(&ended.text);
     let numbers = numbers(&rows, 5);
     assert_eq!((holes(&numbers), numbers.last()), (vec![], Some(&(sender.next - 1))));
-    assert!(rows.windows(2).any(|pair| pair[1][0] < pair[0][0]), "the column time tells the wall clock");
+    assert!(rows.windows(2).any(|pair| pair[1][0] < pair[0][0]), "the column time shows the wall clock");
     let elapsed: Vec<f64> = rows.iter().map(|row| row[1].parse().unwrap()).collect();
     let longest = elapsed.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
     assert!(elapsed.is_sorted() && longest < 10.0, "{longest} s from one row to the next");
@@ -253,12 +253,12 @@ fn the_wall_clock_is_set_back() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn bus_off_and_the_restart_are_told_and_rows_go_on() {
+fn bus_off_and_restart_are_reported_and_the_recording_continues() {
     let can = Can::get();
     let log = Log::start(&can.name, "5");
     let mut sender = Sender::new(&can.name, 5);
     log.warm_up(&mut sender);
-    // As drivers tell it; a virtual interface has no controller of its own.
+    // Error frames as drivers send them; a virtual interface has no controller.
     for error in ["20000040#0000000000000000", "20000100#0000000000000000"] {
         can.cansend(error);
         sender.send_for(Duration::from_millis(300));
@@ -272,17 +272,17 @@ fn bus_off_and_the_restart_are_told_and_rows_go_on() {
     assert!(ended.stderr.contains("bus-off"), "{}", ended.stderr);
 }
 
-/// A hundred recordings, twenty at a time.
+/// A hundred recordings, twenty at a time, each killed at a random moment.
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn killed_at_any_moment() {
+fn a_killed_recording_leaves_rows_up_to_the_last_second() {
     let can = Can::get();
     let mut sender = Sender::new(&can.name, 5);
     let mut random = u64::from(std::process::id()) | 1;
     for _ in 0..5 {
         let mut logs: Vec<Log> = (0..20).map(|_| Log::start(&can.name, "5")).collect();
         logs.iter().for_each(|log| log.warm_up(&mut sender));
-        // When which number had been sent.
+        // When each number was sent.
         let mut sent = Vec::new();
         while let Some(log) = logs.pop() {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -297,7 +297,7 @@ fn killed_at_any_moment() {
     }
 }
 
-/// Kills a recording and looks at what it leaves: what was `sent` more than a second before.
+/// Kills a recording and checks its file: it must contain all numbers of `sent` that are older than a second.
 #[track_caller]
 fn killed(mut log: Log, sent: &[(Instant, u32)]) {
     log.child.kill().unwrap();
@@ -306,16 +306,16 @@ fn killed(mut log: Log, sent: &[(Instant, u32)]) {
     let text = read(&log.file);
     let numbers = numbers(&whole_rows(&text), 5);
     assert_eq!(holes(&numbers), []);
-    // A second by the contract, and half a one for a machine with one CPU and all these programs.
+    // One second by the contract, and half a second for a machine with one CPU and many programs.
     let due = sent.iter().rev().find(|(at, _)| killed.duration_since(*at) > Duration::from_millis(1500));
     let last = *numbers.last().expect("rows");
     assert!(due.is_none_or(|&(_, due)| last >= due), "{last} is the last row, and {due:?} was long ago");
 }
 
-/// 8,000 frames a second of sixteen nodes, which is a full bus at 1 Mbit/s.
+/// 8,000 frames per second of sixteen nodes: a full bus at 1 Mbit/s.
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn a_full_bus_for_twenty_seconds() {
+fn a_full_bus_is_recorded_without_loss() {
     const NODES: u16 = 16;
     const PER_SECOND: u32 = 8000;
     const SECONDS: u32 = 20;
@@ -324,15 +324,15 @@ fn a_full_bus_for_twenty_seconds() {
     let mut senders: Vec<Sender> = (1..=NODES).map(|node| Sender::new(&can.name, node)).collect();
     senders.iter_mut().for_each(|sender| sender.bus.listen(&cangauge::bus::Filters::Only(Vec::new())).unwrap());
     log.warm_up(&mut senders[0]);
-    let begun = Instant::now();
+    let started = Instant::now();
     for slot in 0..PER_SECOND * SECONDS / u32::from(NODES) {
         for sender in &mut senders {
             sender.send_many(1);
         }
-        let due = begun + Duration::from_secs(u64::from(slot) * u64::from(NODES)) / PER_SECOND;
+        let due = started + Duration::from_secs(u64::from(slot) * u64::from(NODES)) / PER_SECOND;
         sleep(due.saturating_duration_since(Instant::now()));
     }
-    let length = begun.elapsed();
+    let length = started.elapsed();
     let memory = peak_memory_kb(log.child.id());
     log.signal("INT");
     let ended = log.end();
@@ -340,7 +340,7 @@ fn a_full_bus_for_twenty_seconds() {
     let rows = rows(&ended.text);
     for sender in &senders {
         let numbers = numbers(&rows, sender.node);
-        // Of the first node, those before the program was there are missing.
+        // The numbers of the first node before the start of the program are missing.
         let first = if sender.node == 1 { numbers[0] } else { 0 };
         assert_eq!((numbers[0], holes(&numbers), numbers.last()), (first, vec![], Some(&(sender.next - 1))));
     }
@@ -348,24 +348,24 @@ fn a_full_bus_for_twenty_seconds() {
     assert!(memory < 20 << 10, "{memory} kB for {} rows, sent in {length:?}", rows.len());
 }
 
-/// The most memory that a process had at once.
+/// The peak memory of a process in kB.
 fn peak_memory_kb(id: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{id}/status")).unwrap();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
     line.trim().trim_end_matches(" kB").parse().unwrap()
 }
 
-/// A SYNC every 10 ms: as many as are counted are on the bus.
+/// A SYNC every 10 ms: the counted number is on the bus.
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn syncs_on_the_bus_are_those_that_are_counted() {
+fn the_number_of_syncs_matches_the_bus() {
     let can = Can::get();
     let mut ear = can.open();
     ear.listen(&cangauge::bus::Filters::Only(vec![CanId::SYNC])).unwrap();
     let mut device = command(&format!("-b {} sim mh4@5", can.name)).stderr(Stdio::null()).spawn().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let summary = folder.path().join("summary.json");
-    // The device needs its time to begin.
+    // The device needs time to start.
     let line = format!("-b {} log 5 --sync 10ms --duration 5s --retries 20 --summary {}", can.name, summary.display());
     let output = command(&line).stdout(Stdio::piped()).stderr(Stdio::piped()).output().unwrap();
     run("kill", &["-INT", &device.id().to_string()]);

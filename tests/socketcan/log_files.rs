@@ -1,4 +1,4 @@
-//! The files of `log` where a disk is full and where a pipe is not read.
+//! The files of `log` if a disk is full, and if a pipe is not read.
 
 use crate::program::{Done, command};
 use crate::{Can, run};
@@ -47,7 +47,7 @@ fn start(can: &Can, more: &str) -> Child {
     child
 }
 
-/// The TPDO of an MH-4 with this pressure, as often as told, until the recording has ended.
+/// Sends `count` TPDOs of an MH-4 with increasing pressure, or until the recording has ended. Returns the number sent.
 fn send(can: &Can, child: &mut Child, count: u32) -> u32 {
     let mut bus = can.open();
     for number in 0..count {
@@ -59,7 +59,7 @@ fn send(can: &Can, child: &mut Child, count: u32) -> u32 {
             std::thread::sleep(Duration::from_millis(1));
         }
         if number % 100 == 99 {
-            // As a bus does, this one gives the program time.
+            // Limits the load, as a real bus does.
             std::thread::sleep(Duration::from_millis(10));
             if child.try_wait().unwrap().is_some() {
                 return number;
@@ -69,7 +69,7 @@ fn send(can: &Can, child: &mut Child, count: u32) -> u32 {
     count
 }
 
-/// The values of the rows; the last line is whole.
+/// The values of the rows. The last line must be complete.
 fn values(text: &str) -> Vec<u32> {
     assert!(text.ends_with('\n'), "{text}");
     let rows = text.lines().skip(1).map(|line| line.split(',').collect::<Vec<_>>());
@@ -82,7 +82,7 @@ fn values(text: &str) -> Vec<u32> {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn a_full_disk_ends_with_whole_rows_and_the_others_are_counted() {
+fn a_full_disk_ends_with_complete_rows_and_counts_the_lost_ones() {
     let can = Can::get();
     let disk = Disk::mount();
     let path = disk.path("run.csv");
@@ -94,7 +94,7 @@ fn a_full_disk_ends_with_whole_rows_and_the_others_are_counted() {
     let text = std::fs::read_to_string(Path::new(&path)).unwrap();
     let written = values(&text);
     assert!(written.len() > 500, "{}", written.len());
-    assert!(written.iter().zip(0..).all(|(value, number)| *value == number), "the first ones, one after the other");
+    assert!(written.iter().zip(0..).all(|(value, number)| *value == number), "the first values, without gaps");
     let said = done.stderr.lines().find(|line| line.ends_with(" could not be written")).unwrap();
     let lost: usize = said.split(' ').nth(1).unwrap().parse().unwrap();
     assert!(lost > 0 && written.len() + lost <= sent as usize + 1, "{lost} of {sent}");
@@ -108,7 +108,7 @@ fn a_pipe_that_is_not_read_for_a_while_loses_nothing() {
     let can = Can::get();
     let mut child = start(&can, &format!("--count {COUNT}"));
     let mut reader = BufReader::with_capacity(100, child.stdout.take().unwrap());
-    // Six times what the pipe holds.
+    // Six times the size of the pipe.
     assert_eq!(send(&can, &mut child, COUNT), COUNT, "it waits for its reader");
     let mut text = String::new();
     reader.read_line(&mut text).unwrap();

@@ -1,4 +1,4 @@
-//! Fastscan of simulated devices in another process finds who is there.
+//! Fastscan finds simulated devices in another process.
 
 use crate::Can;
 use cangauge::canopen::id::NodeId;
@@ -31,8 +31,8 @@ impl Drop for Simulation {
     }
 }
 
-/// Finds whoever has no node-ID and gives them some, from 20 on. The serial numbers in the order in which they
-/// were found.
+/// Finds the devices without a node-ID and assigns node-IDs from 20 on. Returns the serial numbers in the order of
+/// detection.
 fn scan(can: &Can) -> Vec<u32> {
     let mut bus = can.open();
     let mut found = Vec::new();
@@ -50,7 +50,7 @@ fn scan(can: &Can) -> Vec<u32> {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn fastscan_finds_one_device_and_several_one_after_the_other() {
+fn fastscan_finds_one_device_and_several() {
     let can = Can::get();
     for devices in [&["mh4@unconfigured"][..], &["mh4@unconfigured", "mh4@unconfigured", "mh4@unconfigured"]] {
         let simulation = Simulation::start(&can, devices);

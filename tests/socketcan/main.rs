@@ -1,6 +1,6 @@
 //! The SocketCAN transport on a real kernel.
 //!
-//! These tests need a virtual CAN interface of their own, which they take down and flood, and root.
+//! These tests need root and a separate virtual CAN interface, which they take down and flood.
 //! `tests/socketcan/vcan` provides both on any Linux machine:
 //!
 //! ```text
@@ -38,7 +38,7 @@ impl Can {
         let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let name = std::env::var("CANGAUGE_TEST_CAN")
             .expect("CANGAUGE_TEST_CAN names the CAN interface to test with; tests/socketcan/run sets it");
-        // A test that failed may have left it down.
+        // A failed test may have left it down.
         run("ip", &["link", "set", &name, "up"]);
         Can { name, _alone: alone }
     }
@@ -51,7 +51,7 @@ impl Can {
         run("ip", &["link", "set", &self.name, direction]);
     }
 
-    /// Sends with can-utils what our own side cannot.
+    /// Sends a frame with can-utils, for frames that the program cannot send.
     fn cansend(&self, frame: &str) {
         run("cansend", &[&self.name, frame]);
     }
@@ -71,13 +71,13 @@ fn ahead(bus: &dyn Bus, millis: u64) -> Mono {
     bus.now().mono + Duration::from_millis(millis)
 }
 
-/// The next event within a time in which it has to come, however slow the machine.
+/// The next event. The time-out is long enough for a slow machine.
 fn next(bus: &mut dyn Bus) -> Event {
     let deadline = ahead(bus, 20_000);
     bus.receive(deadline).unwrap()
 }
 
-/// The text of the frame that has to come next.
+/// The text of the next frame. Another event is a failure.
 fn next_frame(bus: &mut dyn Bus) -> String {
     match next(bus) {
         Event::Frame(received) => received.frame.to_string(),
@@ -85,7 +85,7 @@ fn next_frame(bus: &mut dyn Bus) -> String {
     }
 }
 
-/// That nothing comes for a moment. What was sent on a virtual bus before is there already.
+/// Checks that no event arrives. On a virtual bus, frames that were sent before are already there.
 fn assert_nothing_more(bus: &mut dyn Bus) {
     let deadline = ahead(bus, 30);
     assert_eq!(bus.receive(deadline).unwrap(), Event::Timeout);

@@ -1,9 +1,9 @@
-//! The program on interfaces, and what `ip` says of them.
+//! Runs the program, and reads interfaces with `ip`.
 
 use serde_json::Value;
 use std::process::{Command, Output, Stdio};
 
-/// What a command did.
+/// The result of a command.
 #[derive(Debug)]
 pub(crate) struct Done {
     pub(crate) code: Option<i32>,
@@ -19,14 +19,14 @@ impl From<Output> for Done {
 }
 
 impl Done {
-    /// That it ended with this code and exactly this output.
+    /// Checks the exit code and the complete output.
     #[track_caller]
     pub(crate) fn is(&self, code: i32, stdout: &str, stderr: &str) {
         assert_eq!((self.code, self.stdout.as_str(), self.stderr.as_str()), (Some(code), stdout, stderr));
     }
 }
 
-/// The program with these words.
+/// The program with these arguments.
 pub(crate) fn command(line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cangauge"));
     command.env_clear().args(line.split_whitespace()).stdin(Stdio::null());
@@ -37,7 +37,7 @@ pub(crate) fn cangauge(line: &str) -> Done {
     command(line).output().unwrap().into()
 }
 
-/// As root without the right to set interfaces.
+/// Runs the program as root without the privilege to set interfaces.
 pub(crate) fn without_the_right(line: &str) -> Done {
     let mut command = Command::new("setpriv");
     command.args(["--bounding-set", "-net_admin", "--inh-caps", "-net_admin", env!("CARGO_BIN_EXE_cangauge")]);
@@ -51,7 +51,7 @@ pub(crate) fn shown(name: &str) -> Value {
     all[0].take()
 }
 
-/// Whether it is up, and everything about its controller but state and counters.
+/// Whether it is up, and all data of its controller except state and counters.
 pub(crate) fn setting(name: &str) -> (bool, Value, Value) {
     let mut shown = shown(name);
     let up = shown["flags"].as_array().unwrap().iter().any(|flag| flag == "UP");

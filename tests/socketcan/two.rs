@@ -1,4 +1,4 @@
-//! Two programs and one node.
+//! Two programs that use the same node.
 
 use super::program::{Done, cangauge, command};
 use super::{Can, run};
@@ -6,13 +6,13 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Simulated devices on the interface, until dropped.
+/// Simulated devices on the interface. They end when the value is dropped.
 struct Devices(Child);
 
 impl Devices {
     fn new(can: &Can) -> Devices {
         let mut child = command(&format!("sim mh4@5,dps@6 -b {}", can.name)).stderr(Stdio::piped()).spawn().unwrap();
-        // It says when they are there.
+        // It prints a line when the devices are ready.
         let mut line = String::new();
         BufReader::new(child.stderr.take().unwrap()).read_line(&mut line).unwrap();
         Devices(child)
@@ -26,7 +26,7 @@ impl Drop for Devices {
     }
 }
 
-/// A program that polls node 5 until it is stopped, and has begun to.
+/// A program that polls node 5 until it is stopped. It has already started.
 fn poller(can: &Can) -> Child {
     let mut child =
         command(&format!("log 5 pressure --poll 100ms -b {}", can.name)).stdout(Stdio::piped()).spawn().unwrap();
@@ -34,7 +34,7 @@ fn poller(can: &Can) -> Child {
     for _ in 0..2 {
         rows.read_line(&mut String::new()).unwrap();
     }
-    // The pipe stays open and is read no more; it holds what little comes.
+    // The pipe stays open and is not read any more; it is large enough for the rest.
     std::mem::forget(rows);
     child
 }
@@ -61,9 +61,9 @@ fn a_second_program_waits_and_then_works() {
     cangauge(&format!("sdo read 6 0x1018:1 -b {}", can.name)).is(0, "866\n", "");
     let mut second = command(&format!("sdo read 5 0x1018:1 -b {}", can.name));
     let mut second = second.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut told = BufReader::new(second.stderr.take().unwrap());
+    let mut stderr = BufReader::new(second.stderr.take().unwrap());
     let mut line = String::new();
-    told.read_line(&mut line).unwrap();
+    stderr.read_line(&mut line).unwrap();
     assert_eq!(line, format!("{}; waiting for it to end\n", in_use_by(&first)));
     // The node is free again, even if its holder is killed.
     run("kill", &["-KILL", &first.id().to_string()]);
@@ -78,18 +78,18 @@ fn a_wait_ends_after_ten_seconds_or_with_ctrl_c() {
     let can = Can::get();
     let _devices = Devices::new(&can);
     let first = poller(&can);
-    let begun = Instant::now();
+    let started = Instant::now();
     let done = cangauge(&format!("lss inquire 5 -q -b {}", can.name));
     let message = format!("cangauge: {}\n", in_use_by(&first));
     assert!(done.code == Some(5) && done.stderr.starts_with(&message), "{done:?}");
-    assert!(begun.elapsed() >= Duration::from_secs(10));
+    assert!(started.elapsed() >= Duration::from_secs(10));
 
     let mut second = command(&format!("autozero 5 -b {}", can.name)).stderr(Stdio::piped()).spawn().unwrap();
-    let mut told = BufReader::new(second.stderr.take().unwrap());
-    told.read_line(&mut String::new()).unwrap();
+    let mut stderr = BufReader::new(second.stderr.take().unwrap());
+    stderr.read_line(&mut String::new()).unwrap();
     run("kill", &["-INT", &second.id().to_string()]);
     let mut rest = String::new();
-    told.read_line(&mut rest).unwrap();
+    stderr.read_line(&mut rest).unwrap();
     assert_eq!((second.wait().unwrap().code(), rest.as_str()), (Some(130), "cangauge: interrupted\n"));
     run("kill", &["-INT", &first.id().to_string()]);
     end(first);

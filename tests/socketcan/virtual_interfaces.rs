@@ -18,7 +18,7 @@ fn a_virtual_interface_goes_down_and_up_and_has_no_bit_rate() {
          hint: switch it on without one: cangauge bus up {name}\n"
     );
     cangauge(&format!("bus up {name} 250k")).is(5, "", &refused);
-    assert_eq!(shown(name)["operstate"], "DOWN", "a refusal touches nothing");
+    assert_eq!(shown(name)["operstate"], "DOWN", "a rejection changes nothing");
     let refused = format!("cangauge: no permission to bring {name} up\nhint: by hand: sudo ip link set {name} up\n");
     without_the_right(&format!("bus up {name}")).is(5, "", &refused);
     cangauge(&format!("bus up {name} -q")).is(0, "", "");
@@ -48,7 +48,7 @@ fn interfaces_are_listed() {
 
 #[test]
 #[ignore = "SKIPPED: needs a CAN interface, see tests/socketcan/run"]
-fn what_is_no_can_interface_is_not_touched() {
+fn other_interfaces_are_not_changed() {
     let can = Can::get();
     for command in ["up", "down"] {
         let done = cangauge(&format!("bus {command} lo"));

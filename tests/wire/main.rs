@@ -1,28 +1,28 @@
-//! Byte transcripts: what the client sends and what comes back, case by case, from `tests/wire/*.can`.
+//! Byte transcripts of the client: the frames sent and received, case by case, from `tests/wire/*.can`.
 //!
 //! ```text
-//! # where it is printed
+//! # the source of the case
 //! upload node=127 object=0x6131:1 type=u32
-//! > 67F#4031610100000000     what the client must send next
-//! < 5FF#423161010000AB00     what the bus delivers
-//! ! timeout                  nothing more comes in time
-//! : 3s                       nothing more comes until then, counted from power on (simulated device)
-//! ~ early answer             what has not been sent yet is dropped, because an answer comes before
-//! = 11206656                 the value, "done", or the error in words
+//! > 67F#4031610100000000     the client must send this frame next
+//! < 5FF#423161010000AB00     the client receives this frame
+//! ! timeout                  the time-out expires
+//! : 3s                       no frame until this time after power on (simulated device)
+//! ~ early answer             frames that were not sent yet are dropped, because an answer arrives first
+//! = 11206656                 the result: the value, "done", or the error as text
 //! ```
-//! After the last line nothing else may have been sent.
+//! After the last line the client must not have sent another frame.
 //!
-//! `nmt`, `sync`: a frame that is only sent. `life` and `tpdo` hear: what each frame tells, one after the other; what
-//! stands at `after` is sent before.
+//! `nmt` and `sync` only send a frame. `life` and `tpdo` receive frames; the result lists their contents in order. With
+//! `after=`, a frame is sent before.
 //!
-//! Behind a line `device KIND@NODE KEY=VALUE…` the same lines run on a simulated device, too ([`simulated`]).
+//! After a line `device KIND@NODE KEY=VALUE…` the same lines also run with a simulated device ([`simulated`]).
 //!
-//! Block transfers have long runs of segments. `fill=LENGTH` names bytes 0, 1, … 250, 0, 1, …, `zeros=LENGTH`
-//! zeros. `segments 605 1-127 at 889` stands for the frames with these sequence numbers that carry the fill
-//! from byte 889 on; with `last` at the end, the last of them says so. As a value, `fill` is just these bytes.
+//! Block transfers have many segments. `fill=LENGTH` stands for the bytes 0, 1, … 250, 0, 1, …, and `zeros=LENGTH` for
+//! zeros. `segments 605 1-127 at 889` stands for the frames with these sequence numbers and the fill from byte 889 on.
+//! With `last` at the end, the last frame is marked as the last segment. As a value, `fill` stands for these bytes.
 //!
-//! LSS collects answers until the time is over, which `=` says; `! ask again` is the repetition, `sent` the result
-//! of what nobody answers. Of a fastscan, every `<` and every `!` ends a step.
+//! LSS collects answers until the time is over (`=`). `! ask again` repeats the request. `sent` is the result of a
+//! request without an answer. In a fastscan, each `<` and each `!` ends a step.
 
 mod simulated;
 
@@ -116,7 +116,7 @@ impl Case {
         Case { machine, fill: Vec::new(), sent: sent.into(), outcome: None, heard: Vec::new() }
     }
 
-    /// Cases that are no SDO transfers.
+    /// Cases other than SDO transfers.
     fn start_lss(kind: &str, keys: &HashMap<&str, &str>) -> Option<Case> {
         let number = |key: &str| keys[key].parse().expect("a number");
         let request = match kind {
@@ -193,7 +193,7 @@ impl Case {
         }
     }
 
-    /// The end of a step of a fastscan.
+    /// Ends a step of a fastscan.
     fn end_step(&mut self, answers: usize) {
         let Machine::Fastscan(scan) = &mut self.machine else { return };
         self.outcome = match scan.on_end(answers) {
@@ -202,7 +202,7 @@ impl Case {
                 None
             }
             lss::Progress::Found(address) => Some(address.to_string()),
-            lss::Progress::NoneFound => Some("nobody".to_owned()),
+            lss::Progress::NoneFound => Some("none found".to_owned()),
             lss::Progress::Failed(error) => Some(error.to_string()),
         };
     }
@@ -226,7 +226,7 @@ impl Case {
         frames.collect()
     }
 
-    /// The next frame that goes to the bus.
+    /// The next frame to send.
     fn send(&mut self) -> Option<Frame> {
         if let Machine::BlockDownload(download) = &mut self.machine {
             download.on_sent();
@@ -313,7 +313,7 @@ fn nmt(command: &str, node: &str) -> Frame {
     command.frame((node != "all").then(|| node.parse().expect("a node-ID")))
 }
 
-/// What stands in a TPDO.
+/// The values in a TPDO.
 fn values(frame: &Frame, fields: &[Field], types: &[DataType]) -> String {
     let values = fields.iter().zip(types).map(|(field, data_type)| {
         let (bytes, length) = field.bytes(frame.data()).expect("a field");
@@ -356,7 +356,7 @@ fn failure(error: TransferError) -> String {
     }
 }
 
-/// The transcripts, in the order of their names.
+/// The transcripts, sorted by name.
 fn files() -> Vec<std::path::PathBuf> {
     let mut files: Vec<_> = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/wire"))
         .expect("the folder of transcripts")
@@ -368,7 +368,7 @@ fn files() -> Vec<std::path::PathBuf> {
 }
 
 #[test]
-fn transcripts() {
+fn the_client_follows_the_transcripts() {
     let mut cases = 0;
     for path in files() {
         let text = std::fs::read_to_string(&path).expect("a transcript");

@@ -1,10 +1,9 @@
-//! The same transcripts from the other end: what a master sends, and what a simulated device answers.
+//! The same transcripts with simulated devices: the test sends the frames of the master and checks the answers.
 //!
-//! `device KIND@NODE` puts one on a bus of its own, until the next such line or the end of the file; `device none` takes it away.
-//! Its quantities stand still at `base=VALUE`, or swing around it by `amplitude=` with a period of `period=` seconds;
-//! `quirk=` names a deviation that it has besides. A `<` may say how long
-//! after the frame before it comes: `+100ms`, give or take two, or `+<100ms` at most. Where that is not said it comes within 5 ms. Between
-//! the cases nothing else comes at once.
+//! `device KIND@NODE` starts a device on a separate bus, up to the next such line or the end of the file. `device none`
+//! removes it. Its quantities are constant at `base=VALUE`, or vary by `amplitude=` with a period of `period=` seconds.
+//! `quirk=` adds a deviation. A `<` may give the time since the previous frame: `+100ms` (within 2 ms), or `+<100ms`
+//! for a maximum; the default maximum is 5 ms. Between the cases, the device must be silent for 1 ms.
 
 use super::files;
 use cangauge::bus::memory::{Clock, MemoryBus};
@@ -16,16 +15,16 @@ use cangauge::sim::{Device, Setup};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A device, and when the last frame was complete.
+/// A device, and the time of the last frame.
 struct Played {
     bus: MemoryBus,
     last: Duration,
-    /// Whether a case has come to its end.
+    /// Whether a case has ended.
     is_over: bool,
 }
 
 impl Played {
-    /// `None` for `none`.
+    /// Starts the device of a `device` line; `None` for `device none`.
     fn new(line: &str) -> Option<Played> {
         let mut words = line.split_whitespace();
         let (kind, node) = words.next().filter(|word| *word != "none")?.split_once('@').expect("KIND@NODE");
@@ -55,7 +54,7 @@ impl Played {
         Some(Played { bus, last: Duration::ZERO, is_over: false })
     }
 
-    /// The next frame until `until`.
+    /// The next frame, received up to `until`.
     fn hear(&mut self, until: Duration) -> Option<(Duration, Frame)> {
         loop {
             match self.bus.receive(Mono::at(until)).expect("a memory bus never fails") {
@@ -70,11 +69,11 @@ impl Played {
         self.bus.now().mono.since_start()
     }
 
-    /// After the end of a case nothing comes for a millisecond, unless the next one waits for it.
+    /// After a case, checks that no frame arrives for 1 ms, unless the next case starts with a frame of the device.
     fn expect_silence(&mut self, place: &str) {
         if std::mem::take(&mut self.is_over) {
             let heard = self.hear(self.now() + Duration::from_millis(1));
-            assert_eq!(heard, None, "{place}: before that nothing else comes");
+            assert_eq!(heard, None, "{place}: unexpected frame before this line");
         }
     }
 
@@ -119,7 +118,7 @@ fn duration(text: &str) -> Duration {
 }
 
 #[test]
-fn simulated_devices_answer_as_printed() {
+fn simulated_devices_follow_the_transcripts() {
     let mut answers = 0;
     for path in files() {
         let text = std::fs::read_to_string(&path).expect("a transcript");

@@ -222,7 +222,7 @@ mod tests {
 
     /// Together, the neighbours and the other revisions contain each other address once, and not the address itself.
             #[test]
-    fn neighbours_and_revisions_cover_all_other_addresses(revision in 0u32..4, serial in 0u32..4, other in (0u32..4, 0u32..4)) {
+    fn ranges_cover_all_other_addresses(revision in 0u32..4, serial in 0u32..4, other in (0u32..4, 0u32..4)) {
                 let address = LssAddress { vendor: 1, product: 2, revision, serial };
                 let other = LssAddress { revision: other.0, serial: other.1, ..address };
                 let found = address.neighbours().into_iter().chain(address.revisions()).flatten();

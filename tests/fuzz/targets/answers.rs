@@ -1,14 +1,14 @@
-//! Whole tasks against a device that answers every SDO request with anything: they end, touch nobody else, write
-//! nothing, and what is printed of it steers no terminal.
+//! Complete tasks with a device that answers SDO requests with arbitrary bytes. The tasks end, access no other node,
+//! write nothing, and print no control characters.
 #![no_main]
 
-use cangauge::output::failure::ErrorMessage;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::CanId;
 use cangauge::master::{Master, Timing};
 use cangauge::node::Overrides;
+use cangauge::output::failure::ErrorMessage;
 use cangauge::output::{info, info_json, json};
 use cangauge::tasks::scan::scan;
 use cangauge::tasks::settings::Device;
@@ -17,7 +17,7 @@ use cangauge_fuzz::{Bytes, node};
 use libfuzzer_sys::fuzz_target;
 use std::time::Duration;
 
-/// Segments of one object. An upload is given up only after 64 MiB, which takes too long here.
+/// The largest number of segments of one object. The limit of the client, 64 MiB, takes too long here.
 const SEGMENTS: usize = 20;
 
 struct Answerer {
@@ -30,7 +30,7 @@ impl Station for Answerer {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
-        // Another participant does not exist: everything sent here is the program's.
+        // There is no other participant: all received frames are from the program.
         assert_eq!(frame.id(), CanId::sdo_request(node()), "{frame} is not for this node");
         let request = frame.all_eight().expect("eight bytes");
         assert!(matches!(request[0] >> 5, 2 | 3 | 4 | 5), "{frame} is no part of a read");
@@ -60,7 +60,7 @@ impl Station for Answerer {
             _ => out.send(Frame::full(response, data)),
         }
         self.at += before - bytes.0.len();
-        // Behind the end it begins anew, so that no length of the script is special; an empty one is silence.
+        // The script repeats after its end. An empty script means no answers.
         if self.at >= self.script.len() {
             self.at = 0;
         }
@@ -75,7 +75,7 @@ impl Station for Answerer {
     fn sent(&mut self, _: Mono, _: &Frame) {}
 }
 
-/// Lines of a table, an object or a page: no other control character, and nothing that turns the direction.
+/// Checks printed text: no control characters except line ends, and no change of the writing direction.
 fn assert_harmless(text: &[u8]) {
     let text = std::str::from_utf8(text).expect("text");
     let steers =

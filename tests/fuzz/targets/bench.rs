@@ -1,4 +1,4 @@
-//! What stands behind `sim:`, and bench files: those that are accepted run.
+//! The text after `sim:` and bench files: each accepted bench runs.
 #![no_main]
 
 use cangauge::bus::Bus;
@@ -9,7 +9,7 @@ use std::time::Duration;
 
 fuzz_target!(|data: &[u8]| {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    // Files are somebody else's affair, and there is none to be written.
+    // This target reads and writes no files.
     if text.contains("record") || text.contains(".toml") {
         return;
     }

@@ -1,4 +1,4 @@
-//! The words of a command line, one a line. What the parsers of values print reads back.
+//! The words of a command line, one for each line. Printed values parse to the same value.
 #![no_main]
 
 use cangauge::canopen::id::NodeId;
@@ -10,7 +10,7 @@ use cangauge::tasks::lss::Target;
 use libfuzzer_sys::fuzz_target;
 use std::ffi::OsString;
 
-/// Where a word is read by a parser that only the command line knows.
+/// Options whose values are parsed only by the command line.
 const PLACES: &[&[&str]] = &[
     &["read"],
     &["sdo", "write", "5", "0x2000"],

@@ -1,4 +1,4 @@
-//! A device description of the user's own.
+//! A device description written by a user.
 #![no_main]
 
 use cangauge::device::catalog::Model;

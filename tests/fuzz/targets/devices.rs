@@ -1,4 +1,4 @@
-//! Simulated devices among any frames: they answer under their own node-IDs only, and come to rest.
+//! Simulated devices with arbitrary frames: they answer only with their node-IDs, and become idle again.
 #![no_main]
 
 use cangauge::bus::{Bus, Event};
@@ -21,7 +21,7 @@ fuzz_target!(|data: &[u8]| {
         if bytes.is_empty() {
             break;
         }
-        // Most are SDO requests, some for LSS, some NMT commands: those are what a device answers to.
+        // Most frames are SDO requests, some are LSS requests or NMT commands: a device reacts to these.
         let ours = match bytes.byte() >> 5 {
             0 => CanId::LSS_MASTER,
             1 => CanId::NMT,
@@ -33,7 +33,7 @@ fuzz_target!(|data: &[u8]| {
         let until = bus.mono() + Duration::from_millis(3);
         loop {
             events += 1;
-            assert!(events < 100_000, "a babbler");
+            assert!(events < 100_000, "it never becomes idle");
             match bus.receive(until) {
                 Ok(Event::Frame(received)) => assert!(received.frame.len() <= 8),
                 Ok(Event::Timeout) | Err(_) => break,

@@ -7,7 +7,7 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
     let Ok(eds) = eds::read(data) else { return };
-    // Every warning is of a line that there is.
+    // Each warning names an existing line.
     let lines = data.split(|byte| *byte == b'\n' || *byte == b'\r').count();
     assert!(eds.warnings.iter().all(|warning| warning.line <= lines + 1));
     let configured = eds.configured();

@@ -1,4 +1,4 @@
-//! Expressions of `check`: what is printed reads back as the same.
+//! Expressions of `check`: a printed expression parses to the same expression.
 #![no_main]
 
 use cangauge::measure::expression::Expression;
@@ -11,7 +11,7 @@ fuzz_target!(|data: &[u8]| {
             let printed = expression.to_string();
             match Expression::parse(&printed) {
                 Ok(again) => assert_eq!(again.to_string(), printed, "{text:?}"),
-                // The parentheses and blanks that make it clear can make it too long.
+                // Added parentheses and spaces can make it too long.
                 Err(error) => assert!(printed.chars().count() > 1000, "{text:?}: {printed:?}: {error}"),
             }
             let _ = (expression.wanted(), expression.needs_many());

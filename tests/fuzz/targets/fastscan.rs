@@ -1,11 +1,11 @@
-//! Fastscan among any answers: it ends, and an address that it makes of them was confirmed.
+//! Fastscan with arbitrary answers: it ends, and each found address was confirmed.
 #![no_main]
 
 use cangauge::canopen::lss::{Fastscan, Progress, Request};
 use cangauge_fuzz::Bytes;
 use libfuzzer_sys::fuzz_target;
 
-/// The longest that any answers can make it.
+/// The largest number of steps for any answers.
 const STEPS: usize = 20_000;
 
 fuzz_target!(|data: &[u8]| {
@@ -16,7 +16,7 @@ fuzz_target!(|data: &[u8]| {
         let step = scan.step();
         let Request::Fastscan { bit_check, .. } = step.request else { panic!("{step:?}") };
         assert!(bit_check < 32 || bit_check == Request::ALL_SLAVES);
-        // Two bits a step; behind the end the answers begin anew.
+        // Two bits for each step. The answers repeat after the end.
         if bytes.is_empty() {
             bytes = Bytes(data);
         }
@@ -24,7 +24,7 @@ fuzz_target!(|data: &[u8]| {
         match scan.on_end(usize::from(answers % 3)) {
             Progress::Continue => {}
             Progress::Found(_) => {
-                assert!(answers % 3 > 0, "found by silence");
+                assert!(answers % 3 > 0, "found without an answer");
                 return;
             }
             Progress::NoneFound | Progress::Failed(_) => return,

@@ -1,4 +1,4 @@
-//! Frames: as text, and what each layer reads from one.
+//! Frames as text, and parsed by each layer.
 #![no_main]
 
 use cangauge::canopen::emcy::Emergency;

@@ -1,4 +1,4 @@
-//! One LSS service, fed with any frames.
+//! One LSS service with arbitrary frames.
 #![no_main]
 
 use cangauge::canopen::id::{CanId, NodeId};
@@ -38,7 +38,7 @@ fuzz_target!(|data: &[u8]| {
         if exchange.on_frame(&frame) {
             ours += 1;
             assert_eq!(frame.id(), CanId::LSS_SLAVE);
-            assert!(exchange.is_answered(), "an answer to what nobody answers");
+            assert!(exchange.is_answered(), "an answer to a service without answers");
         }
     }
     assert_eq!(exchange.has_answer(), ours > 0);

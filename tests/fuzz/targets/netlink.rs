@@ -1,4 +1,4 @@
-//! What the kernel tells of an interface. The module is private to the program; its two files stand alone.
+//! The kernel's description of an interface. The module is private, so its two files are included here.
 #![no_main]
 #![allow(dead_code, missing_docs, unreachable_pub)]
 

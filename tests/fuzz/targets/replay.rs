@@ -1,4 +1,4 @@
-//! A candump log, played.
+//! Replays a candump log.
 #![no_main]
 
 use cangauge::bus::replay::Replay;
@@ -17,7 +17,7 @@ static FILE: LazyLock<PathBuf> = LazyLock::new(|| {
 fuzz_target!(|data: &[u8]| {
     std::fs::write(&*FILE, data).expect("a place for the log");
     let mut bus = Replay::open(&FILE.display().to_string(), Box::new(|_| {})).expect("it is there");
-    // It need not stay there for that.
+    // The open file is enough.
     std::fs::remove_file(&*FILE).expect("it is ours");
     let lines = data.split(|byte| *byte == b'\n').count();
     let (mut last, mut events) = (Mono::START, 0);

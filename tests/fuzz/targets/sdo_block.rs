@@ -1,5 +1,5 @@
-//! The two block machines, fed with any frames and time-outs. Whatever comes, they end: after so many time-outs or
-//! useless frames nothing is sent any more.
+//! Block upload and download with arbitrary frames and time-outs. They always end: after a number of time-outs or
+//! useless frames they send nothing more.
 #![no_main]
 
 use cangauge::canopen::id::CanId;
@@ -8,8 +8,8 @@ use cangauge::canopen::sdo::{BlockDownload, BlockSize, BlockUpload, DownloadSize
 use cangauge_fuzz::{Bytes, assert_requests, node};
 use libfuzzer_sys::fuzz_target;
 
-/// No machine waits longer than this for a server of which nothing is heard.
-const PATIENCE: usize = 8;
+/// The largest number of time-outs in a row before a transfer ends.
+const MAX_TIMEOUTS: usize = 8;
 
 fn upload(head: u8, mut bytes: Bytes<'_>) {
     let mut machine = BlockUpload::new(node(), ObjectId::new(0x1008, 0), head & 0x1f, head & 0x20 != 0);
@@ -17,19 +17,19 @@ fn upload(head: u8, mut bytes: Bytes<'_>) {
         machine = machine.with_block_size(size);
     }
     assert_requests(&[machine.request()]);
-    let (mut out, mut received, mut silences) = (Vec::new(), 0, 0);
+    let (mut out, mut received, mut timeouts) = (Vec::new(), 0, 0);
     loop {
         out.clear();
-        // A control byte of FFh is a time-out, and when all is said nothing else comes.
+        // A control byte of FFh is a time-out. After the end of the input there are only time-outs.
         if bytes.is_empty() || bytes.0[0] == 0xff {
             bytes.byte();
-            silences += 1;
+            timeouts += 1;
             let end = machine.on_timeout(&mut out);
             assert_requests(&out);
             if end.is_some() {
                 return;
             }
-            assert!(silences < PATIENCE, "it waits for ever");
+            assert!(timeouts < MAX_TIMEOUTS, "it does not end");
             continue;
         }
         let frame = bytes.frame(CanId::sdo_response(node()));
@@ -39,7 +39,7 @@ fn upload(head: u8, mut bytes: Bytes<'_>) {
         assert!(out.len() <= 2);
         match progress {
             Progress::NotOurs => assert!(out.is_empty()),
-            Progress::Continue => silences = 0,
+            Progress::Continue => timeouts = 0,
             Progress::Done(uploaded) => {
                 assert!(uploaded.bytes.len() <= received, "no byte that has not been sent");
                 return;

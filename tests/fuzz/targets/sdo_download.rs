@@ -1,4 +1,4 @@
-//! The download machine, fed with any frames. What is done is what was asked for, every byte of it.
+//! A download with arbitrary frames. If it succeeds, all bytes were sent.
 #![no_main]
 
 use cangauge::canopen::id::CanId;

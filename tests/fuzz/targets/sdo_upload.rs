@@ -1,4 +1,4 @@
-//! The upload machine, fed with any frames.
+//! An upload with arbitrary frames.
 #![no_main]
 
 use cangauge::canopen::id::CanId;
@@ -21,10 +21,10 @@ fuzz_target!(|data: &[u8]| {
         let frame = bytes.frame(CanId::sdo_response(node()));
         received += frame.data().len();
         out.clear();
-        let begun = upload.has_begun();
+        let has_begun = upload.has_begun();
         match upload.on_frame(&frame, &mut out) {
             Progress::NotOurs => {
-                assert!(out.is_empty() && upload.has_begun() == begun, "nothing has changed");
+                assert!(out.is_empty() && upload.has_begun() == has_begun, "the state has changed");
             }
             Progress::Continue => assert_eq!(out.len(), 1),
             Progress::Done(uploaded) => {

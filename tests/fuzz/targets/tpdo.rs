@@ -1,4 +1,4 @@
-//! The decoding of TPDOs by any mapping: never more samples than are mapped, and only bits that were sent.
+//! Decodes TPDOs by arbitrary mappings: no more samples than mapped objects, and only received bits.
 #![no_main]
 
 use cangauge::bus::Received;
@@ -10,7 +10,7 @@ use cangauge::canopen::value::DataType;
 use cangauge::device::unit::Unit;
 use cangauge::measure::decode::{Decoded, Decoder};
 use cangauge::measure::layout::{Signal, Tpdo};
-use cangauge::node::{Node};
+use cangauge::node::Node;
 use cangauge_fuzz::{Bytes, node};
 use libfuzzer_sys::fuzz_target;
 use std::time::Duration;
@@ -45,7 +45,7 @@ fuzz_target!(|data: &[u8]| {
         let mut samples = Vec::new();
         match decoder.decode(&Received { frame, at }, &mut samples) {
             Decoded::NotOurs => assert!(frame.is_remote() || Some(frame.id()) != CanId::standard(0x185)),
-            Decoded::Held(_) => panic!("nothing is held that nobody has asked to hold"),
+            Decoded::Held(_) => panic!("a TPDO is held without a request"),
             Decoded::WrongLength(_) => assert_ne!(frame.data().len(), bits.div_ceil(8)),
             Decoded::Tpdo(of) => {
                 assert_eq!((of, frame.data().len()), (node(), bits.div_ceil(8)));

@@ -1,4 +1,4 @@
-//! Units: codes from devices, symbols from people, conversion.
+//! Units: codes of devices, symbols typed by users, conversion.
 #![no_main]
 
 use cangauge::device::unit::Unit;
@@ -22,7 +22,7 @@ fuzz_target!(|data: &[u8]| {
     assert!(from.convert(value, from).is_some());
     if let Some(there) = from.convert(value, to) {
         let back = to.convert(there, from).expect("the way back");
-        // Where nothing is lost on the way there and nothing overflows, it is what it was.
+        // Without loss of precision and overflow, the value is the same after both conversions.
         if value.is_finite() && (1e-30..1e30).contains(&value.abs()) && there.is_finite() && there.abs() > 1e-60 {
             let scale = value.abs().max(1e3) * 1e30;
             assert!((back - value).abs() <= scale * 1e-9, "{value} {from} is {there} {to} is {back}");

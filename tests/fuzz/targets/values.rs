@@ -1,4 +1,4 @@
-//! Values by type, from bytes and from text.
+//! Values of each type, from bytes and from text.
 #![no_main]
 
 use cangauge::canopen::value::{DataType, Value, parse_hex};
@@ -15,7 +15,7 @@ fn is_nan(value: &Value) -> bool {
         || matches!(value, Value::Real64(number) if number.is_nan())
 }
 
-/// Milliseconds have room for three days; times that use it have another, shorter form.
+/// The milliseconds of a time can exceed one day; such times have another, shorter encoding.
 fn is_canonical(value: &Value) -> bool {
     !matches!(value, Value::TimeOfDay(time) | Value::TimeDifference(time) if time.milliseconds >= 86_400_000)
 }
@@ -34,7 +34,7 @@ fuzz_target!(|data: &[u8]| {
         Ok(value) => {
             assert!(data_type.width().is_none_or(|width| width == rest.len()));
             let text = value.to_string();
-            // Filling at the end of a text is no part of it, and a Boolean has 255 ways to be true.
+            // Trailing zeros are not part of a text, and 255 byte values of a Boolean are true.
             let exact = !matches!(value, Value::Text(_) | Value::Bool(_)) && !is_nan(&value);
             if exact && !times.contains(name) {
                 assert_eq!(data_type.encode_text(&text).as_deref(), Ok(rest), "{name}: {text}");
