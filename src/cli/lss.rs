@@ -3,25 +3,28 @@
 mod assign;
 
 use super::args::Duration;
-use super::exit::stdout;
-use super::{Format, Global, open};
+use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::catalog::Model;
 use crate::master::Master;
 use crate::node::Overrides;
-use crate::output::{csv, json_lss, table};
-use crate::tasks::lss::{LssAddress, LssRange, Named, Note, Slave, Target, activate, identify, inquire, scan, store};
-use crate::tasks::{Failure, Kind};
+use crate::output::failure::ErrorMessage;
+use crate::output::lss::Identified;
+use crate::output::notes;
+use crate::tasks::lss::{
+    Descriptions, LssCause, LssFailure, LssRange, Target, TargetError, activate, identify, inquire, scan, store,
+};
+use crate::tasks::{Failure, Note};
 use clap::{Args, Subcommand};
-use std::io::{self, Write};
 use std::str::FromStr;
 use std::sync::Arc;
 
-/// Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device's own)
+/// Set the node-ID and bit rate of devices (LSS, CiA 305, or objects of the device)
 ///
-/// TARGET is a node-ID (its identity is read, and it is addressed by that), VENDOR:PRODUCT:REVISION:SERIAL,
-/// "only" (refused where more than one device shows itself), or "unconfigured" (found by fastscan).
+/// TARGET is one of: a node-ID (the identity is read first, then the device is addressed by it);
+/// VENDOR:PRODUCT:REVISION:SERIAL; "only" (rejected if there is more than one device); "unconfigured" (a device
+/// without a node-ID, found by fastscan).
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim lss scan\n  cangauge -b sim:dps@127 lss set-id 127 12\n  cangauge -b sim:mh4@1 lss set-bitrate 1 500k --retime"
@@ -33,43 +36,43 @@ pub(crate) struct LssCommand {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// List who can be given a node-ID: those that have one by SDO, those that have none by fastscan
+    /// List devices with a node-ID (found by SDO) and without one (found by fastscan)
     Scan,
-    /// Ask a device for its identity and node-ID by LSS
+    /// Read the identity and node-ID of a device by LSS
     Inquire(TargetArgs),
     SetId(assign::SetId),
     SetBitrate(assign::SetBitrate),
     Set(assign::Set),
-    /// Bring configured bit rates into force: so long they go on, as long again they are silent
+    /// Activate a configured bit rate. The device is silent for the delay, changes, and is silent for it again
     Activate(Activate),
-    /// Make node-ID and bit rate last
+    /// Store node-ID and bit rate in non-volatile memory
     Store(StoreArgs),
-    /// Ask whether there are devices with numbers within limits; exit 3 where nobody answers
+    /// Check whether devices have an identity in a range. Exit code 3 if none answers
     Identify(Identify),
 }
 
 #[derive(Debug, Args)]
 struct TargetArgs {
-    /// Which device: 5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured
+    /// Device: 5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured
     target: Target,
 }
 
 #[derive(Debug, Args)]
 struct StoreArgs {
-    /// Which device: 5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured
+    /// Device: 5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured
     target: Target,
-    /// "only" goes on where more than one device shows itself
+    /// Accept more than one device for "only"
     #[arg(long)]
     force: bool,
 }
 
 #[derive(Debug, Args)]
 struct Activate {
-    /// Which device: 5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured; all is everybody
-    target: Everybody,
-    /// The delay, from 1ms to 65s: 1s
+    /// Device: 5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured; or all
+    target: AnyTarget,
+    /// Delay, from 1ms to 65s; usually 1s
     delay: Duration,
-    /// "only" goes on where more than one device shows itself
+    /// Accept more than one device for "only"
     #[arg(long)]
     force: bool,
 }
@@ -80,26 +83,26 @@ struct Identify {
     range: LssRange,
 }
 
-/// One device, or all of them.
+/// One device, or all devices.
 #[derive(Clone, Debug)]
-enum Everybody {
+enum AnyTarget {
     All,
     One(Target),
 }
 
-impl FromStr for Everybody {
-    type Err = String;
+impl FromStr for AnyTarget {
+    type Err = TargetError;
 
-    fn from_str(text: &str) -> Result<Everybody, String> {
+    fn from_str(text: &str) -> Result<AnyTarget, TargetError> {
         match text {
-            "all" => Ok(Everybody::All),
-            _ => text.parse().map(Everybody::One).map_err(|error: crate::tasks::lss::TargetError| error.to_string()),
+            "all" => Ok(AnyTarget::All),
+            _ => text.parse().map(AnyTarget::One),
         }
     }
 }
 
 impl LssCommand {
-    /// LSS has no addresses of its own: the command needs the bus alone.
+    /// LSS reaches every device, so the command needs the bus alone.
     pub(super) fn claim(&self) -> Claim {
         Claim::Bus
     }
@@ -112,98 +115,87 @@ impl LssCommand {
             Action::SetBitrate(args) => args.run(global),
             Action::Set(args) => args.run(global),
             Action::Activate(args) => args.run(global),
-            Action::Store(args) => {
-                with_named(global, |master, named, tell| Ok(store(master, &args.target, named, args.force, tell)?))?;
-                global.console().note("stored: the device acknowledged it");
-                Ok(())
-            }
+            Action::Store(args) => args.run(global),
             Action::Identify(args) => args.run(global),
         }
     }
 }
 
-/// What the user says of descriptions.
-struct Descriptions {
+/// The descriptions that the user named.
+struct NamedDescriptions {
     overrides: Overrides,
     given: Option<Arc<Model>>,
 }
 
-impl Descriptions {
-    fn new(global: &Global) -> anyhow::Result<Descriptions> {
+impl NamedDescriptions {
+    fn new(global: &Global) -> anyhow::Result<NamedDescriptions> {
         let all: Vec<NodeId> = NodeId::all().collect();
         let overrides = open::overrides(global, &all)?;
         let named: Vec<NodeId> = global.device.iter().chain(&global.eds).filter_map(|given| given.node).collect();
-        // What was given for no node in particular stands with every node that was not named.
+        // A description that was named for no node is an override of every node that was not named.
         let given = overrides.iter().find(|(node, _)| !named.contains(node)).map(|(_, model)| Arc::clone(model));
-        Ok(Descriptions { overrides, given })
+        Ok(NamedDescriptions { overrides, given })
     }
 
-    fn named(&self) -> Named<'_> {
-        (&self.overrides, self.given.as_ref())
+    fn get(&self) -> Descriptions<'_> {
+        Descriptions { overrides: &self.overrides, given: self.given.as_ref() }
     }
 }
 
-/// Runs a task with a master on the bus and what the user says of descriptions.
-fn with_named<T>(
+/// Runs a task with a master on the bus and the descriptions that the user named. Its notes are printed.
+fn with_descriptions<T>(
     global: &Global,
-    work: impl FnOnce(&mut Master<'_>, Named<'_>, &mut dyn FnMut(Note)) -> anyhow::Result<T>,
+    work: impl FnOnce(&mut Master<'_>, &Descriptions<'_>, &mut dyn FnMut(Note)) -> Result<T, Failure>,
 ) -> anyhow::Result<T> {
-    let descriptions = Descriptions::new(global)?;
-    global.with_master(|master| work(master, descriptions.named(), &mut |note| say(global, &note)))
+    let descriptions = NamedDescriptions::new(global)?;
+    global.with_master(|master| Ok(work(master, &descriptions.get(), &mut |note| print_note(global, &note))?))
 }
 
-fn say(global: &Global, note: &Note) {
-    match note {
-        Note::Step(text) => global.console().note(text),
-        Note::Warning(text) => global.console().warn(text),
-    }
+fn print_note(global: &Global, note: &Note) {
+    notes::print(&global.console(), note);
+}
+
+fn failed(cause: LssCause) -> anyhow::Error {
+    Failure::general(LssFailure::general(cause)).into()
 }
 
 fn run_scan(global: &Global) -> anyhow::Result<()> {
-    let found = global.with_master(|master| Ok(scan(master, &mut |note| say(global, &note))?))?;
-    print(&found, global.format).map_err(stdout)?;
-    if found.is_empty() {
-        let failure = Failure::new(Kind::NoAnswer, "nobody answers, neither by SDO nor by LSS fastscan");
-        return Err(failure.hint("check power, wiring and bit rate: cangauge scan").into());
-    }
-    Ok(())
+    let found = global.with_master(|master| Ok(scan(master, &mut |note| print_note(global, &note))?))?;
+    global.print(&found)?;
+    if found.is_empty() { Err(failed(LssCause::NoDevice)) } else { Ok(()) }
 }
 
 impl TargetArgs {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let told = with_named(global, |master, named, tell| Ok(inquire(master, &self.target, named, tell)?))?;
-        let node = told.node.map(|node| node.map_or_else(|| "-".to_owned(), |node| node.to_string()));
-        let address = told.address.map(|address| address.to_string());
-        let mut out = io::stdout().lock();
-        match global.format {
-            Format::Json => json_lss::inquired(&mut out, &self.target.to_string(), &told),
-            Format::Csv => {
-                writeln!(out, "{},{}", address.unwrap_or_default(), node.unwrap_or_default())
-            }
-            Format::Text => {
-                let parts: Vec<String> = address.into_iter().chain(node.map(|node| format!("node {node}"))).collect();
-                writeln!(out, "{}", parts.join("  "))
-            }
-        }
-        .and_then(|()| out.flush())
-        .map_err(stdout)
+        let inquired = with_descriptions(global, |master, named, notify| inquire(master, &self.target, named, notify))?;
+        global.print(&[inquired])
+    }
+}
+
+impl StoreArgs {
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        with_descriptions(global, |master, named, notify| store(master, &self.target, named, self.force, notify))?;
+        global.console().note("stored: the device acknowledged it");
+        Ok(())
     }
 }
 
 impl Activate {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let delay_ms = u16::try_from(self.delay.0.as_millis()).ok().filter(|&delay| delay > 0).ok_or_else(|| {
-            Failure::new(Kind::Usage, "the delay goes from 1ms to 65.535s (CiA 305 has 16 bits for milliseconds)")
+            ErrorMessage::usage("the delay must be from 1ms to 65.535s (CiA 305 has 16 bits for milliseconds)")
         })?;
         let target = match &self.target {
-            Everybody::All => None,
-            Everybody::One(target) => Some(target),
+            AnyTarget::All => None,
+            AnyTarget::One(target) => Some(target),
         };
-        with_named(global, |master, named, tell| Ok(activate(master, target, delay_ms, named, self.force, tell)?))?;
+        with_descriptions(global, |master, named, notify| {
+            activate(master, target, delay_ms, named, self.force, notify)
+        })?;
         let silent = crate::bus::time::spoken(2 * self.delay.0);
-        let said =
-            format!("sent, and nobody answers it: in {silent} the new bit rate is in force; this side follows by hand");
-        global.console().note(&said);
+        global.console().note(&format!(
+            "sent; devices do not acknowledge it. The new bit rate is active in {silent}: set the host to it"
+        ));
         Ok(())
     }
 }
@@ -212,49 +204,8 @@ impl Identify {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let answered = global.with_master(|master| Ok(identify(master, &self.range)?))?;
         if !answered {
-            return Err(Failure::new(Kind::NoAnswer, format!("no LSS slave within {} answers", self.range)).into());
+            return Err(failed(LssCause::NoneInRange(self.range)));
         }
-        let mut out = io::stdout().lock();
-        match global.format {
-            Format::Json => json_lss::identified(&mut out, &self.range.to_string()),
-            Format::Csv | Format::Text => writeln!(out, "yes"),
-        }
-        .and_then(|()| out.flush())
-        .map_err(stdout)
+        global.print(&[Identified { range: self.range }])
     }
-}
-
-fn print(found: &[Slave], format: Format) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    match format {
-        Format::Json => found.iter().try_for_each(|slave| json_lss::slave(&mut out, slave))?,
-        Format::Csv => {
-            let head = ["node", "device", "vendor", "product", "revision", "serial"];
-            csv::write(&mut out, &head, found.iter().map(|slave| row(slave, "")))?;
-        }
-        Format::Text if found.is_empty() => {}
-        Format::Text => {
-            let head = HEAD.map(str::to_owned).to_vec();
-            let rows: Vec<_> = std::iter::once(head).chain(found.iter().map(|slave| row(slave, "-"))).collect();
-            use table::Align::{Left, Right};
-            table::write(&mut out, &[Right, Left, Left, Left, Left, Right], &rows)?;
-        }
-    }
-    out.flush()
-}
-
-const HEAD: [&str; 6] = ["NODE", "DEVICE", "VENDOR", "PRODUCT", "REVISION", "SERIAL"];
-
-fn row(slave: &Slave, missing: &str) -> Vec<String> {
-    let part = |part: fn(&LssAddress) -> u32| slave.address.as_ref().map(|address| format!("0x{:08X}", part(address)));
-    [
-        slave.node.map(|node| node.to_string()),
-        slave.model.as_ref().map(|model| model.description.name.clone()),
-        part(|address| address.vendor),
-        part(|address| address.product),
-        part(|address| address.revision),
-        slave.address.map(|address| address.serial.to_string()),
-    ]
-    .map(|cell| cell.unwrap_or_else(|| missing.to_owned()))
-    .to_vec()
 }

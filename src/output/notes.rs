@@ -3,8 +3,10 @@
 //! Each has a code for scripts, which never changes, and a message for people. Some have a command to type.
 
 use super::console::Console;
-use super::failure::autozero;
 use super::failure::host::up_by_hand;
+use super::failure::{self, autozero};
+use super::lss;
+use super::report::Cell;
 use crate::canopen::id::NodeId;
 use crate::tasks::{Effect, Fact, Note};
 use serde::Serialize;
@@ -36,6 +38,21 @@ impl Told {
         self
     }
 
+    /// The same as a cell of a report, for a list of notes.
+    pub(super) fn cell(&self) -> Cell {
+        Cell::Object(vec![
+            ("code", self.code.into()),
+            ("message", self.message.as_str().into()),
+            ("command", self.command.clone().into()),
+        ])
+    }
+
+    /// The message with its hint.
+    fn line(&self) -> String {
+        let hint = self.hint().map_or_else(String::new, |hint| format!("; {hint}"));
+        format!("{}{hint}", self.message)
+    }
+
     /// The command with its purpose, as a hint: `undo: cangauge …`.
     pub fn hint(&self) -> Option<String> {
         self.command.as_ref().map(|command| format!("{}: {command}", self.purpose))
@@ -55,6 +72,7 @@ pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> Told {
         Effect::WasOperational => Told::new("was-operational", "the node was operational before")
             .command("start it again", format!("cangauge nmt start {number}")),
         Effect::Autozero(effect) => autozero::effect(&number, effect),
+        Effect::Lss(effect) => failure::lss::effect(effect),
         Effect::Text(text) | Effect::Hint(text) => Told::new("other", text.clone()),
     }
 }
@@ -75,6 +93,7 @@ pub fn note(note: &Note) -> Told {
             "the node was started; its previous state is unknown, so it stays operational",
         ),
         Fact::Autozero(fact) => autozero::fact(note.node, fact),
+        Fact::Lss(fact) => lss::fact(fact),
         Fact::Text(text) => Told::new("other", text.clone()),
         Fact::StateAsBooted => Told::new(
             "state-as-booted",
@@ -90,9 +109,12 @@ pub fn notes(notes: &[Note]) -> Vec<Told> {
 
 /// Prints a note on stderr: as a warning if the user should act on it.
 pub fn print(console: &Console, note: &Note) {
-    let told = self::note(note);
     let node = note.node.map_or_else(String::new, |node| format!("node {node}: "));
-    let hint = told.hint().map_or_else(String::new, |hint| format!("; {hint}"));
-    let line = format!("{node}{}{hint}", told.message);
+    let line = format!("{node}{}", self::note(note).line());
     if note.fact.is_warning() { console.warn(&line) } else { console.note(&line) }
+}
+
+/// Prints a note of a report on stderr.
+pub fn print_told(console: &Console, told: &Told) {
+    console.note(&told.line());
 }

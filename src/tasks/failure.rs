@@ -87,7 +87,7 @@ pub enum Cause {
     /// A check failed or had no data.
     Check(check::CheckFailure),
     /// A node-ID or a bit rate was not set.
-    Lss(lss::LssFailure),
+    Lss(Box<lss::LssFailure>),
     /// The bit rate of a bus was not found.
     Detect(detect::DetectFailure),
     /// A channel was not set to zero.
@@ -170,7 +170,8 @@ fn node_kind(error: &node::Error) -> Kind {
     }
 }
 
-fn lss_kind(error: &LssError) -> Kind {
+/// The kind of an LSS error.
+pub(super) fn lss_kind(error: &LssError) -> Kind {
     match error {
         LssError::Master(Error::Bus(BusError::File { .. } | BusError::Recording { .. })) => Kind::Io,
         LssError::Master(Error::Bus(_)) => Kind::Bus,

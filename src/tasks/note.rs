@@ -3,6 +3,7 @@
 //! These types contain no text for people. [`crate::output::notes`] turns them into text.
 
 use super::autozero::{AutozeroEffect, AutozeroFact};
+use super::lss::{LssEffect, LssFact};
 use crate::canopen::id::NodeId;
 
 /// What a task that failed had changed before, or what state it left behind.
@@ -23,6 +24,8 @@ pub enum Effect {
     WasOperational,
     /// An autozero failed.
     Autozero(AutozeroEffect),
+    /// A change of node-ID or bit rate failed.
+    Lss(Box<LssEffect>),
     /// Text of a task that has no typed effects yet.
     Text(String),
     /// The hint of a task that has no typed causes yet.
@@ -49,6 +52,8 @@ pub enum Fact {
     LeftOperational,
     /// An autozero succeeded.
     Autozero(AutozeroFact),
+    /// An LSS task reports a step or a warning.
+    Lss(Box<LssFact>),
     /// Text of a task that has no typed notes yet.
     Text(String),
     /// The state of the node before a reset is unknown; it is in the state in which it boots.
@@ -59,6 +64,7 @@ impl Fact {
     /// Whether the user should act on it: printed as a warning.
     pub fn is_warning(&self) -> bool {
         match self {
+            Fact::Lss(fact) => fact.event.is_warning(),
             Fact::KeptUntilPowerOff
             | Fact::OperationalAgain
             | Fact::LeftOperational

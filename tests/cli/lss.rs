@@ -1,8 +1,8 @@
-//! `cangauge lss`: what it says, and the frames of the manuals.
+//! `cangauge lss`: outputs, and the frames of the manuals.
 
 use super::{ALL, Bench, Done};
 
-/// A DPS as delivered, or at another node-ID.
+/// A DPS, with other settings in `more`.
 fn dps(node: u8, more: &str) -> Bench {
     Bench::described(&format!("bit_rate = 125000\n[[device]]\nkind = \"dps\"\nnode = {node}\n{more}"))
 }
@@ -61,7 +61,7 @@ fn dps_table_4_a_node_id_on_a_network() {
 
 #[test]
 fn dps_table_5_a_bit_rate_point_to_point() {
-    // The table ends with 000#0100, which starts every node; nobody was asked to be started.
+    // The table ends with 000#0100, which would start every node. The command starts none.
     let done = dps(127, "").run("lss set-bitrate only 125k").exit(0);
     assert_eq!(
         from(&done, "000#807F"),
@@ -105,7 +105,7 @@ fn dps_table_8_activate_bit_timing() {
         done.frames.iter().map(String::as_str).filter(|frame| frame.contains("17100064")).collect();
     assert_eq!(written, ["67F#2217100064000000"]);
     assert!(done.frames.contains(&"5FF#6017100000000000".to_owned()), "{:?}", done.frames);
-    // Its heartbeat is 77Fh; the table prints 7FFh, which is nobody's.
+    // The heartbeat is 77Fh. The table prints 7FFh, which no node uses.
     let beating = || dps(127, "set = { \"0x1017\" = 100 }\n");
     let done = beating().run("lss set-bitrate only 125k --no-store").exit(0);
     assert_eq!(
@@ -129,7 +129,7 @@ fn mh4_2320h_and_2321h() {
         (done.frames_of("000"), done.frames_of("703"), done.frames_of("7E5")),
         (vec!["8101"], vec!["00"], vec![])
     );
-    assert!(done.stderr.contains("puts the COB-IDs of 1014h and 180xh:1 to their defaults"), "{}", done.stderr);
+    assert!(done.stderr.contains("resets the COB-IDs of 1014h and 180xh:1 to their defaults"), "{}", done.stderr);
     let done = Bench::of("mh4@1,dps@127").run("lss set-bitrate 1 250k --via sdo").exit(0);
     let writes: Vec<&str> = done.frames_of("601").into_iter().filter(|frame| frame.starts_with('2')).collect();
     assert_eq!(writes, ["2321230003736574", "2310100173617665"]);
@@ -137,7 +137,7 @@ fn mh4_2320h_and_2321h() {
 }
 
 #[test]
-fn no_command_sends_nmt_to_anybody_else() {
+fn nmt_goes_to_the_named_node_only() {
     for line in
         ["lss scan", "lss inquire 1", "lss identify 71:1:0-0xFFFFFFFF:0-0xFFFFFFFF", "lss store 1", "lss set-id 9 12"]
     {
@@ -149,43 +149,51 @@ fn no_command_sends_nmt_to_anybody_else() {
 }
 
 #[test]
-fn what_set_id_says() {
+fn set_id_prints_steps_and_result() {
     let done = Bench::of(ALL).run("lss set-id 127 12").prints("12\n");
     let lines: Vec<&str> = done.stderr.lines().collect();
-    assert_eq!(lines[..2], ["node 127 is Honeywell DPS, serial 20002; 12 is free", "node-ID 12 configured, stored"]);
+    assert_eq!(
+        lines[..2],
+        ["node 127: Honeywell DPS, serial 20002; node-ID 12 is free", "node 127: node-ID 12 configured, stored"]
+    );
     assert!(
-        lines[2].starts_with("boot-up from 12 after ") && lines[2].ends_with("identity confirmed; TPDO1 is at 0x18C")
+        lines[2].starts_with("boot-up of node 12 after ")
+            && lines[2].ends_with("identity confirmed; TPDO1 has COB-ID 0x18C")
     );
     let done = Bench::of(ALL).run("lss set-id 1 12 -f json").prints(
-        "{\"target\":\"1\",\"old\":1,\"new\":12,\"stored\":true,\"confirmed\":\"boot-up\",\"vendor\":71,\"product\":1,\
-         \"revision\":65543,\"serial\":10001,\"device\":\"mh4\",\"stale\":[]}\n",
+        "{\"target\":\"1\",\"old\":1,\"new\":12,\"stored\":true,\"confirmed\":\"boot-up\",\"vendor\":71,\"vendor_name\":\"WIKA\",\
+         \"product\":1,\"revision\":65543,\"serial\":10001,\"device\":\"mh4\",\"bit_rate\":null,\"table_index\":null,\
+         \"retimed\":false,\"stale\":[],\"notes\":[]}\n",
     );
     assert_eq!(done.json()[0]["new"], 12);
     let done = Bench::of(ALL).run("lss set-id only 12").exit(1);
-    assert_eq!(done.stderr.lines().next(), Some("cangauge: nodes 1, 2, 3, 127 are there: nothing was changed"));
+    assert_eq!(
+        done.stderr.lines().next(),
+        Some("cangauge: several nodes are on the bus: 1, 2, 3, 127; nothing was changed")
+    );
 }
 
 #[test]
-fn what_set_bitrate_says() {
+fn set_bitrate_prints_steps_and_result() {
     let done = Bench::of(ALL).run("lss set-bitrate 1 500k -f json").exit(0);
     let report = &done.json()[0];
     assert_eq!((&report["bit_rate"], &report["table_index"]), (&500_000.into(), &2.into()));
     assert_eq!((&report["retimed"], &report["confirmed"]), (&false.into(), &"ack".into()));
     let done = Bench::of("mh4@1").run("lss set-bitrate 1 500k --retime").prints("500000\n");
-    assert!(done.stderr.contains("node 1 answers at 500k"), "{}", done.stderr);
+    assert!(done.stderr.contains("node 1: it answers at 500k"), "{}", done.stderr);
     Bench::of(ALL).run("lss set-bitrate 1 auto").prints("auto\n");
-    Bench::of(ALL).run("lss set-bitrate 2 --table-index 6").prints("50000\n");
+    Bench::of(ALL).run("lss set-bitrate 2 --table-index 6").prints("index 6\n");
     let done = Bench::of(ALL).run("lss set-bitrate 127 800k").exit(2);
     assert_eq!(
         done.stderr,
-        "cangauge: Honeywell DPS has no bit rate 800k: nothing was changed\n\
-         hint: its table has 1M, 500k, 250k, 125k, 100k, 50k; another by its index: --table-index N\n"
+        "cangauge: node 127: Honeywell DPS has no bit rate 800k; nothing was changed\n\
+         hint: its table has 1M, 500k, 250k, 125k, 100k, 50k; for another rate: --table-index N\n"
     );
     Bench::of("mh4@1").run("lss set 1 --id 12 --bitrate 500k --retime").prints("12 500000\n");
 }
 
 #[test]
-fn several_without_a_node_id_in_one_line() {
+fn several_unconfigured_devices_get_ids_in_one_command() {
     let unconfigured = |serial: u32| format!("[[device]]\nkind = \"mh4\"\nserial = {serial}\n");
     let bench = Bench::described(&[30, 10, 20].map(unconfigured).concat());
     let done = bench.run("lss set-id unconfigured 12-14 -f json").exit(0);
@@ -200,34 +208,34 @@ fn several_without_a_node_id_in_one_line() {
 }
 
 #[test]
-fn who_is_there_and_who_he_is() {
+fn scan_inquire_and_identify() {
     let bench = Bench::described("[[device]]\nkind = \"dps\"\nnode = 5\n[[device]]\nkind = \"mh4\"\nserial = 77\n");
     let done = bench.run("lss scan").exit(0);
     assert_eq!(
         done.stdout,
-        "NODE  DEVICE  VENDOR      PRODUCT     REVISION    SERIAL\n   \
-            5  dps     0x00000362  0x00443150  0x00010000   20002\n   \
-            -  -       0x00000047  0x00000001  0x00010007      77\n"
+        "NODE  VENDOR     PRODUCT     REVISION    SERIAL  DEVICE\n   \
+            5  Honeywell  0x00443150  0x00010000   20002  dps\n   \
+            -  WIKA       0x00000001  0x00010007      77  -\n"
     );
     let done = bench.run("lss scan -f json").exit(0);
     assert_eq!(done.json()[1]["node"], serde_json::Value::Null);
-    // Each is set aside while the next one is looked for, and nobody is changed by it.
+    // A found device waits while the next one is searched; none is changed.
     let several = [30, 10, 20].map(|serial| format!("[[device]]\nkind = \"mh4\"\nserial = {serial}\n")).concat();
     let done = Bench::described(&several).run("lss scan -f csv").exit(0);
-    let serials: Vec<_> = done.stdout.lines().skip(1).map(|line| line.rsplit(',').next().unwrap_or_default()).collect();
+    let serials: Vec<_> = done.stdout.lines().skip(1).map(|line| line.rsplit(',').nth(1).unwrap_or_default()).collect();
     assert_eq!((serials, done.stderr.as_str()), (vec!["10", "20", "30"], ""));
     let services: Vec<&str> = done.frames_of("7E5").into_iter().map(|frame| &frame[..2]).collect();
     assert!(!services.iter().any(|service| ["11", "13", "15", "17"].contains(service)), "{services:?}");
     assert_eq!(done.frames_of("7E5").last(), Some(&"0400000000000000"), "left again");
-    // One that takes part in configuration state, too, hides the others, which is said.
+    // A device that takes part in configuration state as well hides the others: a warning says so.
     let hides = "[[device]]\nkind = \"mh4\"\nserial = 10\nlss = { endless_fastscan = true }\n";
     let done =
         Bench::described(&format!("{hides}[[device]]\nkind = \"mh4\"\nserial = 20\n")).run("lss scan -f json").exit(0);
     assert_eq!((done.json().len(), done.json()[0]["serial"].clone()), (1, 10.into()), "{}", done.stdout);
-    assert!(done.stderr.contains("whether there are more devices"), "{}", done.stderr);
+    assert!(done.stderr.contains("there may be more devices"), "{}", done.stderr);
     Bench::of(ALL).run("lss inquire 1").prints("0x47:0x1:0x10007:10001  node 1\n");
     Bench::of(ALL).run("lss inquire 1 -f json").prints(
-        "{\"target\":\"1\",\"node\":1,\"unconfigured\":false,\"vendor\":71,\"product\":1,\"revision\":65543,\"serial\":10001}\n",
+        "{\"target\":\"1\",\"node\":1,\"unconfigured\":false,\"vendor\":71,\"vendor_name\":\"WIKA\",\"product\":1,\"revision\":65543,\"serial\":10001}\n",
     );
     Bench::of(ALL).run("lss identify 71:1:0-0xFFFFFFFF:10000-10002").prints("yes\n");
     let done = Bench::of(ALL).run("lss identify 71:1:0-0xFFFFFFFF:10002-10009").exit(3);
@@ -235,7 +243,7 @@ fn who_is_there_and_who_he_is() {
 }
 
 #[test]
-fn wrong_words_are_refused_before_the_bus_is_opened() {
+fn wrong_arguments_are_rejected_before_the_bus_is_opened() {
     let bench = Bench::of(ALL);
     bench
         .run("lss set-id 0 12")
@@ -243,28 +251,32 @@ fn wrong_words_are_refused_before_the_bus_is_opened() {
     bench
         .run("lss set-id 1:2:3 12")
         .refuses("\"1:2:3\" names no device (5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured)");
-    bench.run("lss set-id 1 12-14").refuses("one device takes one node-ID; several are for \"unconfigured\"");
-    bench.run("lss set-id 1 all").refuses("one device takes one node-ID; several are for \"unconfigured\"");
-    bench.run("lss set-bitrate 1 auto --table-index 3").refuses("auto and --table-index exclude each other");
-    bench.run("--device dps lss set-bitrate 1 800k").refuses("Honeywell DPS has no bit rate 800k: nothing was changed");
+    bench
+        .run("lss set-id 1 12-14")
+        .refuses("give one new node-ID; several are possible for the target \"unconfigured\" only");
+    bench
+        .run("lss set-id 1 all")
+        .refuses("give one new node-ID; several are possible for the target \"unconfigured\" only");
+    bench.run("lss set-bitrate 1 auto --table-index 3").refuses("use either auto or --table-index");
+    bench.run("--device dps lss set-bitrate 1 800k").refuses("Honeywell DPS has no bit rate 800k");
     bench
         .run("lss activate all 66s")
-        .refuses("the delay goes from 1ms to 65.535s (CiA 305 has 16 bits for milliseconds)");
+        .refuses("the delay must be from 1ms to 65.535s (CiA 305 has 16 bits for milliseconds)");
 }
 
 #[test]
-fn objects_are_not_set_without_storing_them() {
-    let what = "what stands in its objects comes into force once it is stored (0x1010:1) and reset, so that --no-store \
-                cannot be: nothing was changed\nhint: leave --no-store out, or by LSS where it has it: --via lss\n";
+fn objects_require_a_store() {
+    let cause = "its objects take effect only after they are stored (0x1010:1) and the device is reset";
+    let hint = "hint: omit --no-store, or use LSS: --via lss\n";
     let done = Bench::of(ALL).run("lss set-id 1 12 --via sdo --no-store").exit(2);
-    assert_eq!(done.stderr, format!("cangauge: node 1: {what}"));
+    assert_eq!(done.stderr, format!("cangauge: node 1: {cause}; nothing was changed\n{hint}"));
     assert!(
         !done.frames_of("601").iter().any(|frame| frame.starts_with('2')),
         "only read: {:?}",
         done.frames_of("601")
     );
     assert_eq!((done.frames_of("000"), done.frames_of("7E5")), (vec![], vec![]));
-    // Where it is said what the device is, the bus is not opened for it.
+    // With --device the bus is not opened.
     let done = Bench::of(ALL).run("lss set-bitrate 1 125k --via sdo --no-store --device mh4").exit(2);
-    assert_eq!((done.stderr, done.frames.len()), (format!("cangauge: {what}"), 0));
+    assert_eq!((done.stderr, done.frames.len()), (format!("cangauge: {cause}\n{hint}"), 0));
 }

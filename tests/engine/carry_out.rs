@@ -18,7 +18,7 @@ use cangauge::measure::sample::{Sample, Source};
 use cangauge::node::Overrides;
 use cangauge::node::{Node, WriteOptions};
 use cangauge::tasks::log::{LogEvent, LogOptions, Mode, Observer, log};
-use cangauge::tasks::lss::{self, Job, LssAddress, LssRange, Rate};
+use cangauge::tasks::lss::{self, Descriptions, Job, LssAddress, LssRange, RequestedRate};
 use cangauge::tasks::nmt::Seen;
 use cangauge::tasks::pdo::{self, Item, Line, Send, Settings, Wish};
 use cangauge::tasks::settings::{self, errors, filter, info, limits, minmax, unit};
@@ -128,7 +128,7 @@ pub(crate) fn carry_out(bus: &mut dyn Bus, spec: &Spec, observed: &mut Observati
 
 fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observations) -> Result<Claim, Failure> {
     let none = Overrides::new();
-    let mut quiet = |_: lss::Note| {};
+    let mut quiet = |_: cangauge::tasks::Note| {};
     Ok(match &spec.command {
         Command::Scan { nodes: ids } => {
             let wait = Duration::from_millis(200.min(spec.timeout_ms));
@@ -194,22 +194,40 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
         }
         Command::LssScan => {
             let found = lss::scan(master, &mut quiet)?;
-            let serial = |slave: &lss::Slave| slave.address.map(|address| address.serial);
+            let serial = |slave: &lss::FoundSlave| slave.address.map(|address| address.serial);
             Claim::Found(found.iter().filter_map(|slave| Some((slave.node?.get(), serial(slave)))).collect())
         }
         Command::LssInquire { target: wanted } => {
-            let told = lss::inquire(master, &target(spec, wanted), (&none, None), &mut quiet)?;
+            let told = lss::inquire(
+                master,
+                &target(spec, wanted),
+                &Descriptions { overrides: &none, given: None },
+                &mut quiet,
+            )?;
             let node = told.node.flatten();
             let serial = told.address.map(|address| address.serial);
             Claim::Found(node.map(|node| (node.get(), serial)).into_iter().collect())
         }
         Command::LssStore { target: wanted, force } => {
-            lss::store(master, &target(spec, wanted), (&none, None), *force, &mut quiet)?;
+            lss::store(
+                master,
+                &target(spec, wanted),
+                &Descriptions { overrides: &none, given: None },
+                *force,
+                &mut quiet,
+            )?;
             Claim::Nothing
         }
         Command::LssActivate { target: wanted, delay_ms, force } => {
             let wanted = wanted.as_ref().map(|wanted| target(spec, wanted));
-            lss::activate(master, wanted.as_ref(), *delay_ms, (&none, None), *force, &mut quiet)?;
+            lss::activate(
+                master,
+                wanted.as_ref(),
+                *delay_ms,
+                &Descriptions { overrides: &none, given: None },
+                *force,
+                &mut quiet,
+            )?;
             Claim::Nothing
         }
         Command::LssIdentify { place, around } => {
@@ -222,13 +240,12 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             let job = Job {
                 target: target(spec, wanted),
                 id: id.or((rate.is_none()).then_some(9)).map(node),
-                rate: rate.map(Rate::Bits),
+                rate: rate.map(RequestedRate::Bits),
                 store: *store,
                 retime: *retime,
                 via: *via,
                 force: *force,
-                overrides: &none,
-                given: None,
+                descriptions: Descriptions { overrides: &none, given: None },
             };
             let report = lss::assign(master, &job, &mut quiet)?;
             Claim::Assigned {

@@ -1,5 +1,5 @@
-//! Node-ID and bit rate: whatever goes wrong, no device is changed that was not meant, nothing is a success that the
-//! device does not hold, and nobody stays in configuration state.
+//! Node-ID and bit rate. Whatever fails: no other device is changed, a success is the real state of the device, and no
+//! device stays in configuration state.
 
 mod faults;
 mod interrupted;
@@ -11,9 +11,10 @@ use cangauge::canopen::id::NodeId;
 use cangauge::master::{Master, Timing};
 use cangauge::node::Overrides;
 use cangauge::output::failure::ErrorMessage;
+use cangauge::output::notes;
 use cangauge::sim::{Bench, Device};
-use cangauge::tasks::lss::{Job, Note, Rate, Report, Via, assign};
-use cangauge::tasks::{Failure, Kind};
+use cangauge::tasks::lss::{Assigned, Descriptions, Job, RequestedRate, Via, assign};
+use cangauge::tasks::{Failure, Kind, Note};
 use std::path::Path;
 
 fn bus(toml: &str) -> MemoryBus {
@@ -24,7 +25,7 @@ fn node(id: u8) -> NodeId {
     NodeId::new(id).unwrap()
 }
 
-/// What a device holds: its node-ID and bit rate, now and after power off and on.
+/// Node-ID and bit rate of a device, now and after a power cycle.
 type Held = (Option<u8>, Option<u32>, Option<u8>, Option<u32>);
 
 fn held(device: &Device) -> Held {
@@ -37,9 +38,9 @@ fn all_held(bus: &MemoryBus) -> Vec<Held> {
     bus.stations::<Device>().map(held).collect()
 }
 
-/// A job, what it said, and that nobody stays in configuration state.
+/// The result of a job, and its notes.
 struct Done {
-    result: Result<Report, Failure>,
+    result: Result<Assigned, Failure>,
     notes: Vec<Note>,
 }
 
@@ -51,14 +52,14 @@ impl Done {
     }
 
     fn warns(&self, of: &str) -> bool {
-        self.notes.iter().any(|note| matches!(note, Note::Warning(text) if text.contains(of)))
+        self.notes.iter().any(|note| note.fact.is_warning() && notes::note(note).message.contains(of))
     }
 }
 
 #[derive(Default)]
 struct Wanted {
     id: Option<u8>,
-    rate: Option<Rate>,
+    rate: Option<RequestedRate>,
     retime: bool,
     no_store: bool,
     force: bool,
@@ -69,6 +70,7 @@ struct Wanted {
 #[track_caller]
 fn run(bus: &mut MemoryBus, target: &str, wanted: &Wanted) -> Done {
     let overrides = Overrides::new();
+    let given = wanted.device.map(|name| cangauge::device::catalog::by_name(name).unwrap());
     let job = Job {
         target: target.parse().unwrap(),
         id: wanted.id.map(node),
@@ -77,14 +79,13 @@ fn run(bus: &mut MemoryBus, target: &str, wanted: &Wanted) -> Done {
         retime: wanted.retime,
         via: wanted.via,
         force: wanted.force,
-        overrides: &overrides,
-        given: wanted.device.map(|name| cangauge::device::catalog::by_name(name).unwrap()),
+        descriptions: Descriptions { overrides: &overrides, given: given.as_ref() },
     };
     let mut notes = Vec::new();
     let mut master = Master::new(bus, Timing::default());
     let result = assign(&mut master, &job, &mut |note| notes.push(note));
     master.settle();
-    // What was handed over last gets there.
+    // The last frames arrive.
     let until = master.now() + std::time::Duration::from_millis(20);
     while !matches!(master.next(until), Ok(cangauge::master::Happening::Deadline) | Err(_)) {}
     drop(master);

@@ -98,6 +98,11 @@ pub(super) fn lss(error: &LssError) -> Words {
     }
 }
 
+/// Whether a service addresses one slave.
+pub(super) fn is_addressing(service: Service) -> bool {
+    service == Service::SwitchSelective
+}
+
 fn refusal_hint(service: Service) -> Option<&'static str> {
     match service {
         Service::ConfigureBitTiming => {

@@ -1,10 +1,261 @@
-//! Text for causes: a node-ID or a bit rate was not set.
+//! Text for causes and effects: a node-ID or a bit rate was not set.
 
 use super::Words;
+use super::below;
+use crate::bus::time::spoken;
+use crate::output::lss::{another, duplicate, progress, short};
+use crate::output::notes::Told;
 use crate::tasks::Failure;
-use crate::tasks::lss::LssFailure;
+use crate::tasks::failure::LssError;
+use crate::tasks::lss::{
+    DeviceName, HostObstacle, LssCause, LssEffect, LssFailure, Neighbour, NextStep, NotReset, RequestedRate, Setting,
+    TakenSign,
+};
 
-/// The message and the hint for a cause.
-pub(super) fn words(_failure: &Failure, cause: &LssFailure) -> Words {
-    match *cause {}
+/// What to do if one identity or one node-ID belongs to several devices.
+const CONNECT_ALONE: &str = "connect the device as the only one";
+
+/// The message and the hint for a cause. A device without a known node-ID is named by its identity.
+pub(super) fn words(failure: &Failure, cause: &LssFailure) -> Words {
+    let mut words = cause_words(failure, cause);
+    if let (None, Some(address)) = (failure.node, cause.device.address) {
+        words.message = format!("{address}: {}", words.message);
+    }
+    words
+}
+
+fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
+    match &cause.cause {
+        LssCause::Service(error) => service(&cause.device, error),
+        LssCause::NoSerialNumber => {
+            Words::new("it has no serial number, so it cannot be distinguished from another device")
+                .hint("connect it as the only device, and use the target \"only\"")
+        }
+        LssCause::DuplicateNodeId(sign) => {
+            Words::new(format!("{}: it seems that several devices have this node-ID", duplicate(*sign))).hint(
+                "connect one device at a time, or name one by the identity on its label: \
+                 cangauge lss set-id VENDOR:PRODUCT:REVISION:SERIAL NEW",
+            )
+        }
+        LssCause::NoAnswer(waited) => {
+            Words::new(format!("no answer within {}", spoken(*waited))).hint("list the devices: cangauge lss scan")
+        }
+        LssCause::OtherNodeIdByLss(found) => {
+            let found = found.map_or_else(|| "has no node-ID".to_owned(), |found| format!("has node-ID {found}"));
+            Words::new(format!("by LSS a device with the same identity {found}")).hint(CONNECT_ALONE)
+        }
+        LssCause::SameIdentity(other) => Words::new(format!("node {other} has the same identity")).hint(CONNECT_ALONE),
+        LssCause::SeveralWithIdentity => Words::new("more than one device answers to its identity").hint(CONNECT_ALONE),
+        LssCause::NotTheOnly(sign) => {
+            let names = cause.device.node.map_or_else(|| "node-ID".to_owned(), |node| format!("node-ID ({node})"));
+            Words::new(another(sign))
+                .hint(format!("name one device by its {names} or its identity; list them: cangauge lss scan"))
+        }
+        LssCause::NoDevice => Words::new("no device answers, neither by SDO nor by LSS")
+            .hint("check power, wiring and bit rate; then: cangauge scan"),
+        LssCause::NoUnconfigured => Words::new("no device without a node-ID answers")
+            .hint("fastscan finds only devices without a node-ID; list all: cangauge lss scan"),
+        LssCause::NoneInRange(range) => Words::new(format!("no LSS slave within {range} answers")),
+        LssCause::NoInquiry => Words::new("it does not support the LSS inquiries (5Ah to 5Eh)")
+            .hint("read its identity by SDO: cangauge scan"),
+        LssCause::Taken(new, sign) => {
+            let sign = match sign {
+                TakenSign::Answer => "a node answers there",
+                TakenSign::Heartbeat => "a node sends heartbeats there",
+            };
+            Words::new(format!("node-ID {new} is taken ({sign})")).hint("list the devices: cangauge lss scan")
+        }
+        LssCause::ObjectsUnknown
+        | LssCause::ObjectsOutOfReach
+        | LssCause::NoObject(_)
+        | LssCause::Number(..)
+        | LssCause::NeedsStore(_) => objects(&cause.cause),
+        LssCause::NoSuchRate { .. } | LssCause::RateCodesUnknown(_) => table(&cause.cause),
+        LssCause::NotReset(..)
+        | LssCause::OtherDeviceAnswers(_)
+        | LssCause::NotIdentified
+        | LssCause::DuplicateNewNodeId(_)
+        | LssCause::SilentAfterBootUp(_)
+        | LssCause::StillOldNodeId { .. }
+        | LssCause::NotSeen { .. } => after_reset(failure, &cause.cause),
+        LssCause::HostCannotFollow(_)
+        | LssCause::NotAloneForRetime(_)
+        | LssCause::SilentAtRate(_)
+        | LssCause::SilentAfterStore { .. } => retime(&cause.cause),
+    }
+}
+
+/// An LSS service failed. A device that is silent may answer in STOPPED.
+fn service(device: &DeviceName, error: &LssError) -> Words {
+    let words = below::lss(error);
+    let is_silent = matches!(error, LssError::NoAnswer { service, .. } if below::is_addressing(*service));
+    match (device.node, device.address) {
+        (Some(node), Some(address)) if is_silent => words.hint(format!(
+            "it may answer LSS in STOPPED only: cangauge nmt stop {node}; cangauge lss inquire {address} (if that \
+             answers, give the same target to the other LSS commands); cangauge nmt preop {node}"
+        )),
+        _ => words,
+    }
+}
+
+/// The objects of the device cannot be used.
+fn objects(cause: &LssCause) -> Words {
+    const BY_LSS: &str = "use LSS: --via lss";
+    match cause {
+        LssCause::ObjectsUnknown => Words::new("the objects that set its node-ID and bit rate are unknown")
+            .hint("use LSS: --via lss; or name a description: --device NAME"),
+        LssCause::ObjectsOutOfReach => Words::new("SDO does not reach it, or another device has the same node-ID")
+            .hint(format!("{CONNECT_ALONE}, or {BY_LSS}")),
+        LssCause::NoObject(setting) => {
+            let setting = match setting {
+                Setting::NodeId => "node-ID",
+                Setting::BitRate => "bit rate",
+            };
+            Words::new(format!("the object that sets its {setting} is unknown")).hint(BY_LSS)
+        }
+        LssCause::Number(object, reason) => Words::new(format!("{object}: {reason}")),
+        LssCause::NeedsStore(Some(object)) => {
+            Words::new(format!("its objects take effect only after they are stored ({object}) and the device is reset"))
+                .hint(format!("omit --no-store, or {BY_LSS}"))
+        }
+        LssCause::NeedsStore(None) => Words::new("the device stores its objects as soon as they are written")
+            .hint(format!("omit --no-store, or {BY_LSS}")),
+        _ => Words::default(),
+    }
+}
+
+/// The bit rate is not in the table of the device.
+fn table(cause: &LssCause) -> Words {
+    match cause {
+        LssCause::NoSuchRate { title, rate, rates, has_auto, is_standard } => {
+            let wanted = match rate {
+                RequestedRate::Bits(bits) => short(*bits),
+                RequestedRate::Auto => "auto".to_owned(),
+                RequestedRate::Index(index, _) => format!("index {index}"),
+            };
+            let mut list: Vec<String> = rates.iter().map(|rate| short(*rate)).collect();
+            list.extend(has_auto.then(|| "auto".to_owned()));
+            let source = if *is_standard { "the table of CiA 305" } else { "its table" };
+            let title = title.as_deref().unwrap_or("CiA 305");
+            Words::new(format!("{title} has no bit rate {wanted}"))
+                .hint(format!("{source} has {}; for another rate: --table-index N", list.join(", ")))
+        }
+        LssCause::RateCodesUnknown(title) => {
+            let title = title.as_deref().unwrap_or("this device");
+            Words::new(format!("the bit rate codes of {title} are unknown"))
+                .hint("find the code in its manual, then use --table-index N")
+        }
+        _ => Words::default(),
+    }
+}
+
+/// The device was not seen under its new node-ID.
+fn after_reset(failure: &Failure, cause: &LssCause) -> Words {
+    match cause {
+        LssCause::NotReset(new, why) => {
+            let why = match why {
+                NotReset::SharedNodeId(node) => format!("another device has node-ID {node} too"),
+                NotReset::NodeIdUnknown => "its present node-ID is unknown".to_owned(),
+            };
+            Words::new(format!("not reset, since {why}; so it was not seen as node {new}"))
+        }
+        LssCause::OtherDeviceAnswers(found) => Words::new(format!("another device answers there: {found}")),
+        LssCause::NotIdentified => Words::new("the device there reports no identity"),
+        LssCause::DuplicateNewNodeId(sign) => {
+            Words::new(format!("{}: several devices have this node-ID", duplicate(*sign)))
+        }
+        LssCause::SilentAfterBootUp(waited) => {
+            Words::new(format!("boot-up seen, then no answer within {}", spoken(*waited)))
+        }
+        LssCause::StillOldNodeId { old, new } => {
+            Words::new(format!("it was reset and still has node-ID {old}, not {new}"))
+        }
+        LssCause::NotSeen { new, waited } => {
+            let words = Words::new(format!("no boot-up and no answer from node {new} within {}", spoken(*waited)));
+            match failure.node {
+                Some(_) => words.hint("list the devices: cangauge lss scan"),
+                None => words,
+            }
+        }
+        _ => Words::default(),
+    }
+}
+
+/// Device and host did not change the bit rate together.
+fn retime(cause: &LssCause) -> Words {
+    match cause {
+        LssCause::HostCannotFollow(obstacle) => {
+            let why = match obstacle {
+                HostObstacle::RateUnknown => "the new bit rate is unknown",
+                HostObstacle::NoBitRate => "the interface has no bit rate",
+                HostObstacle::AppliesAtPowerOn => "the device changes its bit rate at power-on",
+                HostObstacle::AppliesAfterStore => "the device changes its bit rate only after it is stored",
+            };
+            Words::new(format!("{why}, so the host cannot follow")).hint("omit --retime, and set the interface by hand")
+        }
+        LssCause::NotAloneForRetime(neighbour) => {
+            let other = match neighbour {
+                Neighbour::Node(node) => format!("node {node} is"),
+                Neighbour::Unconfigured => "a device without a node-ID is".to_owned(),
+                Neighbour::Sender(id) => format!("a sender of frames {id} is"),
+            };
+            Words::new(format!("{other} on the bus too; --retime requires a single device"))
+                .hint(format!("{CONNECT_ALONE}, or omit --retime"))
+        }
+        LssCause::SilentAtRate(bits) => Words::new(format!("it does not answer at {}", short(*bits))),
+        LssCause::SilentAfterStore { bit_rate, interface, host } => {
+            let new = short(*bit_rate);
+            let words = Words::new(format!(
+                "stored and reset, and it does not answer at {new}; the host is at {}",
+                short(*host)
+            ));
+            words.hint(format!("find its bit rate: cangauge bus detect {interface} --active"))
+        }
+        _ => Words::default(),
+    }
+}
+
+/// The text for an effect.
+pub(in crate::output) fn effect(effect: &LssEffect) -> Told {
+    match effect {
+        LssEffect::MayBeConfiguring => {
+            Told::new("may-be-configuring", "the device may still be in the LSS configuration state")
+                .command("a power cycle ends it; then", "cangauge lss scan")
+        }
+        LssEffect::HostIsBack { bit_rate, device_answers: false, .. } => Told::new(
+            "host-restored",
+            format!("the host is back at {}", short(*bit_rate)),
+        )
+        .command("nothing was stored: power the device off and on, then see whether it answers", "cangauge lss scan"),
+        LssEffect::HostIsBack { bit_rate, new, device_answers: true } => {
+            let (old, new) = (short(*bit_rate), short(*new));
+            let message =
+                format!("it still answers at {old}, and the host is back there; its manual says whether it has {new}");
+            Told::new("host-restored", message).command("see its state", "cangauge lss scan")
+        }
+        LssEffect::Progress(device, done, next) => {
+            let told = Told::new("progress", progress(done));
+            match next {
+                NextStep::Cause => told,
+                NextStep::SeeAfterPowerCycle => {
+                    told.command("power it off and on, then see its node-ID", "cangauge lss scan")
+                }
+                NextStep::StoreAgain => told.command(
+                    "store it again, or power it off and on and see what it has kept",
+                    format!("cangauge lss store {}", argument(device)),
+                ),
+                NextStep::PowerCycle => told
+                    .command("power off and on discards what is not stored; then see its node-ID", "cangauge lss scan"),
+            }
+        }
+    }
+}
+
+/// How to name the device in the next command.
+fn argument(device: &DeviceName) -> String {
+    match (device.node, device.address) {
+        (Some(node), _) => node.to_string(),
+        (None, Some(address)) => address.to_string(),
+        (None, None) => "only".to_owned(),
+    }
 }

@@ -9,7 +9,7 @@ mod check;
 mod detect;
 pub mod host;
 mod log;
-mod lss;
+pub(super) mod lss;
 mod nmt;
 mod node;
 mod pdo;

@@ -1,274 +1,282 @@
-//! The whole job: who is meant, whether the new node-ID is free, configure, store, reset, confirm.
+//! Sets node-ID and bit rate: finds the device, checks that the new node-ID is free, configures, stores, resets,
+//! confirms.
 
 use super::cob_ids::{CobIds, cob_ids};
 use super::confirm::{Confirmed, confirm};
+use super::device::{Descriptions, LssDevice};
+use super::event::LssEvent;
+use super::failure::{LssCause, LssEffect, NextStep, NotReset};
+use super::method::{PlannedRate, RequestedRate, check_objects, choose_method, objects_instead, plan_rate};
+use super::node_id::taken;
 use super::objects::by_objects;
-use super::only::agreed;
-use super::presence::taken;
-use super::progress::{Done, Stage};
-use super::retime::{Host, Retiming};
-use super::session::{Session, prepared, put_back};
-use super::subject::{Knowledge, Subject, subject};
-use super::ways::{PlannedRate, Rate, plan_rate, way};
-use super::{Note, Target, Tell, Via};
+use super::progress::{Progress, Stage};
+use super::resolve::resolve;
+use super::retime::{Retiming, leaves_host};
+use super::services::{accepted_by_all, unchanged};
+use super::session::{Session, is_silent, prepared, restore_state};
+use super::{Notify, Target, Via};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
 use crate::device::assign::{AssignEntry, AssignKind, RateSource, RateTable};
 use crate::device::catalog::Model;
 use crate::master::{Lss, LssError, Master};
-use crate::node::Overrides;
 use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What is to be done.
+/// What is to be set.
 #[derive(Clone, Debug)]
 pub struct Job<'a> {
-    /// To whom.
+    /// The device.
     pub target: Target,
-    /// The node-ID that it gets.
+    /// The new node-ID.
     pub id: Option<NodeId>,
-    /// The bit rate that it gets.
-    pub rate: Option<Rate>,
-    /// Whether it lasts.
+    /// The new bit rate.
+    pub rate: Option<RequestedRate>,
+    /// Whether to store both in non-volatile memory.
     pub store: bool,
-    /// Whether the host goes to the new bit rate together with the device.
+    /// Whether the host changes to the new bit rate together with the device.
     pub retime: bool,
-    /// By which means.
+    /// The method.
     pub via: Via,
-    /// Whether `only` goes on where more than one device shows itself.
+    /// Whether [`Target::Only`] goes on if there is more than one device.
     pub force: bool,
-    /// Descriptions that the user named for nodes.
-    pub overrides: &'a Overrides,
-    /// The description that the user named for whichever device is meant.
-    pub given: Option<Arc<Model>>,
+    /// The descriptions that the user named.
+    pub descriptions: Descriptions<'a>,
 }
 
-/// What became of it.
+/// The result.
 #[derive(Clone, Debug)]
-pub struct Report {
-    /// As it was named.
+pub struct Assigned {
+    /// The device as the user named it.
     pub target: Target,
-    /// Its node-ID before; `None` where it had none or nothing told it.
+    /// Its node-ID before; `None` if it had none or it is unknown.
     pub old: Option<NodeId>,
-    /// Its node-ID now.
+    /// Its new node-ID; `None` if only the bit rate was set.
     pub new: Option<NodeId>,
-    /// The bit rate that was set, in bit/s where it is known, and its index.
+    /// The new bit rate.
     pub rate: Option<PlannedRate>,
-    /// Whether the host is at the new bit rate, too.
+    /// Whether the host works at the new bit rate.
     pub retimed: bool,
-    /// Whether it lasts.
+    /// Whether both are stored.
     pub stored: bool,
     /// What confirms it.
     pub confirmed: Confirmed,
-    /// How long after the reset the boot-up came.
-    pub boot: Option<Duration>,
-    /// Its identity.
+    /// The time from the reset to the boot-up message.
+    pub boot_time: Option<Duration>,
+    /// The identity of the device.
     pub address: Option<LssAddress>,
-    /// Its description.
+    /// Its description; `None` for an unknown device.
     pub model: Option<Arc<Model>>,
     /// Its COB-IDs under the new node-ID.
     pub cob_ids: Option<CobIds>,
 }
 
-/// Gives a device its node-ID or bit rate, or both.
+/// Sets node-ID, bit rate or both.
 ///
 /// # Errors
-/// Why it was not done, what has been done and how to go on. Nothing is a success that the device has not shown.
-pub fn assign(master: &mut Master<'_>, job: &Job<'_>, tell: Tell<'_>) -> Result<Report, Failure> {
-    let knowledge = Knowledge { overrides: job.overrides, given: job.given.as_ref() };
-    let subject = subject(master, &job.target, &knowledge, (job.via, job.force), tell)?;
-    let way = way(&subject, job.via, job.store, tell)?;
-    let description = subject.model.as_ref().map(|model| &model.description);
-    let rate = job.rate.map(|rate| plan_rate(description, rate, way.way)).transpose()?;
-    if let (Some(Rate::Bits(_)), RateSource::Standard) = (job.rate, RateTable::of(description).source) {
-        tell(Note::Step(format!(
-            "{}: its own table of bit rates is not known; that of CiA 305 is taken",
-            subject.name()
-        )));
+/// The cause, how far the change has come, and what to do next; bus errors and Ctrl-C.
+pub fn assign(master: &mut Master<'_>, job: &Job<'_>, notify: Notify<'_>) -> Result<Assigned, Failure> {
+    let (device, method, rate) = prepare(master, job, notify).map_err(unchanged)?;
+    let mut work = Work { job, device: &device, method, rate, progress: Progress::new(job.id, rate) };
+    let mut result = work.carry_out(master, notify);
+    if let Err(failure) = &result
+        && let Some(objects) = work.objects_after(failure)
+    {
+        notify(device.note(LssEvent::ObjectsInsteadOfLss));
+        result = check_objects(&device, &objects, job.store, notify).and_then(|()| {
+            work.method = objects;
+            work.progress = Progress::new(job.id, rate);
+            work.carry_out(master, notify)
+        });
     }
-    check_free(master, job, &subject)?;
-    tell(Note::Step(introduction(&subject, job)));
-    let mut done = Done::of(job.id, rate);
-    let result = carry_out(master, job, &subject, &way, rate, &mut done, tell);
-    result.map_err(|failure| done.explain(failure, &subject))
+    result.map_err(|failure| work.explain(failure))
 }
 
-fn check_free(master: &mut Master<'_>, job: &Job<'_>, subject: &Subject) -> Result<(), Failure> {
-    let Some(new) = job.id.filter(|new| subject.node != Some(*new) || !subject.alone) else { return Ok(()) };
-    let Some(sign) = taken(master, new)? else { return Ok(()) };
-    let message = format!("node-ID {new} is taken ({sign}): nothing was changed");
-    Err(subject.failure(Kind::CheckFailed, message).hint("who has which: cangauge lss scan"))
-}
-
-fn introduction(subject: &Subject, job: &Job<'_>) -> String {
-    let free = job.id.filter(|new| subject.node != Some(*new)).map_or(String::new(), |new| format!("; {new} is free"));
-    match subject.node {
-        Some(node) => format!("node {node} is {}{free}", subject.title()),
-        None => format!("{}{free}", subject.title()),
-    }
-}
-
-fn carry_out(
+/// Everything that is checked before anything is changed.
+fn prepare(
     master: &mut Master<'_>,
     job: &Job<'_>,
-    subject: &Subject,
-    way: &AssignEntry,
+    notify: Notify<'_>,
+) -> Result<(LssDevice, AssignEntry, Option<PlannedRate>), Failure> {
+    let device = resolve(master, &job.target, &job.descriptions, (job.via, job.force), notify)?;
+    let mut method = choose_method(&device, job.via, job.store, notify)?;
+    // Nothing is known of the device: it may answer LSS in STOPPED only.
+    method.retry_stopped |= device.description().is_none_or(|description| description.assign.is_empty());
+    let plan = |rate| plan_rate(device.description(), rate, method.way).map_err(|cause| device.failure(cause));
+    let rate = job.rate.map(plan).transpose()?;
+    if let (Some(RequestedRate::Bits(_)), RateSource::Standard) = (job.rate, RateTable::of(device.description()).source)
+    {
+        notify(device.note(LssEvent::StandardRateTable));
+    }
+    let changes_to = job.id.filter(|new| device.node != Some(*new));
+    if let Some(new) = job.id.filter(|_| changes_to.is_some() || !device.is_alone)
+        && let Some(sign) = taken(master, new)?
+    {
+        return Err(device.failure(LssCause::Taken(new, sign)));
+    }
+    let title = device.description().map(|description| description.title.clone());
+    notify(device.note(LssEvent::Found { title, free: changes_to }));
+    Ok((device, method, rate))
+}
+
+/// A job with everything that was found out before.
+struct Work<'a> {
+    job: &'a Job<'a>,
+    device: &'a LssDevice,
+    method: AssignEntry,
     rate: Option<PlannedRate>,
-    done: &mut Done,
-    tell: Tell<'_>,
-) -> Result<Report, Failure> {
-    let mut report = Report {
-        target: job.target.clone(),
-        old: subject.node,
-        new: job.id,
-        rate,
-        retimed: false,
-        stored: job.store,
-        confirmed: Confirmed::Acknowledge,
-        boot: None,
-        address: subject.address,
-        model: subject.model.clone(),
-        cob_ids: None,
-    };
-    let host = Host::of(master, rate);
-    let follows = job.retime && host.is_left_behind();
-    if let (true, Some(rate)) = (follows, rate) {
-        let complete = Retiming::new(master, job, subject, way, rate)?.carry_out(master, done, tell)?;
-        (report.retimed, report.confirmed) = (true, Confirmed::Identity);
-        if complete {
-            if let Some(new) = job.id {
-                report.cob_ids = Some(cob_ids(master, new, subject.node, subject.model.as_deref())?);
+    progress: Progress,
+}
+
+impl Work<'_> {
+    fn carry_out(&mut self, master: &mut Master<'_>, notify: Notify<'_>) -> Result<Assigned, Failure> {
+        let (job, device) = (self.job, self.device);
+        let mut report = self.report();
+        let leaves_host = leaves_host(master, self.rate);
+        let follows = job.retime && leaves_host;
+        if let (true, Some(rate)) = (follows, self.rate) {
+            let retiming = Retiming::new(master, job, device, &self.method, rate)?;
+            let is_complete = retiming.carry_out(master, &mut self.progress, notify)?;
+            (report.retimed, report.confirmed) = (true, Confirmed::Identity);
+            if is_complete {
+                report.cob_ids = self.cob_ids(master)?;
+                return Ok(report);
             }
-            return Ok(report);
+        }
+        let booted = match self.method.way {
+            AssignKind::Lss => self.by_lss(master, follows, follows || !leaves_host, notify)?,
+            AssignKind::Objects => {
+                by_objects(master, device, &self.method, job.store, &mut self.progress)?;
+                false
+            }
+        };
+        notify(device.note(LssEvent::Progress(self.progress.clone())));
+        // After a reset the device would work at a bit rate at which the host cannot hear it.
+        let Some(new) = job.id.filter(|_| follows || !leaves_host) else { return Ok(report) };
+        (report.confirmed, report.boot_time) = confirm(master, device, new, self.node_to_reset(new)?, booted)?;
+        report.cob_ids = self.cob_ids(master)?;
+        Ok(report)
+    }
+
+    fn report(&self) -> Assigned {
+        Assigned {
+            target: self.job.target.clone(),
+            old: self.device.node,
+            new: self.job.id,
+            rate: self.rate,
+            retimed: false,
+            stored: self.job.store,
+            confirmed: Confirmed::Acknowledge,
+            boot_time: None,
+            address: self.device.address,
+            model: self.device.model.clone(),
+            cob_ids: None,
         }
     }
-    // Reset, it would come back at a bit rate at which nobody here hears it.
-    let new = job.id.filter(|_| follows || !host.is_left_behind());
-    let booted = match way.way {
-        AssignKind::Lss => {
-            let session = by_lss(master, job, subject, way, rate.filter(|_| !follows), done, tell)?;
-            // A reset puts the NMT state to rights by itself.
-            if new.is_none() {
-                put_back(master, session.before, tell);
+
+    fn cob_ids(&self, master: &mut Master<'_>) -> Result<Option<CobIds>, Failure> {
+        let Some(new) = self.job.id else { return Ok(None) };
+        Ok(Some(cob_ids(master, new, self.device.node, self.device.model.as_deref())?))
+    }
+
+    /// The node to reset; `None` if the device boots by itself.
+    ///
+    /// # Errors
+    /// A reset would reach another device, or the node-ID is unknown.
+    fn node_to_reset(&self, new: NodeId) -> Result<Option<NodeId>, Failure> {
+        let why = match (self.device.own_node(), self.device.is_unconfigured, self.device.node) {
+            (Some(node), ..) => return Ok(Some(node)),
+            (None, true, _) => return Ok(None),
+            (None, false, Some(node)) => NotReset::SharedNodeId(node),
+            (None, false, None) => NotReset::NodeIdUnknown,
+        };
+        Err(self.device.failure(LssCause::NotReset(new, why)))
+    }
+
+    /// Configures and stores by LSS. Returns whether the device booted under its new node-ID.
+    fn by_lss(
+        &mut self,
+        master: &mut Master<'_>,
+        has_rate: bool,
+        resets: bool,
+        notify: Notify<'_>,
+    ) -> Result<bool, Failure> {
+        let (job, device, progress) = (self.job, self.device, &mut self.progress);
+        let old_rate = master.bus().bit_rate().and_then(|rate| RateTable::of(device.description()).index_of(rate));
+        let session: Session<()> = prepared(master, device, &self.method, notify, |lss| {
+            let result = configure(lss, job, !has_rate, progress).map_err(|error| device.lss_failure(error));
+            if result.is_err() && progress.is_pending() {
+                revert(lss, device, old_rate, progress);
             }
-            new.is_some_and(|new| session.booted.contains(&new))
+            result
+        })?;
+        let new = job.id.filter(|_| resets);
+        // A reset restores the NMT state by itself.
+        if new.is_none() {
+            restore_state(master, device, session.previous_state, notify);
         }
-        AssignKind::Objects => {
-            by_objects(master, subject, way, job.store, done)?;
-            false
+        Ok(new.is_some_and(|new| session.booted.contains(&new)))
+    }
+
+    /// The objects to use after a failure: the device answers no LSS, nothing was changed, and the user did not choose
+    /// the method.
+    fn objects_after(&self, failure: &Failure) -> Option<AssignEntry> {
+        let is_lss = self.job.via == Via::Auto && self.method.way == AssignKind::Lss && !self.job.retime;
+        let is_silent = is_lss && is_silent(self.device, failure) && self.progress.stored == Stage::NotDone;
+        objects_instead(self.device, self.job.store).filter(|_| is_silent)
+    }
+
+    /// The failure with how far the change has come, and what to do next.
+    fn explain(&self, mut failure: Failure) -> Failure {
+        if self.progress.is_unchanged() {
+            return unchanged(failure);
         }
-    };
-    tell(Note::Step(done.spoken()));
-    let Some(new) = new else { return Ok(report) };
-    let reset = match (subject.node.filter(|_| subject.alone), subject.unconfigured) {
-        (Some(node), _) => Some(node),
-        (None, true) => None,
-        (None, false) => return Err(not_reset(subject, new)),
-    };
-    let (confirmed, boot) = confirm(master, subject, new, reset, booted)?;
-    (report.confirmed, report.boot) = (confirmed, boot);
-    report.cob_ids = Some(cob_ids(master, new, subject.node, subject.model.as_deref())?);
-    Ok(report)
+        let next = match (self.progress.stored, failure.kind()) {
+            (Stage::NotDone, Kind::Refused) => NextStep::Cause,
+            (Stage::Done, _) => NextStep::SeeAfterPowerCycle,
+            (Stage::Sent, _) => NextStep::StoreAgain,
+            (Stage::NotDone | Stage::Reverted, _) => NextStep::PowerCycle,
+        };
+        failure.effects.push(LssEffect::Progress(self.device.name(), self.progress.clone(), next).into());
+        failure
+    }
 }
 
-/// A reset by node-ID would hit another device, too, or nobody.
-fn not_reset(subject: &Subject, new: NodeId) -> Failure {
-    let why = match subject.node {
-        Some(node) => format!("another device has node-ID {node} too"),
-        None => "its present node-ID is not known".to_owned(),
-    };
-    let message = format!("not reset, since {why}: whether it becomes node {new} has not been seen");
-    subject.failure(Kind::Unexpected, message)
-}
-
-/// Configures and stores by LSS.
-fn by_lss(
-    master: &mut Master<'_>,
-    job: &Job<'_>,
-    subject: &Subject,
-    way: &AssignEntry,
-    rate: Option<PlannedRate>,
-    done: &mut Done,
-    tell: Tell<'_>,
-) -> Result<Session<()>, Failure> {
-    let old_rate = old_index(master, subject);
-    prepared(master, subject, way, tell, |lss| {
-        let result = configure(lss, job, rate, done).map_err(|error| subject.lss_failure(error));
-        if result.is_err() && done.is_pending() {
-            undo(lss, subject, old_rate, done);
-        }
-        result
-    })
-}
-
-/// The index of the bit rate at which the device works at the moment.
-fn old_index(master: &Master<'_>, subject: &Subject) -> Option<u8> {
-    let description = subject.model.as_ref().map(|model| &model.description);
-    master.bus().bit_rate().and_then(|rate| RateTable::of(description).index_of(rate))
-}
-
-fn configure(lss: &mut Lss<'_, '_>, job: &Job<'_>, rate: Option<PlannedRate>, done: &mut Done) -> Result<(), LssError> {
-    if let Some((id, stage)) = &mut done.id {
-        let result = agreed(lss.configure_node_id(Some(*id)), job.force);
-        *stage = stage_of(&result);
+fn configure(lss: &mut Lss<'_, '_>, job: &Job<'_>, with_rate: bool, progress: &mut Progress) -> Result<(), LssError> {
+    if let Some((id, stage)) = &mut progress.id {
+        let result = accepted_by_all(lss.configure_node_id(Some(*id)), job.force);
+        *stage = Stage::after(&result);
         result?;
     }
-    if let (Some(rate), Some((_, stage))) = (rate, &mut done.rate) {
-        let result = agreed(lss.configure_bit_timing(0, rate.index), job.force);
-        *stage = stage_of(&result);
+    if let (Some((rate, stage)), true) = (&mut progress.rate, with_rate) {
+        let result = accepted_by_all(lss.configure_bit_timing(0, rate.index), job.force);
+        *stage = Stage::after(&result);
         result?;
     }
     if job.store {
-        let result = agreed(lss.store(), job.force);
-        done.stored = stage_of(&result);
+        let result = accepted_by_all(lss.store(), job.force);
+        progress.stored = Stage::after(&result);
         result?;
     }
     Ok(())
 }
 
-/// What an answer, or none, says of a step that was sent.
-pub(super) fn stage_of(result: &Result<(), LssError>) -> Stage {
-    match result {
-        Ok(()) => Stage::Done,
-        Err(LssError::Refused { .. }) => Stage::No,
-        Err(_) => Stage::Sent,
-    }
-}
-
-/// Takes back what is configured and not stored, so that no later reset brings it into force. What can be done is
-/// done; the first failure is the one that counts.
-fn undo(lss: &mut Lss<'_, '_>, subject: &Subject, old_rate: Option<u8>, done: &mut Done) {
-    let is_open = |stage: Stage| matches!(stage, Stage::Sent | Stage::Done);
-    if let Some((_, stage)) = &mut done.id
-        && is_open(*stage)
-        && (subject.node.is_some() || subject.unconfigured)
-        && lss.configure_node_id(subject.node).is_ok()
+/// Sets back values that were configured and not stored: otherwise a later reset would activate them. Failures are
+/// ignored, since the first one is reported.
+fn revert(lss: &mut Lss<'_, '_>, device: &LssDevice, old_rate: Option<u8>, progress: &mut Progress) {
+    if let Some((_, stage)) = &mut progress.id
+        && stage.may_hold()
+        && (device.node.is_some() || device.is_unconfigured)
+        && lss.configure_node_id(device.node).is_ok()
     {
-        *stage = Stage::Undone;
+        *stage = Stage::Reverted;
     }
-    if let (Some((_, stage)), Some(index)) = (&mut done.rate, old_rate)
-        && is_open(*stage)
-        && !done.retimed
+    if let (Some((_, stage)), Some(index)) = (&mut progress.rate, old_rate)
+        && stage.may_hold()
+        && !progress.is_retimed
         && lss.configure_bit_timing(0, index).is_ok()
     {
-        *stage = Stage::Undone;
-    }
-}
-
-impl Report {
-    /// What the device is, for people.
-    pub fn title(&self) -> Option<&str> {
-        self.model.as_ref().map(|model| model.description.title.as_str())
-    }
-
-    /// The bit rate that was set, in words.
-    pub fn rate_spoken(&self) -> Option<String> {
-        self.rate.map(|rate| rate.to_string())
-    }
-
-    /// The description's short name.
-    pub fn device(&self) -> Option<&str> {
-        self.model.as_ref().map(|model| model.description.name.as_str())
+        *stage = Stage::Reverted;
     }
 }

@@ -1,31 +1,39 @@
-//! Whether the device holds what it acknowledged: it is reset, and shows itself under its new node-ID.
+//! Confirms a new node-ID: resets the device and waits for it under the new node-ID.
 
-use super::presence::{Presence, next, presence};
-use super::subject::Subject;
-use crate::bus::Filters;
-use crate::bus::time::spoken;
+use super::device::{DeviceName, LssDevice};
+use super::failure::{LssCause, LssFailure};
+use super::node_id::{Occupant, occupant};
+use crate::bus::{Filters, Mono};
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::{Life, NmtCommand};
-use crate::master::{Happening, Master};
-use crate::tasks::{Failure, Kind};
+use crate::master::{Error, Happening, Master};
+use crate::node::wait::{Policy, pause, wait};
+use crate::tasks::Failure;
+use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The longest wait for a boot-up: no manual gives a time, and what is stored may be written before it.
-const BOOT_TIME: Duration = Duration::from_secs(5);
+/// The longest wait for a boot-up message. No manual gives a time; a device may write its memory first.
+const BOOT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// What confirms the new setting.
+/// How long a device is asked after its boot-up message. Some do not answer for 2 to 3 s.
+const FIRST_ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// The pause before a silent device is asked again.
+const ASK_AGAIN_PAUSE: Duration = Duration::from_millis(100);
+
+/// What confirms the new values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Confirmed {
-    /// The boot-up under the new node-ID, and the identity read under it.
+    /// The boot-up message of the new node-ID, and the identity read from it.
     BootUp,
-    /// The identity read under the new node-ID, or at the new bit rate.
+    /// The identity, read from the new node-ID or at the new bit rate.
     Identity,
-    /// The device has acknowledged it; it comes into force later.
+    /// The acknowledgement. The values take effect later.
     Acknowledge,
 }
 
 impl Confirmed {
-    /// As it stands in the output.
+    /// The word of the contract.
     pub fn as_str(self) -> &'static str {
         match self {
             Confirmed::BootUp => "boot-up",
@@ -35,60 +43,77 @@ impl Confirmed {
     }
 }
 
-/// Resets `reset`, where that is asked for, and waits for the device to show itself as `new`. Returns what confirms
-/// it, and how long the boot-up took.
+/// Resets the node `reset`, if there is one, and waits for the device under the node-ID `new`. Returns the proof, and
+/// the time until the boot-up message.
 ///
 /// # Errors
-/// A device that does not come back, comes back as it was, or shares its new node-ID with another one.
+/// The device does not come back, comes back unchanged, or shares its new node-ID with another device; bus errors and
+/// Ctrl-C.
 pub(super) fn confirm(
     master: &mut Master<'_>,
-    subject: &Subject,
+    device: &LssDevice,
     new: NodeId,
     reset: Option<NodeId>,
-    booted_already: bool,
+    has_booted: bool,
 ) -> Result<(Confirmed, Option<Duration>), Failure> {
     master.listen(&Filters::All)?;
-    let begun = master.now();
+    let start = master.now();
     if let Some(old) = reset {
         master.send(NmtCommand::ResetNode.frame(Some(old)));
     }
-    let after = if booted_already { Some(Duration::ZERO) } else { boot_up(master, new, begun)? };
-    let by = if after.is_some() { Confirmed::BootUp } else { Confirmed::Identity };
-    let failed = |kind, message: String| Err(Failure::of_node(kind, new, message));
-    match presence(master, new)? {
-        Presence::One(found) if subject.address.is_none_or(|address| address == found) => Ok((by, after)),
-        Presence::One(found) => failed(Kind::Unexpected, format!("{found} answers there, another device")),
-        Presence::Nameless if subject.address.is_none() && after.is_some() => Ok((by, after)),
-        Presence::Nameless => failed(Kind::Unexpected, "whoever answers there does not tell who it is".to_owned()),
-        Presence::Several(sign) => failed(Kind::Unexpected, format!("{sign}: more than one device has this node-ID")),
-        Presence::Nobody(waited) if after.is_some() => {
-            failed(Kind::NoAnswer, format!("boot-up seen, and then no answer within {}", spoken(waited)))
+    let boot_time = if has_booted { Some(Duration::ZERO) } else { boot_up(master, new, start)? };
+    let proof = if boot_time.is_some() { Confirmed::BootUp } else { Confirmed::Identity };
+    let cause = match first_answer(master, new, boot_time.is_some())? {
+        Occupant::Device(found) if device.address.is_none_or(|address| address == found) => {
+            return Ok((proof, boot_time));
         }
-        Presence::Nobody(_) => Err(lost(master, subject, new, reset)?),
-    }
+        Occupant::Unidentified if device.address.is_none() && boot_time.is_some() => return Ok((proof, boot_time)),
+        Occupant::Device(found) => LssCause::OtherDeviceAnswers(found),
+        Occupant::Unidentified => LssCause::NotIdentified,
+        Occupant::Several(sign) => LssCause::DuplicateNewNodeId(sign),
+        Occupant::None(waited) if boot_time.is_some() => LssCause::SilentAfterBootUp(waited),
+        Occupant::None(_) => return Err(not_seen(master, device, new, reset)?),
+    };
+    let name = DeviceName { node: Some(new), ..device.name() };
+    Err(Failure::at(new, LssFailure { device: name, cause }))
 }
 
-fn boot_up(master: &mut Master<'_>, new: NodeId, begun: crate::bus::Mono) -> Result<Option<Duration>, Failure> {
-    let until = begun + BOOT_TIME.max(master.timing().timeout);
+fn boot_up(master: &mut Master<'_>, new: NodeId, start: Mono) -> Result<Option<Duration>, Error> {
+    let until = start + BOOT_TIMEOUT.max(master.timing().timeout);
+    let booted = wait(master, until, Policy::Command, |_, event| match event {
+        Happening::Frame(received) if Life::parse(&received.frame) == Some((new, Life::BootUp)) => {
+            ControlFlow::Break(received.at.mono.since(start))
+        }
+        _ => ControlFlow::Continue(()),
+    })?;
+    Ok(booted.done())
+}
+
+/// What answers under the new node-ID. After a boot-up message a silent device is asked again.
+fn first_answer(master: &mut Master<'_>, new: NodeId, has_booted: bool) -> Result<Occupant, Failure> {
+    let until = master.now() + FIRST_ANSWER_TIMEOUT;
     loop {
-        match next(master, until)? {
-            Happening::Frame(received) if Life::parse(&received.frame) == Some((new, Life::BootUp)) => {
-                return Ok(Some(received.at.mono.since(begun)));
-            }
-            Happening::Deadline => return Ok(None),
-            _ => {}
+        let found = occupant(master, new)?;
+        if !matches!(found, Occupant::None(_)) || !has_booted || master.now() >= until {
+            return Ok(found);
         }
+        let again = master.now() + ASK_AGAIN_PAUSE;
+        pause(master, again, Policy::Command)?;
     }
 }
 
-/// Where a device is that does not show itself as `new`.
-fn lost(master: &mut Master<'_>, subject: &Subject, new: NodeId, reset: Option<NodeId>) -> Result<Failure, Failure> {
+/// The failure of a device that was not seen under its new node-ID.
+fn not_seen(
+    master: &mut Master<'_>,
+    device: &LssDevice,
+    new: NodeId,
+    reset: Option<NodeId>,
+) -> Result<Failure, Failure> {
     if let Some(old) = reset.filter(|old| *old != new)
-        && let Presence::One(found) = presence(master, old)?
-        && subject.address.is_none_or(|address| address == found)
+        && let Occupant::Device(found) = occupant(master, old)?
+        && device.address.is_none_or(|address| address == found)
     {
-        let message = format!("it has been reset and is still node {old}, not {new}");
-        return Ok(subject.failure(Kind::Unexpected, message));
+        return Ok(device.failure(LssCause::StillOldNodeId { old, new }));
     }
-    Ok(subject.failure(Kind::NoAnswer, format!("no boot-up and no answer as node {new} within {}", spoken(BOOT_TIME))))
+    Ok(device.failure(LssCause::NotSeen { new, waited: BOOT_TIMEOUT }))
 }

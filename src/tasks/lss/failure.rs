@@ -1,21 +1,248 @@
-//! Causes of failures: a node-ID or a bit rate was not set.
+//! Causes of failures: a node-ID or a bit rate was not set. The texts are in `output`.
 
-use crate::tasks::Kind;
-use crate::tasks::failure::Cause;
+use super::device::DeviceName;
+use super::event::AnotherSlave;
+use super::method::RequestedRate;
+use super::node_id::{DuplicateSign, TakenSign};
+use super::progress::Progress;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::lss::{LssAddress, LssRange};
+use crate::canopen::object::ObjectId;
+use crate::master::LssError;
+use crate::tasks::failure::{Cause, lss_kind};
+use crate::tasks::{Effect, Kind};
+use std::sync::Arc;
+use std::time::Duration;
 
 /// A node-ID or a bit rate was not set.
+#[derive(Clone, Debug)]
+pub struct LssFailure {
+    /// The device that it concerns.
+    pub device: DeviceName,
+    /// The cause.
+    pub cause: LssCause,
+}
+
+/// Why a node-ID or a bit rate was not set.
+#[derive(Clone, Debug)]
+pub enum LssCause {
+    /// An LSS service with the device failed.
+    Service(Arc<LssError>),
+    /// The device has no serial number, so it cannot be distinguished from others.
+    NoSerialNumber,
+    /// More than one device has this node-ID.
+    DuplicateNodeId(DuplicateSign),
+    /// The node does not answer.
+    NoAnswer(Duration),
+    /// By LSS the device with this identity has another node-ID, or none.
+    OtherNodeIdByLss(Option<NodeId>),
+    /// Another node has the same identity.
+    SameIdentity(NodeId),
+    /// More than one slave answers to the identity.
+    SeveralWithIdentity,
+    /// More than one device is on the bus.
+    NotTheOnly(AnotherSlave),
+    /// No device answers, neither by SDO nor by LSS.
+    NoDevice,
+    /// No device without a node-ID answers.
+    NoUnconfigured,
+    /// No slave has an identity in this range.
+    NoneInRange(LssRange),
+    /// The slave supports no inquiry.
+    NoInquiry,
+    /// The new node-ID is in use.
+    Taken(NodeId, TakenSign),
+    /// The objects of this device are unknown.
+    ObjectsUnknown,
+    /// SDO does not reach the device, or not only this one.
+    ObjectsOutOfReach,
+    /// No object is known for this setting.
+    NoObject(Setting),
+    /// The object cannot hold the number.
+    Number(ObjectId, String),
+    /// The objects take effect only if they are stored (this object), or store themselves (`None`).
+    NeedsStore(Option<ObjectId>),
+    /// The device does not have this bit rate.
+    NoSuchRate {
+        /// The title of the description; `None` for the table of CiA 305.
+        title: Option<String>,
+        /// What was requested.
+        rate: RequestedRate,
+        /// The rates of the table in bit/s.
+        rates: Vec<u32>,
+        /// Whether the device can detect the bit rate.
+        has_auto: bool,
+        /// Whether the table is that of CiA 305.
+        is_standard: bool,
+    },
+    /// The codes that the objects of the device have for bit rates are unknown.
+    RateCodesUnknown(Option<String>),
+    /// The device was not reset, so it was not seen under its new node-ID.
+    NotReset(NodeId, NotReset),
+    /// Another device answers under the new node-ID.
+    OtherDeviceAnswers(LssAddress),
+    /// The device under the new node-ID reports no identity.
+    NotIdentified,
+    /// More than one device answers under the new node-ID.
+    DuplicateNewNodeId(DuplicateSign),
+    /// The boot-up message came, and then no answer.
+    SilentAfterBootUp(Duration),
+    /// The device restarted under its old node-ID.
+    StillOldNodeId {
+        /// The old node-ID.
+        old: NodeId,
+        /// The new node-ID.
+        new: NodeId,
+    },
+    /// Neither a boot-up message nor an answer came from the new node-ID.
+    NotSeen {
+        /// The new node-ID.
+        new: NodeId,
+        /// How long it was waited for.
+        waited: Duration,
+    },
+    /// The host cannot change its bit rate together with the device.
+    HostCannotFollow(HostObstacle),
+    /// Another device is on the bus, so the bit rate of the bus cannot be changed.
+    NotAloneForRetime(Neighbour),
+    /// The device does not answer at the new bit rate (in bit/s).
+    SilentAtRate(u32),
+    /// The device stored the new bit rate, was reset, and does not answer at it.
+    SilentAfterStore {
+        /// The new bit rate in bit/s.
+        bit_rate: u32,
+        /// The interface.
+        interface: String,
+        /// The bit rate of the host now, in bit/s.
+        host: u32,
+    },
+}
+
+/// What is to be set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Setting {
+    /// The node-ID.
+    NodeId,
+    /// The bit rate.
+    BitRate,
+}
+
+/// Why a device was not reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NotReset {
+    /// Another device has the same node-ID.
+    SharedNodeId(NodeId),
+    /// Its present node-ID is unknown.
+    NodeIdUnknown,
+}
+
+/// Why the host cannot change its bit rate together with the device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HostObstacle {
+    /// The new bit rate is unknown.
+    RateUnknown,
+    /// The interface has no bit rate.
+    NoBitRate,
+    /// The device changes its bit rate at power-on.
+    AppliesAtPowerOn,
+    /// The device changes its bit rate only after storing.
+    AppliesAfterStore,
+}
+
+/// Something else on the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Neighbour {
+    /// Another node.
+    Node(NodeId),
+    /// A device without a node-ID.
+    Unconfigured,
+    /// The sender of frames with this identifier.
+    Sender(CanId),
+}
+
+/// What was changed before an LSS task failed, or what was left behind.
 #[derive(Clone, Debug, PartialEq)]
-pub enum LssFailure {}
+pub enum LssEffect {
+    /// How far the change has come.
+    Progress(DeviceName, Progress, NextStep),
+    /// The device may still be in configuration state.
+    MayBeConfiguring,
+    /// The host is back at its old bit rate.
+    HostIsBack {
+        /// The old bit rate in bit/s.
+        bit_rate: u32,
+        /// The new bit rate in bit/s.
+        new: u32,
+        /// Whether the device answers at the old bit rate.
+        device_answers: bool,
+    },
+}
+
+/// What the user can do after a change that did not succeed completely.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NextStep {
+    /// Follow the hint of the cause.
+    Cause,
+    /// After a power cycle, see what the device has become.
+    SeeAfterPowerCycle,
+    /// See after a power cycle whether it is stored, or store again.
+    StoreAgain,
+    /// A power cycle discards what is not stored.
+    PowerCycle,
+}
 
 impl LssFailure {
+    /// A failure that concerns no single device.
+    pub fn general(cause: LssCause) -> LssFailure {
+        LssFailure { device: DeviceName::default(), cause }
+    }
+
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
-        match *self {}
+        match &self.cause {
+            LssCause::Service(error) => lss_kind(error),
+            LssCause::NoSerialNumber
+            | LssCause::DuplicateNodeId(_)
+            | LssCause::OtherNodeIdByLss(_)
+            | LssCause::SameIdentity(_)
+            | LssCause::SeveralWithIdentity
+            | LssCause::NotTheOnly(_)
+            | LssCause::Taken(..)
+            | LssCause::ObjectsUnknown
+            | LssCause::ObjectsOutOfReach
+            | LssCause::NoObject(_)
+            | LssCause::HostCannotFollow(_)
+            | LssCause::NotAloneForRetime(_) => Kind::CheckFailed,
+            LssCause::Number(..)
+            | LssCause::NeedsStore(_)
+            | LssCause::NoSuchRate { .. }
+            | LssCause::RateCodesUnknown(_) => Kind::Usage,
+            LssCause::NoAnswer(_)
+            | LssCause::NoDevice
+            | LssCause::NoUnconfigured
+            | LssCause::NoneInRange(_)
+            | LssCause::NoInquiry
+            | LssCause::SilentAfterBootUp(_)
+            | LssCause::NotSeen { .. }
+            | LssCause::SilentAtRate(_)
+            | LssCause::SilentAfterStore { .. } => Kind::NoAnswer,
+            LssCause::NotReset(..)
+            | LssCause::OtherDeviceAnswers(_)
+            | LssCause::NotIdentified
+            | LssCause::DuplicateNewNodeId(_)
+            | LssCause::StillOldNodeId { .. } => Kind::Unexpected,
+        }
     }
 }
 
 impl From<LssFailure> for Cause {
     fn from(cause: LssFailure) -> Cause {
-        Cause::Lss(cause)
+        Cause::Lss(Box::new(cause))
+    }
+}
+
+impl From<LssEffect> for Effect {
+    fn from(effect: LssEffect) -> Effect {
+        Effect::Lss(Box::new(effect))
     }
 }

@@ -1,88 +1,82 @@
-//! Who takes part in LSS.
+//! Lists the devices that can get a node-ID.
 
-use super::subject::everybody_described;
-use super::{Note, Tell};
+use super::device::DeviceName;
+use super::event::{LssEvent, LssFact, Reason};
+use super::{Notify, nodes};
 use crate::bus::Filters;
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::{LssAddress, LssRange};
 use crate::device::catalog::{self, Model};
 use crate::master::{Lss, LssError, Master};
-use crate::tasks::Failure;
+use crate::tasks::{Failure, Note};
 use std::sync::Arc;
 
-/// A device that can be given a node-ID.
+/// A device that can get a node-ID.
 #[derive(Clone, Debug)]
-pub struct Slave {
-    /// Its node-ID; `None` of one that has none.
+pub struct FoundSlave {
+    /// Its node-ID; `None` if it has none.
     pub node: Option<NodeId>,
-    /// Its identity, where it tells all of it.
+    /// Its identity, if it reports all four numbers.
     pub address: Option<LssAddress>,
-    /// Its description, where one is known.
+    /// Its description; `None` for an unknown device.
     pub model: Option<Arc<Model>>,
 }
 
-/// Everybody who has a node-ID, by SDO, and those who have none, by fastscan. Each of these is set aside in
-/// configuration state while the next one is looked for; nothing is changed in any of them.
+/// Lists the devices with a node-ID, found by SDO, and those without, found by fastscan. A device that fastscan found
+/// waits in configuration state while the next one is searched. Nothing is changed.
 ///
 /// # Errors
-/// What stops everything, and a first fastscan that fails: a later one is said. Nobody there is an empty list.
-pub fn scan(master: &mut Master<'_>, tell: Tell<'_>) -> Result<Vec<Slave>, Failure> {
-    let mut found: Vec<Slave> = everybody_described(master)?
+/// Bus errors and Ctrl-C; the first fastscan failed. If a later one fails, that is an event. If there is no device, the
+/// list is empty.
+pub fn scan(master: &mut Master<'_>, notify: Notify<'_>) -> Result<Vec<FoundSlave>, Failure> {
+    let mut slaves: Vec<FoundSlave> = nodes::identified(master)?
         .into_iter()
-        .map(|found| {
-            let identity = &found.instrument.identity;
-            let parts = [identity.vendor, identity.product, identity.revision, identity.serial];
-            let address = match parts {
-                [Some(vendor), Some(product), Some(revision), Some(serial)] => {
-                    Some(LssAddress { vendor, product, revision, serial })
-                }
-                _ => None,
-            };
-            Slave { node: Some(found.node), address, model: found.instrument.model }
+        .map(|found| FoundSlave {
+            node: Some(found.node),
+            address: nodes::address_of(&found.instrument),
+            model: found.instrument.model,
         })
         .collect();
     master.listen(&Filters::All)?;
     let mut lss = master.lss();
-    let unconfigured = unconfigured(&mut lss, tell);
+    let unconfigured = unconfigured(&mut lss, notify);
     let left = lss.leave();
     let unconfigured = unconfigured?;
     left?;
-    found.extend(unconfigured.into_iter().map(|address| {
+    slaves.extend(unconfigured.into_iter().map(|address| {
         let model = catalog::by_identity(address.vendor, address.product);
-        Slave { node: None, address: Some(address), model }
+        FoundSlave { node: None, address: Some(address), model }
     }));
-    Ok(found)
+    Ok(slaves)
 }
 
-/// One after the other, until nobody answers any more.
-fn unconfigured(lss: &mut Lss<'_, '_>, tell: Tell<'_>) -> Result<Vec<LssAddress>, LssError> {
+/// Finds devices without a node-ID until no more answers.
+fn unconfigured(lss: &mut Lss<'_, '_>, notify: Notify<'_>) -> Result<Vec<LssAddress>, LssError> {
     let mut found: Vec<LssAddress> = Vec::new();
     loop {
-        let more = match lss.fastscan_beside(&found) {
+        let reason = match lss.fastscan_beside(&found) {
             Ok(None) => return Ok(found),
             Ok(Some(address)) if !found.contains(&address) => {
                 found.push(address);
                 continue;
             }
-            Ok(Some(_)) => "it answers again although it has been found".to_owned(),
-            // What stops everything does; with nothing found the error is the answer.
+            Ok(Some(_)) => None,
             Err(error @ (LssError::Master(_) | LssError::Disturbed(_))) => return Err(error),
+            // Without any device the error is the result.
             Err(error) if found.is_empty() => return Err(error),
-            Err(error) => error.to_string(),
+            Err(error) => Some(Reason(Arc::new(error))),
         };
-        let last = found.last().map(ToString::to_string).unwrap_or_default();
-        tell(Note::Warning(format!(
-            "whether there are more devices without a node-ID than {last} cannot be told ({more}): \
-             once that one has been given one, ask again"
-        )));
+        let Some(&last) = found.last() else { return Ok(found) };
+        let device = DeviceName { node: None, address: Some(last) };
+        notify(Note::general(LssFact { device, event: LssEvent::MoreUnconfigured { last, reason } }));
         return Ok(found);
     }
 }
 
-/// Whether there are slaves whose numbers lie within the limits.
+/// Whether slaves have an identity in this range.
 ///
 /// # Errors
-/// What stops everything.
+/// Bus errors and Ctrl-C; an answer violates the protocol.
 pub fn identify(master: &mut Master<'_>, range: &LssRange) -> Result<bool, Failure> {
     master.listen(&Filters::All)?;
     Ok(master.lss().identify(range)?)

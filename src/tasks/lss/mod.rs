@@ -1,54 +1,67 @@
-//! Node-ID and bit rate, by LSS (CiA 305) or by objects of the device's own.
+//! Node-ID and bit rate: set by LSS (CiA 305), or through objects of the device.
 //!
-//! What all of these hold to: nothing is changed before it is clear that one device is meant and which; the
-//! configuration state is left again on every way out; a node is reset only where the reset cannot hit another
-//! device; and success is what the device shows afterwards under its new node-ID, not what it acknowledged.
+//! Rules that all functions keep:
+//! - Nothing is changed before exactly one device is known to be addressed.
+//! - Every path out leaves the LSS configuration state.
+//! - A node is reset only if the reset cannot reach another device.
+//! - Success is what the device shows under its new node-ID, not what it acknowledged.
+//!
+//! The modules, from the bottom up: [`device`] (the device and how LSS reaches it), `node_id` and `nodes` (what answers
+//! on the bus), `session` (configuration state), `sole` and `resolve` (from the argument to the device), `method`,
+//! `objects`, `retime`, `confirm`, `cob_ids`, and the tasks themselves: `assign`, `services`, `find`.
 
 mod assign;
 mod cob_ids;
 mod confirm;
+mod device;
+mod event;
 mod failure;
 mod find;
+mod method;
+mod node_id;
+mod nodes;
 mod objects;
-mod only;
-mod presence;
 mod progress;
+mod resolve;
 mod retime;
+mod services;
 mod session;
-mod single;
-mod subject;
-mod ways;
+mod sole;
 
-pub use failure::LssFailure;
-
-pub use assign::{Job, Report, assign};
-pub use cob_ids::{CobIds, Stale};
+pub use assign::{Assigned, Job, assign};
+pub use cob_ids::{CobIds, StaleCobId};
 pub use confirm::Confirmed;
-pub use find::{Slave, identify, scan};
-pub use single::{Inquired, Named, activate, inquire, store};
-pub use ways::{PlannedRate, Rate, check_rate, check_store};
+pub use device::{Descriptions, DeviceName};
+pub use event::{AnotherSlave, LssEvent, LssFact, Reason, UnansweredService};
+pub use failure::{HostObstacle, LssCause, LssEffect, LssFailure, Neighbour, NextStep, NotReset, Setting};
+pub use find::{FoundSlave, identify, scan};
+pub use method::{PlannedRate, RequestedRate, check_rate, check_store};
+pub use node_id::{DuplicateSign, TakenSign};
+pub use progress::{Progress, Stage};
+pub use services::{Inquired, activate, inquire, store};
 
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddressError;
 pub use crate::canopen::lss::{LssAddress, LssRange};
+use crate::tasks::Note;
 use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
 
-/// Which device is meant.
+/// The device that a command names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Target {
-    /// The one with this node-ID: its identity is read first, and it is addressed by that.
+    /// The device with this node-ID. Its identity is read first, then it is addressed by the identity.
     Node(NodeId),
-    /// The one with this identity.
+    /// The device with this identity.
     Address(LssAddress),
-    /// The only one on the bus.
+    /// The only device on the bus.
     Only,
-    /// One without a node-ID, whichever is found first.
+    /// A device without a node-ID: the first that fastscan finds.
     Unconfigured,
 }
 
-/// Text that names no device.
+/// A text that names no device.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{0}\" names no device (5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured)")]
 pub struct TargetError(String);
@@ -79,29 +92,20 @@ impl fmt::Display for Target {
     }
 }
 
-/// By which means node-ID and bit rate are set.
+/// How node-ID and bit rate are set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Via {
-    /// What the description of the device says, else LSS.
+    /// By the method that the description of the device prefers, else by LSS.
     #[default]
     Auto,
-    /// LSS.
+    /// By LSS.
     Lss,
-    /// Objects of the device's own.
+    /// Through objects of the device.
     Sdo,
 }
 
-/// Something worth knowing while it is done.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Note {
-    /// What is going on.
-    Step(String),
-    /// What is not as it should be, or what could not be proved.
-    Warning(String),
-}
+/// Receives notes while a task runs.
+pub type Notify<'a> = &'a mut dyn FnMut(Note);
 
-/// Hears of what is going on.
-pub type Tell<'a> = &'a mut dyn FnMut(Note);
-
-/// The longest wait for the acknowledge of what writes to a non-volatile memory; `--timeout` can only lengthen it.
-pub const STORE_TIME: Duration = Duration::from_secs(3);
+/// The shortest time-out for a write to non-volatile memory.
+const STORE_TIMEOUT: Duration = Duration::from_secs(3);

@@ -1,130 +1,136 @@
-//! Node-ID and bit rate through objects of the device's own.
+//! Sets node-ID and bit rate through objects of the device.
 
-use super::STORE_TIME;
-use super::progress::{Done, Stage};
-use super::session::prepare;
-use super::subject::Subject;
-use super::ways::place;
+use super::STORE_TIMEOUT;
+use super::device::LssDevice;
+use super::failure::{LssCause, Setting};
+use super::method::object_for;
+use super::progress::{Progress, Stage};
+use super::session::enter_state;
+use crate::bus::Received;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::DownloadSize;
 use crate::device::assign::{AssignEntry, AssignObject};
-use crate::device::description::SizeIndication;
-use crate::master::{Error, Master, Request, SdoError, SdoFailure};
-use crate::tasks::{Failure, Kind};
+use crate::master::{Error, Master, Request};
+use crate::node::write::write_with;
+use crate::node::{self, Node, WriteOptions};
+use crate::tasks::Failure;
+use std::time::Duration;
 
-/// What an object held before it was written, where it told.
-type Before = Option<u8>;
+/// An object and the number to write to it.
+type Write = Option<(AssignObject, u8)>;
 
-/// Writes what `done` names to the objects of the way, and stores it.
+/// Writes the values of `progress` to the objects of the method, and stores them.
 ///
 /// # Errors
-/// Refusals and silence. What is not stored is put back where the device told what it was.
+/// The device rejects a write or does not answer. Values that are not stored are set back if the previous ones could be
+/// read.
 pub(super) fn by_objects(
     master: &mut Master<'_>,
-    subject: &Subject,
-    way: &AssignEntry,
+    device: &LssDevice,
+    method: &AssignEntry,
     store: bool,
-    done: &mut Done,
+    progress: &mut Progress,
 ) -> Result<(), Failure> {
-    let Some(node) = subject.node else {
-        return Err(subject.failure(Kind::CheckFailed, "its node-ID is not known"));
+    let Some(id) = device.node else { return Err(device.failure(LssCause::ObjectsOutOfReach)) };
+    let node = device.as_node(id);
+    let object = |object, setting| object_for(device, object, setting);
+    let new_id = match progress.id {
+        Some((id, _)) => Some((object(method.node_id, Setting::NodeId)?, id.get())),
+        None => None,
     };
-    let id = done.id.map(|(id, _)| place(subject, way.node_id, "node-ID").map(|at| (at, id.get()))).transpose()?;
-    let rate =
-        done.rate.map(|(rate, _)| place(subject, way.bit_rate, "bit rate").map(|at| (at, rate.index))).transpose()?;
-    prepare(master, subject, way.state)?;
-    let held = [id, rate].map(|place| place.map(|(at, _)| at));
-    let held = [read(master, node, held[0])?, read(master, node, held[1])?];
-    let result = write_all(master, subject, way, (node, store), (id, rate), done);
-    if result.is_err() && done.is_pending() {
-        undo(master, subject, node, id.map(|(at, _)| at).zip(held[0]), rate.map(|(at, _)| at).zip(held[1]), done);
+    let new_rate = match progress.rate {
+        Some((rate, _)) => Some((object(method.bit_rate, Setting::BitRate)?, rate.index)),
+        None => None,
+    };
+    enter_state(master, device, method.state)?;
+    let old_id = previous(master, id, new_id)?;
+    let old_rate = previous(master, id, new_rate)?;
+    let result = write_all(master, device, &node, method.store.filter(|_| store), (new_id, new_rate), progress);
+    // A method without a store object stores by itself.
+    if result.is_ok() && method.store.is_none() {
+        progress.stored = Stage::Done;
+    }
+    if result.is_err() && progress.is_pending() {
+        revert(master, device, &node, (old_id, old_rate), progress);
     }
     result
 }
 
-type Number = Option<(AssignObject, u8)>;
-
 fn write_all(
     master: &mut Master<'_>,
-    subject: &Subject,
-    way: &AssignEntry,
-    (node, store): (NodeId, bool),
-    (id, rate): (Number, Number),
-    done: &mut Done,
+    device: &LssDevice,
+    node: &Node,
+    store: Option<ObjectId>,
+    (id, rate): (Write, Write),
+    progress: &mut Progress,
 ) -> Result<(), Failure> {
-    if let (Some((at, number)), Some((_, stage))) = (id, &mut done.id) {
-        write(master, subject, node, at, number, stage)?;
+    if let (Some((object, number)), Some((_, stage))) = (id, &mut progress.id) {
+        write_number(master, device, node, object, number, stage)?;
     }
-    if let (Some((at, number)), Some((_, stage))) = (rate, &mut done.rate) {
-        write(master, subject, node, at, number, stage)?;
+    if let (Some((object, number)), Some((_, stage))) = (rate, &mut progress.rate) {
+        write_number(master, device, node, object, number, stage)?;
     }
-    let Some(object) = way.store else {
-        // It is kept as soon as it is written.
-        done.stored = Stage::Done;
-        return Ok(());
-    };
-    if store {
-        let wait = master.timing().timeout.max(STORE_TIME);
-        let request = Request::write(node, object, b"save".to_vec(), size(subject)).once().within(wait);
-        send(master, request, &mut done.stored)?;
+    match store {
+        Some(object) => write_bytes(master, node, object, b"save", STORE_TIMEOUT, &mut progress.stored),
+        None => Ok(()),
     }
-    Ok(())
 }
 
-fn write(
+fn write_number(
     master: &mut Master<'_>,
-    subject: &Subject,
-    node: NodeId,
-    at: AssignObject,
+    device: &LssDevice,
+    node: &Node,
+    object: AssignObject,
     number: u8,
     stage: &mut Stage,
 ) -> Result<(), Failure> {
-    let data = at.encode(number).map_err(|error| subject.failure(Kind::Usage, format!("{}: {error}", at.object)))?;
-    let request = Request::write(node, at.object, data, size(subject));
-    send(master, if at.signature { request.once() } else { request }, stage)
+    let data = object.encode(number).map_err(|reason| device.failure(LssCause::Number(object.object, reason)))?;
+    write_bytes(master, node, object.object, &data, Duration::ZERO, stage)
 }
 
-fn send(master: &mut Master<'_>, request: Request, stage: &mut Stage) -> Result<(), Failure> {
+fn write_bytes(
+    master: &mut Master<'_>,
+    node: &Node,
+    object: ObjectId,
+    data: &[u8],
+    at_least: Duration,
+    stage: &mut Stage,
+) -> Result<(), Failure> {
     *stage = Stage::Sent;
-    match master.transfer_one(request)? {
-        Ok(_) => {
-            *stage = Stage::Done;
-            Ok(())
-        }
-        Err(error) => {
-            if matches!(error.failure, SdoFailure::Refused(_)) {
-                *stage = Stage::No;
-            }
-            Err(error.into())
-        }
-    }
+    let (progress, watch) = (&mut |_| {}, &mut |_: &Received| {});
+    let mut options = WriteOptions { at_least, ..WriteOptions::new(progress, watch) };
+    let result = write_with(master, node, object, data, &mut options);
+    *stage = match &result {
+        Ok(_) => Stage::Done,
+        Err(node::Error::Sdo(_) | node::Error::Width { .. }) => Stage::NotDone,
+        Err(_) => Stage::Sent,
+    };
+    result.map(|_| ()).map_err(Failure::from)
 }
 
-fn size(subject: &Subject) -> DownloadSize {
-    match subject.model.as_ref().map(|model| model.description.sdo.size) {
-        Some(SizeIndication::Omitted) => DownloadSize::Omitted,
-        Some(SizeIndication::Indicated) | None => DownloadSize::Indicated,
-    }
+/// The number that an object holds: its lowest byte. `None` if the device does not return it: then it cannot be set
+/// back.
+fn previous(master: &mut Master<'_>, node: NodeId, write: Write) -> Result<Write, Error> {
+    let Some((object, _)) = write else { return Ok(None) };
+    let answer = master.transfer_one(Request::read(node, object.object))?;
+    let uploaded = answer.ok().and_then(|answer| answer.uploaded);
+    Ok(uploaded.and_then(|uploaded| uploaded.bytes.first().map(|&number| (object, number))))
 }
 
-/// What the object holds: its lowest byte. A device that does not tell cannot be put back, no more.
-fn read(master: &mut Master<'_>, node: NodeId, at: Option<AssignObject>) -> Result<Before, Error> {
-    let Some(object) = at.map(|at: AssignObject| -> ObjectId { at.object }) else { return Ok(None) };
-    match master.transfer_one(Request::read(node, object))? {
-        Ok(answer) => Ok(answer.uploaded.and_then(|uploaded| uploaded.bytes.first().copied())),
-        Err(SdoError { .. }) => Ok(None),
-    }
-}
-
-fn undo(master: &mut Master<'_>, subject: &Subject, node: NodeId, id: Number, rate: Number, done: &mut Done) {
-    let is_open = |stage: Stage| matches!(stage, Stage::Sent | Stage::Done);
-    let id = id.zip(done.id.as_mut().map(|(_, stage)| stage));
-    let rate = rate.zip(done.rate.as_mut().map(|(_, stage)| stage));
-    for ((at, number), stage) in id.into_iter().chain(rate) {
-        let mut undone = *stage;
-        if is_open(*stage) && write(master, subject, node, at, number, &mut undone).is_ok() {
-            *stage = Stage::Undone;
+/// Writes the previous numbers to the objects that may hold the new ones.
+fn revert(
+    master: &mut Master<'_>,
+    device: &LssDevice,
+    node: &Node,
+    (id, rate): (Write, Write),
+    progress: &mut Progress,
+) {
+    let id = id.zip(progress.id.as_mut().map(|(_, stage)| stage));
+    let rate = rate.zip(progress.rate.as_mut().map(|(_, stage)| stage));
+    for ((object, number), stage) in id.into_iter().chain(rate) {
+        let mut of_write = *stage;
+        if stage.may_hold() && write_number(master, device, node, object, number, &mut of_write).is_ok() {
+            *stage = Stage::Reverted;
         }
     }
 }

@@ -1,96 +1,80 @@
-//! What has been done and what not, for whoever has to go on from there.
+//! How far a change has come.
 
-use super::subject::Subject;
-use super::ways::PlannedRate;
+use super::method::PlannedRate;
 use crate::canopen::id::NodeId;
-use crate::tasks::{Failure, Kind};
+use crate::master::LssError;
 
 /// How far one step has come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Stage {
-    /// Not begun, or refused.
+pub enum Stage {
+    /// Not sent, or rejected.
     #[default]
-    No,
-    /// Sent; whether it was taken is not known.
+    NotDone,
+    /// Sent; it is unknown whether the device accepted it.
     Sent,
     /// Acknowledged.
     Done,
-    /// Put back to what it was.
-    Undone,
+    /// Set back to the previous value.
+    Reverted,
 }
 
-/// What has been done so far.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Done {
-    /// The node-ID that is set, and how far that has come.
+impl Stage {
+    /// The stage after an LSS service with this result.
+    pub(super) fn after(result: &Result<(), LssError>) -> Stage {
+        match result {
+            Ok(()) => Stage::Done,
+            Err(LssError::Refused { .. }) => Stage::NotDone,
+            Err(_) => Stage::Sent,
+        }
+    }
+
+    /// Whether the device may hold the new value.
+    pub(super) fn may_hold(self) -> bool {
+        matches!(self, Stage::Sent | Stage::Done)
+    }
+}
+
+/// How far a change of node-ID and bit rate has come.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Progress {
+    /// The new node-ID, if one is to be set.
     pub id: Option<(NodeId, Stage)>,
-    /// The bit rate that is set.
+    /// The new bit rate, if one is to be set.
     pub rate: Option<(PlannedRate, Stage)>,
-    /// Whether it lasts.
+    /// Whether both are stored.
     pub stored: Stage,
-    /// The host went to the new bit rate together with the device.
-    pub retimed: bool,
+    /// Whether the host works at the new bit rate.
+    pub is_retimed: bool,
 }
 
-impl Done {
-    /// Nothing yet of what is to be set.
-    pub(super) fn of(id: Option<NodeId>, rate: Option<PlannedRate>) -> Done {
-        Done { id: id.map(|id| (id, Stage::No)), rate: rate.map(|rate| (rate, Stage::No)), ..Done::default() }
+impl Progress {
+    /// Before the first step.
+    pub(super) fn new(id: Option<NodeId>, rate: Option<PlannedRate>) -> Progress {
+        Progress {
+            id: id.map(|id| (id, Stage::NotDone)),
+            rate: rate.map(|rate| (rate, Stage::NotDone)),
+            ..Progress::default()
+        }
     }
 
     fn stages(&self) -> impl Iterator<Item = Stage> {
         self.id.iter().map(|(_, stage)| *stage).chain(self.rate.iter().map(|(_, stage)| *stage))
     }
 
-    /// Whether the device may hold something new that does not last.
+    /// Whether the device may hold a new value that is not stored.
     pub(super) fn is_pending(&self) -> bool {
-        self.stored == Stage::No && self.stages().any(|stage| matches!(stage, Stage::Sent | Stage::Done))
+        self.stored == Stage::NotDone && self.stages().any(Stage::may_hold)
     }
 
-    /// Whether the device certainly is as it was.
-    pub(super) fn is_untouched(&self) -> bool {
-        self.stored == Stage::No
-            && !self.retimed
-            && self.stages().all(|stage| matches!(stage, Stage::No | Stage::Undone))
+    /// Whether the device certainly is as it was before.
+    pub(super) fn is_unchanged(&self) -> bool {
+        self.stored == Stage::NotDone && !self.is_retimed && !self.stages().any(Stage::may_hold)
     }
 
-    /// What has been done, in words: `node-ID 12 configured, not stored`.
-    pub(super) fn spoken(&self) -> String {
-        let word = |what: String, stage: Stage| match stage {
-            Stage::No => format!("{what} not configured"),
-            Stage::Sent => format!("whether {what} was taken is not known"),
-            Stage::Done => format!("{what} configured"),
-            Stage::Undone => format!("{what} put back"),
-        };
-        let id = self.id.map(|(id, stage)| word(format!("node-ID {id}"), stage));
-        let rate = self.rate.map(|(rate, stage)| word(format!("bit rate {rate}"), stage));
-        let stored = match self.stored {
-            Stage::No | Stage::Undone => "not stored",
-            Stage::Sent => "whether it is stored is not known",
-            Stage::Done => "stored",
-        };
-        id.into_iter().chain(rate).chain([stored.to_owned()]).collect::<Vec<_>>().join(", ")
-    }
-
-    /// The failure together with what has been done, and how to go on.
-    pub(super) fn explain(&self, failure: Failure, subject: &Subject) -> Failure {
-        if self.is_untouched() {
-            let is_told = failure.to_string().ends_with("nothing was changed");
-            return if is_told { failure } else { failure.and("nothing was changed") };
+    /// Records a step with the bit rate.
+    pub(super) fn set_rate(&mut self, stage: Stage) {
+        if let Some((_, of_rate)) = &mut self.rate {
+            *of_rate = stage;
         }
-        let way_on = match (self.stored, failure.kind()) {
-            (Stage::Done, _) => "power it off and on, and see what it has become: cangauge scan".to_owned(),
-            (Stage::Sent, _) => format!(
-                "whether it lasts shows only after power off and on: cangauge scan; or do it again: cangauge lss store {}",
-                subject.argument()
-            ),
-            (_, Kind::Interrupted) => {
-                "until it is reset it works as before; power off and on undoes the rest".to_owned()
-            }
-            _ => "power off and on undoes what is not stored; then do it again".to_owned(),
-        };
-        let has_hint = self.stored == Stage::No && failure.kind() == Kind::Refused;
-        let failure = failure.and(self.spoken());
-        if has_hint { failure } else { failure.hint(way_on) }
     }
 }

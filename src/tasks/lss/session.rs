@@ -1,152 +1,148 @@
-//! Configuration state: how one device gets there, in which NMT state, and that everything is left as it was.
+//! LSS configuration state: how a device gets there, in which NMT state, and that it leaves it again.
 
-use super::subject::Subject;
-use super::{Note, Tell};
+use super::Notify;
+use super::device::{LssDevice, Reach};
+use super::event::LssEvent;
+use super::failure::{LssCause, LssEffect};
 use crate::canopen::id::NodeId;
-use crate::canopen::lss::{LssAddress, Mode};
+use crate::canopen::lss::{Mode, Service};
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::device::assign::{AssignEntry, AssignState};
 use crate::master::{Lss, LssError, Master};
-use crate::tasks::nmt::states;
-use crate::tasks::{Failure, Kind};
+use crate::node::state::state;
+use crate::tasks::Failure;
+use crate::tasks::failure::Cause;
 use std::collections::BTreeSet;
 
-/// How LSS reaches a device.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Reach {
-    /// By its identity: 40h to 43h.
-    Selective(LssAddress),
-    /// Whoever is there: 04h.
-    Global,
-}
-
-/// What was done in configuration state.
+/// The result of work in configuration state.
 pub(super) struct Session<T> {
-    /// What came of it.
-    pub done: T,
-    /// Who has booted meanwhile: a device that had no node-ID boots when it leaves configuration state with one.
+    /// The result.
+    pub result: T,
+    /// The nodes that booted meanwhile. A device without a node-ID boots when it leaves configuration state with one.
     pub booted: BTreeSet<NodeId>,
-    /// The NMT state to be put back.
-    pub before: Option<Before>,
+    /// The NMT state to restore.
+    pub previous_state: Option<PreviousState>,
 }
 
-/// Does something in configuration state, and leaves it again however that ends.
+/// Switches the device to configuration state, does the work, and switches it back to waiting state in any case.
 ///
 /// # Errors
-/// A device that does not answer to its identity, and whatever `work` finds.
+/// The device does not answer to its identity; errors of `work`.
 pub(super) fn configured<T>(
     master: &mut Master<'_>,
-    subject: &Subject,
+    device: &LssDevice,
     work: impl FnOnce(&mut Lss<'_, '_>) -> Result<T, Failure>,
 ) -> Result<Session<T>, Failure> {
     let mut lss = master.lss();
-    let entered = match subject.reach {
+    let entered = match device.reach {
         Reach::Global => lss.switch_global(Mode::Configuration),
         Reach::Selective(address) => lss.switch_selective(&address),
     };
-    let done = entered.map_err(|error| subject.lss_failure(error)).and_then(|()| work(&mut lss));
+    let result = entered.map_err(|error| device.lss_failure(error)).and_then(|()| work(&mut lss));
     let left = lss.leave();
-    let done = done?;
+    let result = result?;
     left.map_err(|error| {
-        let failure = subject.lss_failure(error).and("the device may still be in configuration state");
-        failure.hint("power off and on brings it out")
+        let mut failure = device.lss_failure(error);
+        failure.effects.push(LssEffect::MayBeConfiguring.into());
+        failure
     })?;
-    Ok(Session { done, booted: lss.boot_ups().keys().copied().collect(), before: None })
+    Ok(Session { result, booted: lss.boot_ups().keys().copied().collect(), previous_state: None })
 }
 
-impl Subject {
-    /// An error of LSS with the device's name.
-    pub(super) fn lss_failure(&self, error: LssError) -> Failure {
-        match error {
-            LssError::Master(error) => error.into(),
-            error => Failure { node: self.node, ..Failure::from(error) },
-        }
-    }
-}
-
-/// The NMT state of a device before it was put into the one that it wants for LSS.
+/// The NMT state of a node before it was changed for LSS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Before {
+pub(super) struct PreviousState {
     node: NodeId,
-    /// `None`: nothing told it.
+    /// `None` if it is unknown.
     state: Option<NmtState>,
-    now: AssignState,
+    changed_to: AssignState,
 }
 
-/// Puts the device into the NMT state that it wants, where that is one and the command reaches nobody else.
+/// Puts the device into the NMT state that the method requires. Without a requirement, or if the command would reach
+/// another device, nothing is sent.
 ///
 /// # Errors
-/// What stops everything.
-pub(super) fn prepare(
+/// Bus errors and Ctrl-C.
+pub(super) fn enter_state(
     master: &mut Master<'_>,
-    subject: &Subject,
-    wanted: Option<AssignState>,
-) -> Result<Option<Before>, Failure> {
-    let (Some(node), Some(wanted), true) = (subject.node, wanted, subject.alone) else { return Ok(None) };
-    let state = states(master, &[node])?.into_iter().find_map(|report| report.state);
-    let (command, target) = match wanted {
+    device: &LssDevice,
+    required: Option<AssignState>,
+) -> Result<Option<PreviousState>, Failure> {
+    let (Some(node), Some(required)) = (device.own_node(), required) else { return Ok(None) };
+    let state = state(master, node)?;
+    let (command, target) = match required {
         AssignState::PreOperational => (NmtCommand::EnterPreOperational, NmtState::PreOperational),
         AssignState::Stopped => (NmtCommand::Stop, NmtState::Stopped),
     };
-    // Also where it is in that state already: the manuals print the command.
+    // Sent in any case, as the manuals print it.
     master.send(command.frame(Some(node)));
-    Ok(Some(Before { node, state, now: wanted }).filter(|_| state != Some(target)))
+    Ok(Some(PreviousState { node, state, changed_to: required }).filter(|_| state != Some(target)))
 }
 
-/// Puts back what [`prepare`] changed, as far as the state before was known. A stopped device has no SDO, so it is
-/// not left stopped where it was not known to be.
-pub(super) fn put_back(master: &mut Master<'_>, before: Option<Before>, tell: Tell<'_>) {
-    let Some(Before { node, state, now }) = before else { return };
-    let command = match (state, now) {
-        (Some(NmtState::Operational), _) => NmtCommand::Start,
-        (Some(NmtState::Stopped), _) => NmtCommand::Stop,
+/// Restores the NMT state that [`enter_state`] changed, if it was known. A stopped device has no SDO, so a device of
+/// unknown state is not left in STOPPED.
+pub(super) fn restore_state(
+    master: &mut Master<'_>,
+    device: &LssDevice,
+    previous: Option<PreviousState>,
+    notify: Notify<'_>,
+) {
+    let Some(PreviousState { node, state, changed_to }) = previous else { return };
+    let command = match (state, changed_to) {
+        (Some(NmtState::Operational), _) => Some(NmtCommand::Start),
+        (Some(NmtState::Stopped), _) => Some(NmtCommand::Stop),
         (Some(NmtState::PreOperational), _) | (Some(NmtState::Other(_)) | None, AssignState::Stopped) => {
-            NmtCommand::EnterPreOperational
+            Some(NmtCommand::EnterPreOperational)
         }
-        (Some(NmtState::Other(_)) | None, AssignState::PreOperational) => {
-            tell(Note::Step(format!("node {node} is in PRE-OPERATIONAL; nothing told its state before")));
-            return;
-        }
+        (Some(NmtState::Other(_)) | None, AssignState::PreOperational) => None,
     };
-    master.send(command.frame(Some(node)));
-    master.settle();
-    if state.is_none() {
-        tell(Note::Step(format!("node {node} is in PRE-OPERATIONAL again; nothing told its state before")));
+    if let Some(command) = command {
+        master.send(command.frame(Some(node)));
+        master.settle();
+    }
+    if matches!(state, Some(NmtState::Other(_)) | None) {
+        notify(device.note(LssEvent::LeftPreOperational));
     }
 }
 
-/// Does something in configuration state, in the NMT state that the way wants, and once more in STOPPED where the
-/// device does not answer and the way says so. The NMT state is put back.
+/// Works in configuration state and in the NMT state that the method requires. If the device does not answer LSS and the
+/// method allows it, the work is done again in STOPPED.
+///
+/// On success the caller restores the NMT state; on failure it is restored here.
 ///
 /// # Errors
 /// As [`configured`].
 pub(super) fn prepared<T>(
     master: &mut Master<'_>,
-    subject: &Subject,
-    way: &AssignEntry,
-    tell: Tell<'_>,
+    device: &LssDevice,
+    method: &AssignEntry,
+    notify: Notify<'_>,
     mut work: impl FnMut(&mut Lss<'_, '_>) -> Result<T, Failure>,
 ) -> Result<Session<T>, Failure> {
-    let before = prepare(master, subject, way.state)?;
-    let mut entered = false;
-    let first = configured(master, subject, |lss| {
-        // To a global switch nobody answers.
-        entered = subject.reach != Reach::Global;
-        work(lss)
-    });
-    let silent = matches!(&first, Err(failure) if failure.kind() == Kind::NoAnswer) && !entered;
-    let (done, before) = if silent && way.retry_stopped && subject.alone {
-        tell(Note::Step(format!("{}: silent; once more in STOPPED", subject.name())));
-        let stopped = prepare(master, subject, Some(AssignState::Stopped))?;
-        (configured(master, subject, work), before.or(stopped))
+    let previous = enter_state(master, device, method.state)?;
+    let first = configured(master, device, &mut work);
+    let is_silent = first.as_ref().is_err_and(|failure| is_silent(device, failure));
+    let (done, previous_state) = if is_silent && method.retry_stopped && device.is_alone {
+        notify(device.note(LssEvent::RetryInStopped));
+        let stopped = enter_state(master, device, Some(AssignState::Stopped))?;
+        (configured(master, device, work), previous.or(stopped))
     } else {
-        (first, before)
+        (first, previous)
     };
     match done {
-        Ok(session) => Ok(Session { before, ..session }),
+        Ok(session) => Ok(Session { previous_state, ..session }),
         Err(failure) => {
-            put_back(master, before, tell);
+            restore_state(master, device, previous_state, notify);
             Err(failure)
         }
     }
+}
+
+/// Whether a failure means that the device does not answer LSS at all. A global switch is not answered, so there the
+/// first service counts.
+pub(super) fn is_silent(device: &LssDevice, failure: &Failure) -> bool {
+    let Cause::Lss(cause) = &failure.cause else { return false };
+    let LssCause::Service(error) = &cause.cause else { return false };
+    let LssError::NoAnswer { service, .. } = **error else { return false };
+    service == Service::SwitchSelective || device.reach == Reach::Global && service != Service::Store
 }

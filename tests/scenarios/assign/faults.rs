@@ -1,4 +1,4 @@
-//! Devices that lose answers, refuse, and do not come back.
+//! Devices that lose answers, reject requests, and do not come back.
 
 use super::{Held, Wanted, all_held, bus, id, run};
 use cangauge::bus::memory::{Outbox, Station};
@@ -6,9 +6,9 @@ use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::tasks::Kind;
-use cangauge::tasks::lss::{Rate, Via};
+use cangauge::tasks::lss::{RequestedRate, Via};
 
-/// The device with these oddities at node 5, and two that are not meant: one of the same kind, one without a node-ID.
+/// A device with these oddities at node 5, and two other devices: one of the same kind, one without a node-ID.
 fn bench(kind: &str, oddities: &str) -> String {
     format!(
         "device = [{{ kind = '{kind}', node = 5, serial = 100 {oddities} }}, {{ kind = '{kind}', node = 6, serial = 200 }}, \
@@ -16,17 +16,17 @@ fn bench(kind: &str, oddities: &str) -> String {
     )
 }
 
-/// What must be so whatever happens.
+/// What holds after every run.
 #[track_caller]
 fn check(before: &[Held], after: &[Held], succeeded: bool, new: u8) {
-    assert_eq!(before[1..], after[1..], "somebody who was not meant");
+    assert_eq!(before[1..], after[1..], "another device was changed");
     if succeeded {
-        assert_eq!((after[0].0, after[0].2), (Some(new), Some(new)), "no success that the device does not hold");
+        assert_eq!((after[0].0, after[0].2), (Some(new), Some(new)), "a success is the real state of the device");
     }
 }
 
 #[test]
-fn whatever_goes_wrong_with_one_service() {
+fn every_fault_of_one_service() {
     let faults = [
         ", lss = { lose = [0x11] }",
         ", lss = { lose = [0x17] }",
@@ -56,7 +56,7 @@ fn whatever_goes_wrong_with_one_service() {
                 if let Err(failure) = &done.result {
                     let says_all = failure.kind() == Kind::Refused;
                     assert!(says_all || ErrorMessage::of(&failure).hint.is_some(), "{kind}{fault}: {failure}");
-                    // What says that nothing was changed is right even after a reset.
+                    // "nothing was changed" holds even after a power cycle.
                     if ErrorMessage::of(&failure).message.contains("nothing was changed") {
                         bus.power_cycle();
                         assert_eq!(all_held(&bus)[0], before[0], "{kind}{fault}: {failure}");
@@ -73,7 +73,7 @@ fn identity(kind: &str) -> String {
 }
 
 #[test]
-fn storing_refused_is_put_back_and_no_success() {
+fn rejected_store_is_reverted_and_no_success() {
     let mut bus = bus(&bench("mh4", ", lss = { refuse = { '0x17' = 1 } }"));
     let before = all_held(&bus);
     let done = run(&mut bus, "5", &id(12));
@@ -82,28 +82,28 @@ fn storing_refused_is_put_back_and_no_success() {
     assert!(done.failure().1.contains("nothing was changed"), "{}", done.failure().1);
     assert!(ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap().contains("--via sdo"));
     assert_eq!(all_held(&bus), before);
-    // What waited in it waits no longer: a reset leaves it where it is.
+    // No value is left pending: a reset changes nothing.
     let mut master = cangauge::master::Master::new(&mut bus, cangauge::master::Timing::default());
     master.send("000#8105".parse().unwrap());
     let until = master.now() + std::time::Duration::from_millis(500);
     while !matches!(master.next(until), Ok(cangauge::master::Happening::Deadline)) {}
     drop(master);
     assert_eq!(all_held(&bus), before);
-    // And by its objects it goes.
+    // Its objects work.
     run(&mut bus, "5", &Wanted { via: Via::Sdo, ..id(12) }).result.unwrap();
     assert_eq!(all_held(&bus)[0].2, Some(12));
 }
 
 #[test]
-fn a_lost_acknowledge_of_a_store_is_no_success() {
+fn lost_acknowledgement_of_a_store_is_no_success() {
     let mut bus = bus(&bench("mh4", ", lss = { lose = [0x17] }"));
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::NoAnswer);
-    assert!(done.failure().1.contains("whether it is stored is not known"), "{}", done.failure().1);
+    assert!(done.failure().1.contains("unknown whether it is stored"), "{}", done.failure().1);
 }
 
 #[test]
-fn one_that_does_not_come_back() {
+fn device_that_does_not_come_back() {
     let mut bus = bus(&bench("mh4", ", offline_after = ['reset']"));
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::NoAnswer);
@@ -112,7 +112,7 @@ fn one_that_does_not_come_back() {
     assert!(hint.contains("power it off and on"), "{hint}");
 }
 
-/// A device that has been at node 12 all along and says so when it hears a reset of node 5.
+/// A device with node-ID 12 that sends a boot-up message at the reset of node 5.
 struct Newcomer {
     awake: bool,
 }
@@ -140,23 +140,23 @@ impl Station for Newcomer {
 }
 
 #[test]
-fn another_one_that_shows_itself_in_its_place() {
+fn another_device_under_the_new_node_id() {
     let mut bus = bus(&bench("mh4", ", offline_after = ['reset']"));
     bus.attach(Newcomer { awake: false });
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::Unexpected);
-    assert!(done.failure().1.contains("0x1:0x2:0x3:4 answers there, another device"), "{}", done.failure().1);
+    assert!(done.failure().1.contains("another device answers there: 0x1:0x2:0x3:4"), "{}", done.failure().1);
 }
 
 #[test]
-fn a_bit_rate_that_the_device_refuses() {
+fn rejected_bit_rate_changes_nothing() {
     let mut bus = bus(&bench("mh4", ", lss = { refuse = { '0x13' = 1 } }"));
     let before = all_held(&bus);
-    let wanted = Wanted { rate: Some(Rate::Bits(500_000)), ..id(12) };
+    let wanted = Wanted { rate: Some(RequestedRate::Bits(500_000)), ..id(12) };
     let done = run(&mut bus, "5", &wanted);
     assert_eq!(done.failure().0, Kind::Refused);
     assert!(
-        done.failure().1.contains("nothing was changed") || done.failure().1.contains("put back"),
+        done.failure().1.contains("nothing was changed") || done.failure().1.contains("set back"),
         "{}",
         done.failure().1
     );

@@ -1,4 +1,4 @@
-//! Ctrl-C at any moment.
+//! Ctrl-C at every moment.
 
 use super::{Wanted, all_held, bus, id, run};
 use cangauge::bus::memory::{Outbox, Station};
@@ -7,17 +7,17 @@ use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::CanId;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::tasks::Kind;
-use cangauge::tasks::lss::{Rate, Via};
+use cangauge::tasks::lss::{RequestedRate, Via};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-/// Hears when something is changed: NMT, LSS services that configure, writes by SDO.
+/// Records the moments of changes: NMT, LSS services that configure, SDO writes.
 #[derive(Default)]
-struct Ear {
-    heard: Vec<Mono>,
+struct ChangeRecorder {
+    moments: Vec<Mono>,
 }
 
-impl Station for Ear {
+impl Station for ChangeRecorder {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, now: Mono, frame: &Frame, _: &mut Outbox) {
@@ -28,7 +28,7 @@ impl Station for Ear {
             id => id.sdo_request_node().is_some() && first >> 5 == 1,
         };
         if changes {
-            self.heard.push(now);
+            self.moments.push(now);
         }
     }
 
@@ -41,16 +41,16 @@ impl Station for Ear {
     fn sent(&mut self, _: Mono, _: &Frame) {}
 }
 
-/// Moments all over a job's run, and close to each other around every frame that changes something.
+/// Moments of a whole run, closer together around every frame that changes something.
 fn moments(bench: &str, target: &str, wanted: &Wanted) -> BTreeSet<Duration> {
     let mut bus = bus(bench);
-    bus.attach(Ear::default());
+    bus.attach(ChangeRecorder::default());
     run(&mut bus, target, wanted).result.unwrap();
     let length = bus.mono().since_start();
     let coarse = (1..24).map(|part| length * part / 24);
-    let heard: Vec<Mono> = bus.stations::<Ear>().flat_map(|ear| ear.heard.clone()).collect();
-    assert!(!heard.is_empty());
-    let fine = heard.iter().flat_map(|at| {
+    let changes: Vec<Mono> = bus.stations::<ChangeRecorder>().flat_map(|recorder| recorder.moments.clone()).collect();
+    assert!(!changes.is_empty());
+    let fine = changes.iter().flat_map(|at| {
         let steps = [-2_500, -1_500, -700, -300, 100, 600, 1_100, 1_700, 2_600, 4_500, 20_000_i64];
         steps.map(|step| shifted(*at, step))
     });
@@ -62,7 +62,7 @@ fn shifted(at: Mono, micros: i64) -> Duration {
     if micros < 0 { at.since_start().saturating_sub(step) } else { at.since_start() + step }
 }
 
-/// Interrupts a job at many moments of its run, and looks at what is left behind.
+/// Interrupts a job at many moments, and checks the devices.
 fn at_every_step(bench: &str, target: &str, wanted: &Wanted) {
     let mut interrupted = 0;
     for moment in moments(bench, target, wanted) {
@@ -72,7 +72,7 @@ fn at_every_step(bench: &str, target: &str, wanted: &Wanted) {
         bus.interrupt_at(Mono::at(moment));
         let done = run(&mut bus, target, wanted);
         let after = all_held(&bus);
-        assert_eq!(before[1..], after[1..], "{moment:?}: somebody who was not meant");
+        assert_eq!(before[1..], after[1..], "{moment:?}: another device was changed");
         match &done.result {
             Ok(_) => {}
             Err(failure) => {
@@ -108,7 +108,7 @@ fn by_lss() {
 }
 
 #[test]
-fn by_lss_to_one_that_wants_another_state() {
+fn by_lss_with_a_required_nmt_state() {
     let bench = "device = [{ kind = 'd20', node = 5, latency = '1ms' }, { kind = 'dps', node = 6 }]";
     at_every_step(bench, "5", &id(12));
 }
@@ -120,14 +120,14 @@ fn by_objects() {
 
 #[test]
 fn the_bit_rate() {
-    let wanted = Wanted { rate: Some(Rate::Bits(500_000)), ..Wanted::default() };
+    let wanted = Wanted { rate: Some(RequestedRate::Bits(500_000)), ..Wanted::default() };
     at_every_step(MH4, "5", &wanted);
 }
 
 #[test]
 fn device_and_host_together() {
     let alone = "device = [{ kind = 'mh4', node = 5, latency = '1ms' }]";
-    let wanted = Wanted { rate: Some(Rate::Bits(500_000)), retime: true, ..Wanted::default() };
+    let wanted = Wanted { rate: Some(RequestedRate::Bits(500_000)), retime: true, ..Wanted::default() };
     at_every_step(alone, "5", &wanted);
 }
 

@@ -1,4 +1,4 @@
-//! Device and host to a new bit rate together, and back.
+//! Device and host change the bit rate together, and back.
 
 use super::{Done, Wanted, all_held, bus, run};
 use cangauge::bus::BitRateControl;
@@ -6,10 +6,10 @@ use cangauge::bus::memory::MemoryBus;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::Device;
 use cangauge::tasks::Kind;
-use cangauge::tasks::lss::{Confirmed, Rate, Via};
+use cangauge::tasks::lss::{Confirmed, RequestedRate, Via};
 
 fn retimed(bus: &mut MemoryBus, target: &str) -> Done {
-    run(bus, target, &Wanted { rate: Some(Rate::Bits(500_000)), retime: true, ..Wanted::default() })
+    run(bus, target, &Wanted { rate: Some(RequestedRate::Bits(500_000)), retime: true, ..Wanted::default() })
 }
 
 fn rates(bus: &MemoryBus) -> Vec<(Option<u32>, Option<u32>)> {
@@ -33,12 +33,13 @@ fn each_kind_and_the_host_go_together() {
 }
 
 #[test]
-fn node_id_and_bit_rate_in_one_go() {
+fn node_id_and_bit_rate_together() {
     for via in [Via::Lss, Via::Sdo] {
         let mut bus = bus("device = [{ kind = 'mh4', node = 5 }]");
-        let wanted = Wanted { id: Some(12), rate: Some(Rate::Bits(500_000)), retime: true, via, ..Wanted::default() };
+        let wanted =
+            Wanted { id: Some(12), rate: Some(RequestedRate::Bits(500_000)), retime: true, via, ..Wanted::default() };
         let done = run(&mut bus, "5", &wanted);
-        assert_eq!(done.warns("no way back"), via == Via::Sdo, "{:?}", done.notes);
+        assert_eq!(done.warns("cannot return to the old bit rate"), via == Via::Sdo, "{:?}", done.notes);
         let report = done.result.unwrap_or_else(|failure| panic!("{via:?}: {failure}"));
         assert!(report.retimed && report.confirmed != Confirmed::Acknowledge, "{via:?}");
         assert_eq!(all_held(&bus), [(Some(12), NEW, Some(12), NEW)], "{via:?}");
@@ -49,26 +50,26 @@ fn node_id_and_bit_rate_in_one_go() {
 #[test]
 fn without_the_host_nothing_is_reset() {
     let mut bus = bus("device = [{ kind = 'mh4', node = 5 }, { kind = 'mh4', node = 6 }]");
-    let wanted = Wanted { id: Some(12), rate: Some(Rate::Bits(500_000)), ..Wanted::default() };
+    let wanted = Wanted { id: Some(12), rate: Some(RequestedRate::Bits(500_000)), ..Wanted::default() };
     let report = run(&mut bus, "5", &wanted).result.unwrap();
     assert_eq!((report.retimed, report.confirmed), (false, Confirmed::Acknowledge));
     assert_eq!(all_held(&bus), [(Some(5), OLD, Some(12), NEW), (Some(6), OLD, Some(6), OLD)]);
 }
 
 #[test]
-fn one_that_is_gone_comes_back_with_power() {
+fn lost_device_returns_after_a_power_cycle() {
     let mut bus = bus("device = [{ kind = 'mh4', node = 5, offline_after = ['activate'] }]");
     let done = retimed(&mut bus, "5");
     assert_eq!(done.failure().0, Kind::NoAnswer);
-    assert!(done.failure().1.contains("this side is back at 250k"), "{}", done.failure().1);
-    assert!(ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap().contains("power off and on"), "the way on");
+    assert!(done.failure().1.contains("the host is back at 250k"), "{}", done.failure().1);
+    assert!(ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap().contains("off and on"));
     assert_eq!(bus.bit_rate(), OLD);
     bus.power_cycle();
     assert_eq!(rates(&bus), [(OLD, OLD)]);
 }
 
 #[test]
-fn refused_while_anybody_else_is_there() {
+fn rejected_if_another_device_is_on_the_bus() {
     for other in [
         "{ kind = 'dps', node = 6 }",
         "{ kind = 'mh4' }",
@@ -93,7 +94,7 @@ fn without_the_privilege_nothing_is_changed() {
 }
 
 #[test]
-fn a_store_that_fails_after_it_is_said_and_lasts_until_power_off() {
+fn failed_store_is_reported_and_lasts_until_power_off() {
     let mut bus = bus("device = [{ kind = 'mh4', node = 5, lss = { refuse = { '0x17' = 1 } } }]");
     let done = retimed(&mut bus, "5");
     assert_eq!(done.failure().0, Kind::Refused);

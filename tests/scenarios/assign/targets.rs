@@ -1,4 +1,4 @@
-//! Who is meant, and that it is nobody else.
+//! The named device is changed, and no other.
 
 use super::{Wanted, all_held, bus, id, node, run};
 use cangauge::bus::faults::{FaultPlan, Faulty};
@@ -11,7 +11,7 @@ use cangauge::node::Overrides;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, State};
 use cangauge::tasks::Kind;
-use cangauge::tasks::lss::{Confirmed, Job, Rate, Target, Via, assign, store};
+use cangauge::tasks::lss::{Confirmed, Descriptions, Job, RequestedRate, Target, Via, assign, store};
 use std::collections::BTreeSet;
 
 const ALL: &str = "device = [
@@ -51,7 +51,7 @@ fn each_kind_by_its_identity_among_all() {
 }
 
 #[test]
-fn a_node_id_that_is_taken_is_refused() {
+fn taken_node_id_is_rejected() {
     let mut bus = bus(ALL);
     let before = all_held(&bus);
     for target in ["1", "0x362:0x443150:0x10000:20002"] {
@@ -63,7 +63,7 @@ fn a_node_id_that_is_taken_is_refused() {
 }
 
 #[test]
-fn a_lost_frame_makes_no_node_id_free() {
+fn lost_frame_does_not_make_a_node_id_free() {
     let bench = "device = [{ kind = 'mh4', node = 5 }, { kind = 'dps', node = 12 }]";
     let overrides = Overrides::new();
     let job = Job {
@@ -74,10 +74,9 @@ fn a_lost_frame_makes_no_node_id_free() {
         retime: false,
         via: Via::Auto,
         force: false,
-        overrides: &overrides,
-        given: None,
+        descriptions: Descriptions { overrides: &overrides, given: None },
     };
-    // More frames than it takes.
+    // More than the frames of the whole job.
     for lost in 0..150 {
         let mut bus = Faulty::new(bus(bench), FaultPlan { lose: BTreeSet::from([lost]), ..FaultPlan::default() });
         let before = all_held(bus.inner());
@@ -87,7 +86,7 @@ fn a_lost_frame_makes_no_node_id_free() {
     }
 }
 
-/// Two devices under one node-ID of which now the one and now the other is the first: another serial number each time.
+/// Two devices with one node-ID that answer in turns: the serial number differs each time.
 #[derive(Default)]
 struct Changeling {
     reads: u8,
@@ -114,23 +113,23 @@ impl Station for Changeling {
 }
 
 #[test]
-fn answers_that_differ_from_one_time_to_the_next() {
+fn answers_that_differ_show_two_devices() {
     let mut bus = bus("device = [{ kind = 'mh4', node = 6 }]");
     bus.attach(Changeling::default());
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::CheckFailed);
-    assert!(done.failure().1.contains("its answers differ from one time to the next"), "{}", done.failure().1);
+    assert!(done.failure().1.contains("its answers to the same request differ"), "{}", done.failure().1);
 }
 
 #[test]
-fn a_stopped_node_with_a_heartbeat_is_there_too() {
+fn node_id_of_a_stopped_node_with_heartbeat_is_taken() {
     let mut bus = bus("device = [{ kind = 'mh4', node = 1 }, { kind = 'mh4', node = 7, set = { '0x1017' = 1000 } }]");
     let mut master = cangauge::master::Master::new(&mut bus, cangauge::master::Timing::default());
     master.send("000#0207".parse().unwrap());
     master.settle();
     drop(master);
     let done = run(&mut bus, "1", &id(7));
-    assert!(done.failure().1.contains("a node shows itself there"), "{:?}", done.failure());
+    assert!(done.failure().1.contains("a node sends heartbeats there"), "{:?}", done.failure());
 }
 
 #[test]
@@ -139,10 +138,10 @@ fn two_devices_with_one_node_id() {
     let before = all_held(&bus);
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::CheckFailed);
-    assert!(done.failure().1.contains("more than one device has this node-ID"), "{}", done.failure().1);
+    assert!(done.failure().1.contains("several devices have this node-ID"), "{}", done.failure().1);
     assert!(ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap().contains("VENDOR:PRODUCT:REVISION:SERIAL"));
     assert_eq!(all_held(&bus), before);
-    // By its identity one of them takes it; nobody is reset, and it is no success yet.
+    // One of them is addressed by its identity. It is not reset, so that is no success yet.
     let done = run(&mut bus, "0x362:0x443150:0x10000:200", &id(12));
     assert_eq!(done.failure().0, Kind::Unexpected);
     assert!(done.failure().1.contains("not reset") && done.failure().1.contains("stored"), "{}", done.failure().1);
@@ -155,7 +154,7 @@ fn two_devices_with_one_node_id() {
 }
 
 #[test]
-fn one_of_two_with_one_node_id_that_tells_it() {
+fn one_of_two_with_one_node_id_is_not_reset() {
     let twins = "device = [
         { kind = 'mh4', node = 5, serial = 100, duplicate_id = true }, { kind = 'mh4', node = 5, serial = 200, duplicate_id = true },
     ]";
@@ -165,7 +164,7 @@ fn one_of_two_with_one_node_id_that_tells_it() {
     assert_eq!(done.failure().0, Kind::Unexpected);
     assert!(done.failure().1.contains("another device has node-ID 5 too"), "{}", done.failure().1);
     assert!(done.warns("it is not reset"), "{:?}", done.notes);
-    // Reset, it would be at 12 now, and the other one would have lost what it was doing.
+    // A reset would have restarted the other device too.
     expected[1].2 = Some(12);
     assert_eq!(all_held(&bus), expected);
 }
@@ -192,8 +191,8 @@ fn only_is_for_one_device_alone() {
     for kind in ["mh4", "d20", "mc1609", "dps"] {
         let mut bus = bus(&format!("device = [{{ kind = '{kind}', node = 5 }}]"));
         let done = run(&mut bus, "only", &id(12));
-        // DPS knows neither the inquiries nor the question for others; the D-20-9 listens when it is stopped.
-        assert_eq!(done.warns("does not know"), matches!(kind, "dps" | "d20"), "{kind} {:?}", done.notes);
+        // DPS supports neither inquiry nor identify; D-20-9 answers in STOPPED only.
+        assert_eq!(done.warns("does not support"), matches!(kind, "dps" | "d20"), "{kind} {:?}", done.notes);
         let report = done.result.unwrap_or_else(|failure| panic!("{kind}: {failure}"));
         assert_eq!(report.confirmed, Confirmed::BootUp, "{kind}");
         assert_eq!(all_held(&bus)[0].2, Some(12), "{kind}");
@@ -201,7 +200,7 @@ fn only_is_for_one_device_alone() {
 }
 
 #[test]
-fn only_is_refused_where_another_one_shows_itself() {
+fn only_is_rejected_if_another_device_is_found() {
     let two = [
         "device = [{ kind = 'mh4', node = 5 }, { kind = 'dps', node = 6 }]",
         "device = [{ kind = 'mh4', node = 5 }, { kind = 'mh4' }]",
@@ -220,18 +219,18 @@ fn only_is_refused_where_another_one_shows_itself() {
 }
 
 #[test]
-fn only_one_and_it_has_no_node_id() {
+fn only_works_without_a_node_id() {
     let mut bus = bus("device = [{ kind = 'mh4' }]");
     let report = run(&mut bus, "only", &id(12)).result.unwrap();
     assert_eq!((report.confirmed, all_held(&bus)[0].2), (Confirmed::BootUp, Some(12)));
 }
 
 #[test]
-fn forced_on_several_it_is_no_success() {
+fn forced_only_with_several_devices_is_no_success() {
     let mut bus = bus("device = [{ kind = 'mh4', node = 5 }, { kind = 'mh4', node = 6 }]");
     let done = run(&mut bus, "only", &Wanted { force: true, ..id(12) });
     assert_eq!(done.failure().0, Kind::Unexpected, "{:?}", done.failure());
-    assert!(done.warns("all of them will take it"), "{:?}", done.notes);
+    assert!(done.warns("all of them accept the change"), "{:?}", done.notes);
     assert_eq!(
         all_held(&bus).iter().map(|held| (held.0, held.2)).collect::<Vec<_>>(),
         [(Some(5), Some(12)), (Some(6), Some(12))]
@@ -239,17 +238,19 @@ fn forced_on_several_it_is_no_success() {
 }
 
 #[test]
-fn a_store_that_is_forced_takes_the_yes_of_several() {
+fn forced_store_accepts_several_answers() {
     let mut bus = bus("device = [{ kind = 'mh4', node = 5 }, { kind = 'mh4', node = 6, latency = '1ms' }]");
     let overrides = Overrides::new();
     let mut master = Master::new(&mut bus, Timing::default());
-    let mut stored = |force| store(&mut master, &Target::Only, (&overrides, None), force, &mut |_| {});
+    let mut stored = |force| {
+        store(&mut master, &Target::Only, &Descriptions { overrides: &overrides, given: None }, force, &mut |_| {})
+    };
     assert_eq!(stored(false).expect_err("two are there").kind(), Kind::CheckFailed);
     stored(true).unwrap();
 }
 
 #[test]
-fn nobody_is_no_answer() {
+fn absent_device_is_no_answer() {
     for target in ["9", "1:2:3:4", "unconfigured"] {
         let mut bus = bus(ALL);
         let before = all_held(&bus);
@@ -259,7 +260,7 @@ fn nobody_is_no_answer() {
 }
 
 #[test]
-fn without_a_serial_number_it_cannot_be_told_from_another() {
+fn device_without_serial_number_is_rejected() {
     let mut bus = bus("device = [{ kind = 'mh4', node = 5, serial = 0 }]");
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::CheckFailed);
@@ -276,7 +277,7 @@ fn two_devices_with_one_identity() {
         assert!(done.failure().1.ends_with("nothing was changed"), "{}", done.failure().1);
     }
     assert_eq!(all_held(&bus), before);
-    // Those whose LSS tells no node-ID (5Eh).
+    // Devices without 5Eh.
     for kind in ["dps", "d20"] {
         let twin = |node: u8| format!("{{ kind = '{kind}', node = {node}, serial = 7 }}");
         let mut bus = super::bus(&format!("device = [{}, {}]", twin(5), twin(6)));
@@ -284,7 +285,7 @@ fn two_devices_with_one_identity() {
         assert_eq!(run(&mut bus, "5", &id(12)).failure().0, Kind::CheckFailed, "{kind}");
         assert_eq!(all_held(&bus), before, "{kind}");
     }
-    // One of them has no node-ID, so that SDO does not show it: both answer to their address.
+    // One of them has no node-ID, so SDO does not show it. Both answer to the identity.
     let mut bus = super::bus("device = [{ kind = 'mh4', node = 5, serial = 7 }, { kind = 'mh4', serial = 7 }]");
     let before = all_held(&bus);
     let done = run(&mut bus, "5", &id(12));
@@ -310,16 +311,20 @@ fn by_objects_of_its_own() {
     }
     let mut bus = bus("device = [{ kind = 'dps', node = 6 }]");
     let done = run(&mut bus, "6", &Wanted { via: Via::Sdo, ..id(12) });
-    assert!(done.failure().1.contains("no source at hand"), "{:?}", done.failure());
+    assert!(
+        done.failure().1.contains("the objects that set its node-ID and bit rate are unknown"),
+        "{:?}",
+        done.failure()
+    );
 }
 
 #[test]
-fn objects_that_cannot_be_set_for_a_while_are_not_touched() {
-    // MH-4: in force "after 1010h and a reset". A HYDAC of the old kind keeps what is written.
+fn objects_that_need_a_store_are_not_written_without_one() {
+    // MH-4: effective "after 1010h and a reset". An old HYDAC stores what is written.
     for (kind, device, why) in [
-        ("mh4", None, "once it is stored (0x1010:1)"),
-        ("hydac", None, "once it is stored (0x1010:4)"),
-        ("hydac-old", Some("hydac-old"), "lasts"),
+        ("mh4", None, "after they are stored (0x1010:1)"),
+        ("hydac", None, "after they are stored (0x1010:4)"),
+        ("hydac-old", Some("hydac-old"), "as soon as they are written"),
     ] {
         let mut bus = bus(&format!("device = [{{ kind = '{kind}', node = 5 }}]"));
         let expected = all_held(&bus);
@@ -332,12 +337,12 @@ fn objects_that_cannot_be_set_for_a_while_are_not_touched() {
 }
 
 #[test]
-fn a_state_that_lss_wanted_otherwise_is_put_back() {
+fn nmt_state_changed_for_lss_is_restored() {
     // The DPS takes part in PRE-OPERATIONAL, the D-20-9 in STOPPED; a bit rate alone ends in no reset.
     for kind in ["dps", "d20"] {
         let device = format!("{{ kind = '{kind}', node = 5, start = true, set = {{ '0x1017' = 100 }} }}");
         let mut bus = bus(&format!("device = [{device}]"));
-        let wanted = Wanted { rate: Some(Rate::Bits(500_000)), ..Wanted::default() };
+        let wanted = Wanted { rate: Some(RequestedRate::Bits(500_000)), ..Wanted::default() };
         run(&mut bus, "5", &wanted).result.unwrap();
         let device: &Device = bus.stations().next().unwrap();
         assert_eq!(device.state(), Some(State::Operational), "{kind}");
@@ -345,7 +350,7 @@ fn a_state_that_lss_wanted_otherwise_is_put_back() {
 }
 
 #[test]
-fn what_is_not_stored_is_gone_with_the_power() {
+fn values_that_are_not_stored_are_lost_at_power_off() {
     let mut bus = bus(ALL);
     let expected = all_held(&bus);
     let report = run(&mut bus, "1", &Wanted { no_store: true, ..id(12) }).result.unwrap();
@@ -355,25 +360,24 @@ fn what_is_not_stored_is_gone_with_the_power() {
 }
 
 #[test]
-fn identifiers_that_have_not_followed_are_named() {
+fn stale_cob_ids_are_reported() {
     let mut bus = bus("device = [{ kind = 'mh4', node = 5, set = { '0x1800:1' = 0x40000185 } }]");
     let report = run(&mut bus, "5", &id(12)).result.unwrap();
     let ids = report.cob_ids.unwrap();
-    let stale: Vec<String> = ids.stale.iter().map(ToString::to_string).collect();
+    let stale: Vec<String> = ids.stale.iter().map(|stale| stale.object.to_string()).collect();
     let moved: Vec<String> = ids.tpdos.iter().map(|(number, id)| format!("{number} {id}")).collect();
-    // Whether a COB-ID that was written with its default follows, the simulated device decides; the two agree.
+    // Either the COB-ID followed the node-ID, or it is reported as stale.
     assert_eq!(stale.is_empty(), moved[0] == "1 18C", "{stale:?} {moved:?}");
 }
 
 #[test]
-fn a_bit_rate_that_the_device_does_not_have_is_refused_with_the_list() {
-    use cangauge::tasks::lss::Rate;
+fn unsupported_bit_rate_is_rejected_with_the_list() {
     let mut bus = bus(ALL);
     let before = all_held(&bus);
     for (target, rate, list) in [
-        ("127", Rate::Bits(800_000), "1M, 500k, 250k, 125k, 100k, 50k"),
-        ("127", Rate::Auto, "1M, 500k, 250k, 125k, 100k, 50k"),
-        ("1", Rate::Bits(100_000), "1M, 800k, 500k, 250k, 125k, 50k, 20k, auto"),
+        ("127", RequestedRate::Bits(800_000), "1M, 500k, 250k, 125k, 100k, 50k"),
+        ("127", RequestedRate::Auto, "1M, 500k, 250k, 125k, 100k, 50k"),
+        ("1", RequestedRate::Bits(100_000), "1M, 800k, 500k, 250k, 125k, 50k, 20k, auto"),
     ] {
         let done = run(&mut bus, target, &Wanted { rate: Some(rate), ..Wanted::default() });
         assert_eq!(done.failure().0, Kind::Usage);
@@ -382,7 +386,7 @@ fn a_bit_rate_that_the_device_does_not_have_is_refused_with_the_list() {
     }
     assert_eq!(all_held(&bus), before);
     // Its own table: 5 is 100k.
-    let done = run(&mut bus, "127", &Wanted { rate: Some(Rate::Bits(100_000)), ..Wanted::default() });
+    let done = run(&mut bus, "127", &Wanted { rate: Some(RequestedRate::Bits(100_000)), ..Wanted::default() });
     let report = done.result.unwrap();
     assert_eq!(
         (report.rate.map(|rate| (rate.bits, rate.index)), report.confirmed),

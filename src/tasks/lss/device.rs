@@ -1,0 +1,137 @@
+//! The device that a task works on, and how LSS reaches it.
+
+use super::Via;
+use super::event::{LssEvent, LssFact};
+use super::failure::{LssCause, LssFailure};
+use crate::canopen::id::NodeId;
+use crate::canopen::lss::LssAddress;
+use crate::device::assign::AssignKind;
+use crate::device::catalog::{self, Model};
+use crate::device::description::Description;
+use crate::master::{LssError, Master};
+use crate::node::survey::identify;
+use crate::node::{Node, Overrides};
+use crate::tasks::{Failure, Note};
+use std::sync::Arc;
+
+/// What identifies a device in messages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DeviceName {
+    /// Its node-ID; `None` if it has none or it is unknown.
+    pub node: Option<NodeId>,
+    /// Its identity; `None` if it is unknown.
+    pub address: Option<LssAddress>,
+}
+
+/// How LSS reaches a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reach {
+    /// By its identity (40h to 43h).
+    Selective(LssAddress),
+    /// Every slave on the bus (04h).
+    Global,
+}
+
+/// The device that a task works on.
+#[derive(Clone, Debug)]
+pub(super) struct LssDevice {
+    /// Its identity; `None` if it is unknown.
+    pub address: Option<LssAddress>,
+    /// Its present node-ID; `None` if it has none or it is unknown.
+    pub node: Option<NodeId>,
+    /// Whether it is known to have no node-ID.
+    pub is_unconfigured: bool,
+    /// Whether a message to its node-ID reaches this device and no other.
+    pub is_alone: bool,
+    /// Its description; `None` for an unknown device.
+    pub model: Option<Arc<Model>>,
+    /// How LSS reaches it.
+    pub reach: Reach,
+}
+
+impl LssDevice {
+    /// The device with this identity, of which nothing else is known.
+    pub(super) fn with_address(address: LssAddress) -> LssDevice {
+        LssDevice {
+            address: Some(address),
+            node: None,
+            is_unconfigured: false,
+            is_alone: false,
+            model: None,
+            reach: Reach::Selective(address),
+        }
+    }
+
+    /// The name for messages.
+    pub(super) fn name(&self) -> DeviceName {
+        DeviceName { node: self.node, address: self.address }
+    }
+
+    /// The node-ID, if a message to it reaches this device and no other.
+    pub(super) fn own_node(&self) -> Option<NodeId> {
+        self.node.filter(|_| self.is_alone)
+    }
+
+    /// The description of the device.
+    pub(super) fn description(&self) -> Option<&Description> {
+        self.model.as_ref().map(|model| &model.description)
+    }
+
+    /// The device as a node for SDO.
+    pub(super) fn as_node(&self, node: NodeId) -> Node {
+        Node { model: self.model.clone(), is_identified: true, ..Node::new(node) }
+    }
+
+    /// Whether its node-ID is set by LSS.
+    pub(super) fn uses_lss(&self, via: Via) -> bool {
+        let preferred = self.description().and_then(Description::preferred_assign);
+        match via {
+            Via::Auto => preferred.is_none_or(|entry| entry.way == AssignKind::Lss),
+            Via::Lss => true,
+            Via::Sdo => false,
+        }
+    }
+
+    /// A failure of this device.
+    pub(super) fn failure(&self, cause: LssCause) -> Failure {
+        Failure { node: self.node, ..Failure::general(LssFailure { device: self.name(), cause }) }
+    }
+
+    /// The failure of an LSS service with this device.
+    pub(super) fn lss_failure(&self, error: LssError) -> Failure {
+        match error {
+            LssError::Master(error) => error.into(),
+            error => self.failure(LssCause::Service(Arc::new(error))),
+        }
+    }
+
+    /// A note about this device.
+    pub(super) fn note(&self, event: LssEvent) -> Note {
+        Note { node: self.node, fact: LssFact { device: self.name(), event }.into() }
+    }
+}
+
+/// The descriptions that the user named.
+#[derive(Clone, Copy, Debug)]
+pub struct Descriptions<'a> {
+    /// For nodes.
+    pub overrides: &'a Overrides,
+    /// For the target, whatever its node-ID is.
+    pub given: Option<&'a Arc<Model>>,
+}
+
+impl Descriptions<'_> {
+    /// The description of a device: the one that the user named, else by what it answers by SDO, else by its identity.
+    ///
+    /// # Errors
+    /// Bus errors and Ctrl-C; a node that stops answering.
+    pub(super) fn model_of(&self, master: &mut Master<'_>, device: &LssDevice) -> Result<Option<Arc<Model>>, Failure> {
+        if let Some(given) = self.given {
+            return Ok(Some(Arc::clone(given)));
+        }
+        let by_identity = device.address.and_then(|address| catalog::by_identity(address.vendor, address.product));
+        let Some(node) = device.own_node() else { return Ok(by_identity) };
+        let found = identify(master, &[node], self.overrides)?.pop();
+        Ok(found.and_then(|node| node.model).or(by_identity))
+    }
+}

@@ -1,0 +1,150 @@
+//! What is reported while a task runs: steps and warnings, as types. The texts are in `output`.
+
+use super::device::DeviceName;
+use super::progress::Progress;
+use crate::canopen::id::NodeId;
+use crate::canopen::lss::LssAddress;
+use crate::master::LssError;
+use crate::tasks::Fact;
+use std::sync::Arc;
+
+/// An event of an LSS task.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LssFact {
+    /// The device that it concerns.
+    pub device: DeviceName,
+    /// What happened.
+    pub event: LssEvent,
+}
+
+/// What happened in an LSS task.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LssEvent {
+    /// The target was found.
+    Found {
+        /// The title of its description.
+        title: Option<String>,
+        /// The new node-ID, if it was found to be free.
+        free: Option<NodeId>,
+    },
+    /// The bit rate table of the device is unknown; that of CiA 305 is used.
+    StandardRateTable,
+    /// How far the change has come.
+    Progress(Progress),
+    /// The device does not answer LSS; it is tried again in STOPPED.
+    RetryInStopped,
+    /// The device is in PRE-OPERATIONAL; its state before is unknown.
+    LeftPreOperational,
+    /// The device goes to a new bit rate together with the host.
+    ChangingRate {
+        /// In bit/s.
+        bit_rate: u32,
+        /// The time until the change in milliseconds.
+        delay_ms: u16,
+    },
+    /// The device answers at the new bit rate.
+    AnswersAt {
+        /// In bit/s.
+        bit_rate: u32,
+    },
+    /// The device does not answer LSS; its objects are used instead.
+    ObjectsInsteadOfLss,
+    /// No document confirms the method.
+    UnverifiedMethod {
+        /// What is doubtful, from the description.
+        doubt: String,
+    },
+    /// Storing also stores all other values, and resets the COB-IDs to their defaults.
+    StoreResetsCobIds,
+    /// Another device has the same node-ID, so the node is not reset.
+    SharedNodeId(NodeId),
+    /// Several slaves are on the bus, and all of them accept the change.
+    AllSlavesChange(AnotherSlave),
+    /// The slave lacks a service, so LSS cannot show that it is the only one.
+    CannotExcludeOthers(UnansweredService),
+    /// Fastscan stopped after this device; there may be more.
+    MoreUnconfigured {
+        /// The device that was found last.
+        last: LssAddress,
+        /// The error; `None` if the device was found again.
+        reason: Option<Reason>,
+    },
+    /// The device stores the bit rate before it uses it, so it cannot return to the old one.
+    NoReturn {
+        /// The new bit rate in bit/s.
+        bit_rate: u32,
+    },
+}
+
+impl LssEvent {
+    /// Whether the user should act on it: printed as a warning.
+    pub fn is_warning(&self) -> bool {
+        match self {
+            LssEvent::Found { .. }
+            | LssEvent::StandardRateTable
+            | LssEvent::Progress(_)
+            | LssEvent::RetryInStopped
+            | LssEvent::LeftPreOperational
+            | LssEvent::ChangingRate { .. }
+            | LssEvent::AnswersAt { .. } => false,
+            LssEvent::ObjectsInsteadOfLss
+            | LssEvent::UnverifiedMethod { .. }
+            | LssEvent::StoreResetsCobIds
+            | LssEvent::SharedNodeId(_)
+            | LssEvent::AllSlavesChange(_)
+            | LssEvent::CannotExcludeOthers(_)
+            | LssEvent::MoreUnconfigured { .. }
+            | LssEvent::NoReturn { .. } => true,
+        }
+    }
+}
+
+/// A service that a slave does not answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UnansweredService {
+    /// 5Ah to 5Dh.
+    Inquire,
+    /// 46h to 4Bh.
+    Identify,
+}
+
+/// The evidence of more than one slave on the bus.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum AnotherSlave {
+    /// Several nodes answer SDO or send heartbeats.
+    Nodes(Vec<NodeId>),
+    /// Several devices share a node-ID.
+    SharedNodeId(NodeId, super::node_id::DuplicateSign),
+    /// Two answers to one LSS inquiry.
+    Answers(u32, u32),
+    /// The answers to an LSS inquiry collide.
+    Collision,
+    /// A slave with another serial number than this answers.
+    OtherSerial(u32),
+    /// The slaves report different node-IDs.
+    NodeIds,
+    /// LSS and SDO show different identities.
+    Identities {
+        /// By SDO.
+        by_sdo: LssAddress,
+        /// By LSS.
+        by_lss: LssAddress,
+    },
+}
+
+/// An LSS error as the reason of an event.
+#[derive(Clone, Debug)]
+pub struct Reason(pub Arc<LssError>);
+
+/// Errors of the operating system cannot be compared, so the debug forms are.
+impl PartialEq for Reason {
+    fn eq(&self, other: &Reason) -> bool {
+        format!("{:?}", self.0) == format!("{:?}", other.0)
+    }
+}
+
+impl From<LssFact> for Fact {
+    fn from(fact: LssFact) -> Fact {
+        Fact::Lss(Box::new(fact))
+    }
+}

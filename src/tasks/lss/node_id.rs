@@ -1,0 +1,232 @@
+//! What answers under a node-ID: one device, none, or several.
+
+use super::device::DeviceName;
+use super::failure::{LssCause, LssFailure};
+use crate::bus::{Fault, Filters, Mono};
+use crate::canopen::id::NodeId;
+use crate::canopen::lss::LssAddress;
+use crate::canopen::nmt::Life;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
+use crate::master::{Error, Happening, Master, Request, SdoError, SdoFailure};
+use crate::node::wait::{Policy, wait};
+use crate::tasks::Failure;
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
+const IDENTITY: u16 = 0x1018;
+
+/// How often an identity is read. The answers of two devices can merge on the wire once, but not each time.
+const IDENTITY_READS: usize = 3;
+
+/// The wait for a second answer after an identity was read.
+const SECOND_ANSWER_TIMEOUT: Duration = Duration::from_millis(50);
+
+/// How long to listen for other nodes. The usual heartbeat time is 1 s.
+pub(super) const LISTEN_TIME: Duration = Duration::from_millis(1100);
+
+/// A time that no SDO transfer exceeds.
+const MAX_TRANSFER_TIME: Duration = Duration::from_secs(3600);
+
+/// The evidence of two devices with one node-ID.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DuplicateSign {
+    /// Another master sends requests to the node, so the answers cannot be assigned.
+    OtherMaster,
+    /// Answers arrive twice.
+    AnswersTwice,
+    /// Answers collide.
+    AnswersCollide,
+    /// Answers to the same request differ.
+    AnswersDiffer,
+}
+
+/// The evidence that a node-ID is in use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TakenSign {
+    /// A node answers SDO.
+    Answer,
+    /// A node sends heartbeats or a boot-up message.
+    Heartbeat,
+}
+
+/// What answers under a node-ID.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Occupant {
+    /// One device with this identity.
+    Device(LssAddress),
+    /// As far as is known one device. It has no serial number, so it cannot be distinguished from others.
+    Unidentified,
+    /// Several devices.
+    Several(DuplicateSign),
+    /// No device answered within this time.
+    None(Duration),
+}
+
+/// Reads the identity (1018h) of a node several times, and looks for evidence of two devices: answers that arrive
+/// twice, differ or collide.
+///
+/// # Errors
+/// Bus errors and Ctrl-C; an answer that violates the protocol.
+pub(super) fn occupant(master: &mut Master<'_>, node: NodeId) -> Result<Occupant, Failure> {
+    master.listen(&Filters::All)?;
+    let mut first: Option<[Option<u32>; 4]> = None;
+    for _ in 0..IDENTITY_READS {
+        let mut parts = [None; 4];
+        for (part, sub) in parts.iter_mut().zip(1..) {
+            let mut monitor = SdoMonitor::new(node);
+            *part = match monitor.read(master, ObjectId::new(IDENTITY, sub))? {
+                Ok(number) => Some(number),
+                Err(SdoError { failure: SdoFailure::Refused(_) | SdoFailure::Fit(_), .. }) => None,
+                Err(SdoError { failure: SdoFailure::NoAnswer { waited, .. }, .. }) => {
+                    return Ok(match monitor.has_collision {
+                        true => Occupant::Several(DuplicateSign::AnswersCollide),
+                        false => Occupant::None(waited),
+                    });
+                }
+                Err(error) => return Err(error.into()),
+            };
+            if sub == 4 {
+                monitor.listen(master, SECOND_ANSWER_TIMEOUT)?;
+            }
+            if let Some(sign) = monitor.sign() {
+                return Ok(Occupant::Several(sign));
+            }
+        }
+        if first.is_some_and(|first| first != parts) {
+            return Ok(Occupant::Several(DuplicateSign::AnswersDiffer));
+        }
+        first = Some(parts);
+    }
+    Ok(match first.unwrap_or_default() {
+        [Some(vendor), Some(product), Some(revision), Some(serial)] if serial != 0 => {
+            Occupant::Device(LssAddress { vendor, product, revision, serial })
+        }
+        _ => Occupant::Unidentified,
+    })
+}
+
+/// Watches the SDO channel of a node for frames other than the expected answers.
+struct SdoMonitor {
+    node: NodeId,
+    has_extra_answer: bool,
+    has_other_master: bool,
+    has_collision: bool,
+}
+
+impl SdoMonitor {
+    fn new(node: NodeId) -> SdoMonitor {
+        SdoMonitor { node, has_extra_answer: false, has_other_master: false, has_collision: false }
+    }
+
+    fn sign(&self) -> Option<DuplicateSign> {
+        match self {
+            SdoMonitor { has_other_master: true, .. } => Some(DuplicateSign::OtherMaster),
+            SdoMonitor { has_extra_answer: true, .. } => Some(DuplicateSign::AnswersTwice),
+            SdoMonitor { has_collision: true, .. } => Some(DuplicateSign::AnswersCollide),
+            SdoMonitor { .. } => None,
+        }
+    }
+
+    fn on_event(&mut self, event: &Happening) {
+        match event {
+            Happening::Frame(received) => {
+                let id = received.frame.id();
+                self.has_extra_answer |= id.sdo_response_node() == Some(self.node);
+                self.has_other_master |= id.sdo_request_node() == Some(self.node);
+            }
+            Happening::Fault(fault, _) => self.has_collision |= is_collision(*fault),
+            _ => {}
+        }
+    }
+
+    /// Reads an UNSIGNED32.
+    fn read(&mut self, master: &mut Master<'_>, object: ObjectId) -> Result<Result<u32, SdoError>, Failure> {
+        let node = self.node;
+        let request = master.start(Request::read(node, object));
+        let until = master.now() + MAX_TRANSFER_TIME;
+        let answer = wait(master, until, Policy::Command, |_, event| match event {
+            Happening::Sdo(ticket, result) if ticket == request => ControlFlow::Break(result),
+            event => {
+                self.on_event(&event);
+                ControlFlow::Continue(())
+            }
+        })?;
+        let answer = answer.done().ok_or(Error::Interrupted)?;
+        let value = answer.and_then(|answer| answer.value(node, object, Some(DataType::Unsigned(4))));
+        let number = value.map(|(value, _)| value.as_u64().and_then(|number| u32::try_from(number).ok()));
+        Ok(number.map(Option::unwrap_or_default))
+    }
+
+    fn listen(&mut self, master: &mut Master<'_>, duration: Duration) -> Result<(), Failure> {
+        let until = master.now() + duration;
+        wait(master, until, Policy::Command, |_, event| {
+            self.on_event(&event);
+            ControlFlow::<()>::Continue(())
+        })?;
+        Ok(())
+    }
+}
+
+/// Whether two nodes that send at the same time can cause this fault.
+fn is_collision(fault: Fault) -> bool {
+    matches!(fault, Fault::Protocol | Fault::ErrorPassive | Fault::BusOff)
+}
+
+/// Whether a node-ID is in use: an SDO answer, a heartbeat or a boot-up message. A stopped node without heartbeat cannot
+/// be detected.
+///
+/// # Errors
+/// Bus errors and Ctrl-C.
+pub(super) fn taken(master: &mut Master<'_>, node: NodeId) -> Result<Option<TakenSign>, Failure> {
+    master.listen(&Filters::All)?;
+    let timeout = master.timing().timeout.min(LISTEN_TIME / 3);
+    let start = master.now();
+    // Two requests: one of them or its answer may be lost.
+    let requests = [(); 2].map(|()| Request::read(node, DEVICE_TYPE).once().within(timeout));
+    let tickets = requests.map(|request| master.start(request));
+    let mut open = tickets.len();
+    let on_event = |event: Happening, open: &mut usize| match event {
+        Happening::Sdo(ticket, result) if tickets.contains(&ticket) => {
+            *open -= 1;
+            match result {
+                Err(SdoError { failure: SdoFailure::NoAnswer { .. } | SdoFailure::Cancelled, .. }) => None,
+                Ok(_) | Err(_) => Some(TakenSign::Answer),
+            }
+        }
+        Happening::Frame(received) => {
+            Life::parse(&received.frame).filter(|(alive, _)| *alive == node).map(|_| TakenSign::Heartbeat)
+        }
+        _ => None,
+    };
+    let mut until_sign = |master: &mut Master<'_>, until: Mono, ends_with_requests: bool| {
+        wait(master, until, Policy::Command, |_, event| match on_event(event, &mut open) {
+            Some(sign) => ControlFlow::Break(Some(sign)),
+            None if ends_with_requests && open == 0 => ControlFlow::Break(None),
+            None => ControlFlow::Continue(()),
+        })
+        .map(|waited| waited.done().flatten())
+    };
+    let mut sign = until_sign(master, start + MAX_TRANSFER_TIME, true)?;
+    if sign.is_none() {
+        sign = until_sign(master, start + LISTEN_TIME, false)?;
+    }
+    master.forget(tickets.into_iter());
+    Ok(sign)
+}
+
+/// The identity of the only device under a node-ID.
+///
+/// # Errors
+/// No device, more than one, or a device without a serial number; bus errors and Ctrl-C.
+pub(super) fn identity_of(master: &mut Master<'_>, node: NodeId) -> Result<LssAddress, Failure> {
+    let cause = match occupant(master, node)? {
+        Occupant::Device(address) => return Ok(address),
+        Occupant::Unidentified => LssCause::NoSerialNumber,
+        Occupant::Several(sign) => LssCause::DuplicateNodeId(sign),
+        Occupant::None(waited) => LssCause::NoAnswer(waited),
+    };
+    let device = DeviceName { node: Some(node), address: None };
+    Err(Failure::at(node, LssFailure { device, cause }))
+}

@@ -1,0 +1,137 @@
+//! From the argument to the device: its identity, where it is, and how LSS reaches it.
+
+use super::device::{Descriptions, LssDevice};
+use super::event::LssEvent;
+use super::failure::{LssCause, LssFailure};
+use super::node_id::{Occupant, identity_of, occupant};
+use super::session::{configured, is_silent};
+use super::sole::sole_device;
+use super::{Notify, Target, Via, nodes};
+use crate::canopen::id::NodeId;
+use crate::canopen::lss::LssAddress;
+use crate::master::{LssError, Master};
+use crate::tasks::Failure;
+
+/// Finds the device of a target. Nothing is changed, and the configuration state is left again. `force` is for
+/// [`Target::Only`].
+///
+/// # Errors
+/// No device, more than one, or one that cannot be distinguished from others; bus errors and Ctrl-C.
+pub(super) fn resolve(
+    master: &mut Master<'_>,
+    target: &Target,
+    descriptions: &Descriptions<'_>,
+    (via, force): (Via, bool),
+    notify: Notify<'_>,
+) -> Result<LssDevice, Failure> {
+    match target {
+        Target::Node(node) => by_node_id(master, *node, descriptions, via),
+        Target::Address(address) => by_address(master, *address, descriptions, notify),
+        Target::Only => sole_device(master, descriptions, force, notify),
+        Target::Unconfigured => unconfigured(master, descriptions),
+    }
+}
+
+fn by_node_id(
+    master: &mut Master<'_>,
+    node: NodeId,
+    descriptions: &Descriptions<'_>,
+    via: Via,
+) -> Result<LssDevice, Failure> {
+    let address = identity_of(master, node)?;
+    nodes::refuse_shared_identity(master, address, Some(node))?;
+    let mut device = LssDevice { node: Some(node), is_alone: true, ..LssDevice::with_address(address) };
+    device.model = descriptions.model_of(master, &device)?;
+    if device.uses_lss(via)
+        && let LssNodeId::Known(found) = inquire_node_id(master, &device)?
+        && found != Some(node)
+    {
+        return Err(device.failure(LssCause::OtherNodeIdByLss(found)));
+    }
+    Ok(device)
+}
+
+fn by_address(
+    master: &mut Master<'_>,
+    address: LssAddress,
+    descriptions: &Descriptions<'_>,
+    notify: Notify<'_>,
+) -> Result<LssDevice, Failure> {
+    let mut device = LssDevice::with_address(address);
+    // A device that requires another NMT state does not answer LSS here. SDO may show it.
+    let by_lss = inquire_node_id(master, &device)?;
+    match by_lss {
+        LssNodeId::Known(Some(node)) => device.node = Some(node),
+        LssNodeId::Known(None) => device.is_unconfigured = true,
+        LssNodeId::NotSupported | LssNodeId::Silent(_) => {
+            device.node = nodes::with_identity(master, address)?.first().copied();
+        }
+    }
+    nodes::refuse_shared_identity(master, address, device.node)?;
+    let mut is_stopped = false;
+    if let Some(node) = device.node {
+        match occupant(master, node)? {
+            Occupant::Device(found) if found == address => device.is_alone = true,
+            Occupant::Device(_) | Occupant::Several(_) => notify(device.note(LssEvent::SharedNodeId(node))),
+            // It answers LSS but not SDO: it is stopped. No other device answers under its node-ID.
+            Occupant::None(_) => is_stopped = matches!(by_lss, LssNodeId::Known(_)),
+            Occupant::Unidentified => {}
+        }
+    }
+    if let LssNodeId::Silent(failure) = by_lss
+        && !device.is_alone
+    {
+        return Err(*failure);
+    }
+    device.model = descriptions.model_of(master, &device)?;
+    device.is_alone |= is_stopped;
+    Ok(device)
+}
+
+fn unconfigured(master: &mut Master<'_>, descriptions: &Descriptions<'_>) -> Result<LssDevice, Failure> {
+    let mut lss = master.lss();
+    let found = lss.fastscan();
+    let left = lss.leave();
+    let found = found?;
+    left?;
+    drop(lss);
+    let address = found.ok_or_else(|| Failure::general(LssFailure::general(LssCause::NoUnconfigured)))?;
+    let mut device = LssDevice { is_unconfigured: true, ..LssDevice::with_address(address) };
+    // Fails if a configured device has the same identity.
+    inquire_node_id(master, &device)?;
+    device.model = descriptions.model_of(master, &device)?;
+    Ok(device)
+}
+
+/// The node-ID that a device reports by LSS.
+enum LssNodeId {
+    /// `None` if it has none.
+    Known(Option<NodeId>),
+    /// The device does not support the service (5Eh).
+    NotSupported,
+    /// The device does not answer to its identity. Some devices answer in one NMT state only.
+    Silent(Box<Failure>),
+}
+
+/// Reads the node-ID by LSS (5Eh).
+///
+/// # Errors
+/// [`LssCause::SeveralWithIdentity`]; bus errors and Ctrl-C.
+fn inquire_node_id(master: &mut Master<'_>, device: &LssDevice) -> Result<LssNodeId, Failure> {
+    let asked = configured(master, device, |lss| match lss.inquire_node_id() {
+        Ok(gathered) => Ok(Some(gathered)),
+        Err(LssError::NoAnswer { .. }) => Ok(None),
+        Err(error) => Err(device.lss_failure(error)),
+    });
+    match asked {
+        Ok(session) => match session.result {
+            Some(gathered) if !gathered.is_one() => Err(device.failure(LssCause::SeveralWithIdentity)),
+            Some(gathered) => {
+                Ok(gathered.answers.first().map_or(LssNodeId::NotSupported, |node| LssNodeId::Known(*node)))
+            }
+            None => Ok(LssNodeId::NotSupported),
+        },
+        Err(failure) if is_silent(device, &failure) => Ok(LssNodeId::Silent(Box::new(failure))),
+        Err(failure) => Err(failure),
+    }
+}

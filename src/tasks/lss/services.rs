@@ -1,0 +1,124 @@
+//! Single LSS services: inquire, activate, store.
+
+use super::device::{Descriptions, LssDevice};
+use super::failure::LssCause;
+use super::method::choose_method;
+use super::resolve::resolve;
+use super::session::{prepared, restore_state};
+use super::{Notify, Target, Via};
+use crate::canopen::id::NodeId;
+use crate::canopen::lss::{LssAddress, Mode};
+use crate::master::{Lss, LssError, Master};
+use crate::tasks::{Effect, Failure};
+
+/// What a slave reports.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Inquired {
+    /// The device as the user named it.
+    pub target: Target,
+    /// Its identity; `None` if it does not support the inquiry.
+    pub address: Option<LssAddress>,
+    /// Its node-ID: `Some(None)` if it has none, `None` if it does not support the inquiry.
+    pub node: Option<Option<NodeId>>,
+}
+
+/// Reads identity and node-ID of a slave by LSS.
+///
+/// # Errors
+/// As [`super::assign`]; [`LssCause::NoInquiry`].
+pub fn inquire(
+    master: &mut Master<'_>,
+    target: &Target,
+    descriptions: &Descriptions<'_>,
+    notify: Notify<'_>,
+) -> Result<Inquired, Failure> {
+    let device = resolve(master, target, descriptions, (Via::Lss, false), notify)?;
+    let (address, node) = with_device(master, &device, notify, |lss| {
+        let address = unless_silent(lss.inquire_address())?;
+        let node = unless_silent(lss.inquire_node_id())?;
+        Ok((address, node.and_then(|gathered| gathered.answers.first().copied())))
+    })?;
+    if address.is_none() && node.is_none() {
+        return Err(device.failure(LssCause::NoInquiry));
+    }
+    Ok(Inquired { target: target.clone(), address, node })
+}
+
+fn unless_silent<T>(result: Result<T, LssError>) -> Result<Option<T>, LssError> {
+    match result {
+        Ok(answer) => Ok(Some(answer)),
+        Err(LssError::NoAnswer { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// Stores the configured node-ID and bit rate in non-volatile memory.
+///
+/// # Errors
+/// As [`super::assign`].
+pub fn store(
+    master: &mut Master<'_>,
+    target: &Target,
+    descriptions: &Descriptions<'_>,
+    force: bool,
+    notify: Notify<'_>,
+) -> Result<(), Failure> {
+    let device = resolve(master, target, descriptions, (Via::Lss, force), notify).map_err(unchanged)?;
+    with_device(master, &device, notify, |lss| accepted_by_all(lss.store(), force))
+}
+
+/// Activates the configured bit rate: the slave is silent for `delay_ms`, changes the bit rate, and is silent for the
+/// same time again. `None` addresses all slaves. Slaves do not acknowledge it.
+///
+/// # Errors
+/// As [`super::assign`].
+pub fn activate(
+    master: &mut Master<'_>,
+    target: Option<&Target>,
+    delay_ms: u16,
+    descriptions: &Descriptions<'_>,
+    force: bool,
+    notify: Notify<'_>,
+) -> Result<(), Failure> {
+    let Some(target) = target else {
+        let mut lss = master.lss();
+        let sent = lss.switch_global(Mode::Configuration).and_then(|()| lss.activate(delay_ms));
+        let left = lss.leave();
+        sent?;
+        return Ok(left?);
+    };
+    let device = resolve(master, target, descriptions, (Via::Lss, force), notify).map_err(unchanged)?;
+    with_device(master, &device, notify, |lss| lss.activate(delay_ms))
+}
+
+/// Carries out a service with the device in configuration state.
+fn with_device<T>(
+    master: &mut Master<'_>,
+    device: &LssDevice,
+    notify: Notify<'_>,
+    mut service: impl FnMut(&mut Lss<'_, '_>) -> Result<T, LssError>,
+) -> Result<T, Failure> {
+    let method = choose_method(device, Via::Lss, true, notify)?;
+    let session =
+        prepared(master, device, &method, notify, |lss| service(lss).map_err(|error| device.lss_failure(error)))?;
+    restore_state(master, device, session.previous_state, notify);
+    Ok(session.result)
+}
+
+/// The failure of a task that had changed nothing.
+pub(super) fn unchanged(mut failure: Failure) -> Failure {
+    failure.effects.push(Effect::NothingChanged);
+    failure
+}
+
+/// With `force` it is a success if several slaves accept the request.
+pub(super) fn accepted_by_all(result: Result<(), LssError>, force: bool) -> Result<(), LssError> {
+    match result {
+        Err(LssError::Several { frames, .. })
+            if force && frames.iter().all(|frame| frame.data().get(1) == Some(&0)) =>
+        {
+            Ok(())
+        }
+        result => result,
+    }
+}
