@@ -45,7 +45,7 @@
 //! master.listen_to(&ids)?;
 //! for node in survey_nodes(&mut master, &ids, &Overrides::new())? {
 //!     for signal in &node.signals {
-//!         let (object, data_type) = signal.value;
+//!         let (object, Some(data_type)) = signal.value else { continue };
 //!         let value = master.read(node.id, object, data_type)??;
 //!         let number = Number::from_value(&value, signal.digits.unwrap_or(0)).ok_or("not a number")?;
 //!         let unit = signal.unit.map(|unit| unit.to_string()).unwrap_or_default();

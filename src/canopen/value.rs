@@ -43,6 +43,12 @@ impl DataType {
         }
     }
 
+    /// Whether a value of this type is a number or a bit.
+    pub fn is_number(self) -> bool {
+        use DataType::{Boolean, Integer, Real32, Real64, Unsigned};
+        matches!(self, Boolean | Unsigned(_) | Integer(_) | Real32 | Real64)
+    }
+
     /// The type with this code (CiA 301, table 44), as used in EDS files.
     pub fn from_code(code: u16) -> Option<DataType> {
         Some(match code {

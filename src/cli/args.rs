@@ -4,6 +4,7 @@
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
 use crate::measure::decode::Wanted;
 use crate::output::report::Format;
 use clap::ValueEnum;
@@ -96,7 +97,7 @@ impl FromStr for Nodes {
     }
 }
 
-/// A signal or an object: `pressure`, `pressure.status`, `0x6130:1`.
+/// A signal or an object: `pressure`, `pressure.status`, `0x6130:1`, `0x6010:0/i16`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SignalArg(pub Wanted);
 
@@ -111,10 +112,17 @@ impl FromStr for SignalArg {
         }
         // `ch1` reads as a name, `6130:1` as an object; hexadecimal words without a digit in front are names.
         if text.starts_with(|first: char| first.is_ascii_digit()) {
-            return text
-                .parse::<ObjectId>()
-                .map(|object| SignalArg(Wanted::Object(object)))
-                .map_err(|error| error.to_string());
+            let (object, stated) = match text.split_once('/') {
+                Some((object, stated)) => {
+                    (object, Some(stated.parse::<DataType>().map_err(|error| error.to_string())?))
+                }
+                None => (text, None),
+            };
+            if let Some(stated) = stated.filter(|stated| !stated.is_number()) {
+                return Err(format!("\"{text}\": {stated} is not a type of numbers (i16, u32, r32)"));
+            }
+            let object = object.parse::<ObjectId>().map_err(|error| error.to_string())?;
+            return Ok(SignalArg(Wanted::Object(object, stated)));
         }
         if is_name(text) {
             return Ok(SignalArg(Wanted::Signal(text.to_owned())));
@@ -278,7 +286,7 @@ mod tests {
         assert_eq!(signal("pressure"), Ok(Wanted::Signal("pressure".into())));
         assert_eq!(signal("pressure.status"), Ok(Wanted::Status("pressure".into())));
         assert_eq!(signal("ch16"), Ok(Wanted::Signal("ch16".into())));
-        assert_eq!(signal("6130:1"), Ok(Wanted::Object(ObjectId::new(0x6130, 1))));
+        assert_eq!(signal("6130:1"), Ok(Wanted::Object(ObjectId::new(0x6130, 1), None)));
         assert!(signal("6130:300").is_err() && signal("").is_err() && signal("pressure.x").is_err());
 
         let object = |text: &str| text.parse::<ObjectArg>();

@@ -6,9 +6,9 @@ use super::{Format, Global, open};
 use crate::bus::claim::Claim;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
-use crate::measure::sample::{Number, Sample, Status};
+use crate::measure::sample::{Doubt, Number, Raw, Sample, Status};
 use crate::output::failure::ErrorMessage;
-use crate::output::{csv, json, table, text};
+use crate::output::{csv, doubt, json, table, text};
 use crate::tasks::read::{Target, read};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
@@ -25,7 +25,7 @@ use std::io::{self, Write};
 pub(crate) struct Read {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
-    /// pressure, temperature, ch1 to ch16, pressure.status, or an object as it is: 0x6130:1
+    /// pressure, temperature, ch1 to ch16, pressure.status, or an object as it is: 0x6130:1, 0x6010:0/i16
     signals: Vec<SignalArg>,
     /// Convert to this unit: bar, mbar, kPa, MPa, psi, degC, degF, K
     #[arg(long = "in", value_name = "UNIT", value_parser = parse_unit)]
@@ -45,6 +45,8 @@ struct Shown {
     text: String,
     unit: String,
     status: Option<Status>,
+    doubt: Option<Doubt>,
+    raw: Raw,
 }
 
 impl Read {
@@ -61,9 +63,16 @@ impl Read {
             let results = read(master, &nodes, &wanted, &overrides).or_fail()?;
             Ok((nodes.len(), results))
         })?;
+        let bare = asked == 1 && wanted.len() == 1;
         let (mut shown, mut failures) = (Vec::new(), Vec::new());
         for result in results {
             match result.and_then(|samples| {
+                for (target, sample) in &samples {
+                    if let Some(doubt) = sample.doubt.filter(|doubt| !bare || *doubt != Doubt::UnknownType) {
+                        let (node, signal) = (target.source.node, &target.source.signal);
+                        global.console().warn(&doubt::doubt(node, signal, doubt));
+                    }
+                }
                 samples.into_iter().map(|(target, sample)| self.show(target, &sample)).collect::<Result<Vec<_>, _>>()
             }) {
                 Ok(values) => shown.extend(values),
@@ -77,7 +86,6 @@ impl Read {
             let without: Vec<Failure> = without;
             without.iter().for_each(|failure| global.console().note(&ErrorMessage::from(failure).message));
         }
-        let bare = asked == 1 && wanted.len() == 1;
         let invalid = print(&shown, global.format, bare).map_err(stdout)?;
         if let Some(failure) = invalid {
             failures.push(failure);
@@ -105,7 +113,8 @@ impl Read {
                 (converted.map(Number::Real64), shown.unwrap_or_default(), to.to_string())
             }
         };
-        Ok(Shown { target, value, text, unit, status: sample.status })
+        let (status, doubt, raw) = (sample.status, sample.doubt, sample.raw);
+        Ok(Shown { target, value, text, unit, status, doubt, raw })
     }
 }
 
@@ -138,8 +147,14 @@ fn print(shown: &[Shown], format: Format, bare: bool) -> io::Result<Option<Failu
         Format::Text if bare => {
             if let [item] = shown {
                 if item.value.is_none() {
-                    let status = item.status.map_or("invalid", Status::as_str);
                     let source = &item.target.source;
+                    if item.doubt == Some(Doubt::UnknownType) {
+                        let raw: String = item.raw.bytes().iter().map(|byte| format!("{byte:02X}")).collect();
+                        let message = format!("{} (received 0x{raw})", doubt::unknown_type(&source.signal));
+                        let remedy = doubt::type_remedy(source.node, &source.signal);
+                        return Ok(Some(Failure::of_node(Kind::Usage, source.node, message).hint(remedy)));
+                    }
+                    let status = item.status.map_or("invalid", Status::as_str);
                     let message = format!("{} has no valid value: {status}", source.signal);
                     return Ok(Some(Failure::of_node(Kind::Unexpected, source.node, message)));
                 }

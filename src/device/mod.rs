@@ -6,6 +6,7 @@ pub mod description;
 pub mod dictionary;
 pub mod eds;
 pub mod nearest;
+pub mod profiles;
 pub mod quirk;
 pub mod scalar;
 pub mod sensor;

@@ -1,12 +1,13 @@
 //! Decodes TPDOs into samples, by mapping, data type, decimal digits and status.
 
-use super::layout::{Layout, Signal, Tpdo};
-use super::sample::{Number, Raw, Sample, Source, Status};
-use crate::bus::{Received, Stamp};
+use super::layout::{Layout, Signal, Tpdo, fits};
+pub use super::reading::{Reading, is_smallest};
+use super::sample::{Sample, Source};
+use crate::bus::Received;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{Field, lay_out};
-use crate::canopen::value::{DataType, Value};
+use crate::canopen::value::DataType;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
@@ -17,62 +18,19 @@ pub enum Wanted {
     Signal(String),
     /// The status of a signal: `pressure.status`.
     Status(String),
-    /// An object, without unit and decimal digits: `0x6130:1`.
-    Object(ObjectId),
+    /// An object by its address, with the type that the user states: `0x6130:1`, `0x6010:0/i16`.
+    Object(ObjectId, Option<DataType>),
 }
 
-/// How the bytes of one value become a sample.
-#[derive(Clone, Debug)]
-pub struct Reading {
-    /// The number of the source.
-    pub source: usize,
-    data_type: DataType,
-    digits: u8,
-    marker: bool,
-}
-
-impl Reading {
-    /// For the process value of a signal. `source` is the number of the source.
-    pub fn of_signal(signal: &Signal, data_type: DataType, source: usize) -> Reading {
-        Reading { source, data_type, digits: signal.digits.unwrap_or(0), marker: signal.marker }
-    }
-
-    /// For a number without unit and decimal digits.
-    pub fn plain(data_type: DataType, source: usize) -> Reading {
-        Reading { source, data_type, digits: 0, marker: false }
-    }
-
-    /// The data type of the value.
-    pub fn data_type(&self) -> DataType {
-        self.data_type
-    }
-
-    /// The sample for the bytes of a value and, if there are any, its status bits. `None` if the bytes do not fit the type.
-    pub fn sample(&self, at: Stamp, bytes: &[u8], status_bits: Option<u64>) -> Option<Sample> {
-        let value = self.data_type.decode(bytes).ok()?;
-        let number = Number::from_value(&value, self.digits)?;
-        let reported = status_bits.map(Status::from_bits);
-        let marked = !number.is_finite() || self.marker && is_smallest(&value, self.data_type);
-        let status = match reported {
-            Some((Status::Ok, _)) if marked => Some(Status::Invalid),
-            Some((status, _)) => Some(status),
-            None if marked => Some(Status::Invalid),
-            None if self.marker => Some(Status::Ok),
-            None => None,
-        };
-        let valid = !marked && reported.is_none_or(|(_, valid)| valid);
-        Some(Sample { at, source: self.source, value: valid.then_some(number), status, raw: Raw::new(bytes) })
-    }
-}
-
-/// Whether an integer is the smallest number of its type, which marks an overload (MH-4: -32768, -2147483648). Use it only for
-/// signals that have this marker.
-pub fn is_smallest(value: &Value, data_type: DataType) -> bool {
-    match (value, data_type) {
-        (Value::Integer(number), DataType::Integer(width)) => {
-            *number == i64::MIN >> (64 - 8 * u32::from(width.clamp(1, 8)))
+impl Wanted {
+    /// The name as in [`Source`]: `pressure`, `pressure.status`, `0x6010:0/i16`.
+    pub fn name(&self) -> String {
+        match self {
+            Wanted::Signal(name) => name.clone(),
+            Wanted::Status(name) => format!("{name}.status"),
+            Wanted::Object(object, None) => object.to_string(),
+            Wanted::Object(object, Some(data_type)) => format!("{object}/{data_type}"),
         }
-        _ => false,
     }
 }
 
@@ -174,8 +132,12 @@ impl Decoder {
             if let Some(signal) = layout.signals.iter().find(|signal| signal.is_value(object)) {
                 if wanted.is_empty() || is_wanted(&Wanted::Signal(signal.name.clone())) {
                     let status = fields.iter().find(|other| Some(other.entry.object) == signal.status).copied();
-                    let unit = signal.unit.map(|unit| unit.to_string()).unwrap_or_default();
-                    add(&signal.name, unit, &|source| Reading::of_signal(signal, data_type, source), status);
+                    add(
+                        &signal.name,
+                        unit_of(Some(signal)),
+                        &|source| Reading::of_signal(signal, data_type, source),
+                        status,
+                    );
                 }
             } else if let Some(signal) = layout.signals.iter().find(|signal| signal.status == Some(object)) {
                 if is_wanted(&Wanted::Status(signal.name.clone())) {
@@ -183,10 +145,22 @@ impl Decoder {
                     add(&name, String::new(), &|source| Reading::plain(data_type, source), None);
                 }
             } else if wanted.is_empty() && !is_dummy(object) {
-                add(&object.to_string(), String::new(), &|source| Reading::plain(data_type, source), None);
+                let reading = |source| Reading::of_object(layout, object, data_type, source);
+                add(&object.to_string(), unit_of(layout.signal_of(object)), &reading, None);
             }
-            if is_wanted(&Wanted::Object(object)) {
-                add(&object.to_string(), String::new(), &|source| Reading::plain(data_type, source), None);
+            for item in wanted {
+                if let Wanted::Object(wanted, stated) = item
+                    && *wanted == object
+                {
+                    let reading = |source| match *stated {
+                        Some(stated) => {
+                            Reading::plain(Some(stated).filter(|stated| fits(*stated, field.entry.bits)), source)
+                        }
+                        None => Reading::of_object(layout, object, data_type, source),
+                    };
+                    let signal = layout.signal_of(object).filter(|signal| stated.is_none() && !signal.is_value(object));
+                    add(&item.name(), unit_of(signal), &reading, None);
+                }
             }
         }
         TpdoDecoder { node: layout.node, length: bits.div_ceil(8), values, is_held: false, wrong_lengths: 0 }
@@ -244,15 +218,22 @@ fn is_dummy(object: ObjectId) -> bool {
 
 /// The source of a value of a node; `signal` gives the unit.
 pub fn source(node: NodeId, name: &str, signal: Option<&Signal>) -> Source {
-    let unit = signal.and_then(|signal| signal.unit).map(|unit| unit.to_string()).unwrap_or_default();
-    Source { node, signal: Arc::from(name), unit: Arc::from(unit) }
+    Source { node, signal: Arc::from(name), unit: Arc::from(unit_of(signal)) }
+}
+
+/// The unit of a signal in words; empty if it is unknown.
+fn unit_of(signal: Option<&Signal>) -> String {
+    signal.and_then(|signal| signal.unit).map(|unit| unit.to_string()).unwrap_or_default()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bus::Stamp;
     use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber};
     use crate::device::unit::Unit;
+    use crate::measure::layout::MeasuringRange;
+    use crate::measure::sample::Status;
 
     #[derive(Clone)]
     struct Node {
@@ -264,21 +245,28 @@ mod tests {
 
     impl Node {
         fn layout(&self) -> Layout<'_> {
-            Layout { node: self.id, model: self.model.as_deref(), signals: &self.signals, tpdos: &self.tpdos }
+            Layout {
+                node: self.id,
+                profile: Some(404),
+                model: self.model.as_deref(),
+                signals: &self.signals,
+                tpdos: &self.tpdos,
+            }
         }
     }
 
-    fn node(value: (ObjectId, DataType), words: &[u32], signal: impl Fn(&mut Signal)) -> Node {
+    fn node((object, data_type): (ObjectId, DataType), words: &[u32], signal: impl Fn(&mut Signal)) -> Node {
         let id = NodeId::new(1).expect("a node-ID");
         let mut pressure = Signal {
             name: "pressure".into(),
             channel: 1,
-            value,
+            value: (object, Some(data_type)),
             also: vec![ObjectId::new(0x2090, 0)],
             status: None,
             marker: false,
             unit: Some(Unit(0x004e_0000)),
             digits: Some(3),
+            range: MeasuringRange::Unknown,
         };
         signal(&mut pressure);
         let tpdo = Tpdo {
@@ -328,7 +316,7 @@ mod tests {
         for other in ["181#", "181#0000803F", "181#0000803F0000", "181#R5", "00000181#0000803F00", "182#0000803F00"] {
             assert_eq!(rows(&mh4, &[], other), [], "{other}");
         }
-        let asked = [Wanted::Status("pressure".into()), Wanted::Object(ObjectId::new(0x6150, 1))];
+        let asked = [Wanted::Status("pressure".into()), Wanted::Object(ObjectId::new(0x6150, 1), None)];
         assert_eq!(rows(&mh4, &asked, "181#0000C07F03"), [row("pressure.status", "3", ""), row("0x6150:1", "3", "")]);
     }
 
@@ -359,8 +347,8 @@ mod tests {
     fn dps_integer_has_digits_and_no_status() {
         let dps = node((ObjectId::new(0x6130, 1), DataType::Integer(4)), &[0x6130_0120], |_| {});
         let mut dps = dps;
-        // Without a description 6130h is REAL32 by the standard.
-        assert_eq!(rows(&dps, &[], "181#50C30000"), [row("pressure", "7.0065e-41", "")]);
+        // Without a description 6130h is REAL32 by the profile, and the integer is no such number.
+        assert_eq!(rows(&dps, &[], "181#50C30000"), [row("pressure", "", "invalid")]);
         dps.model = Some(Arc::new(
             Model::from_toml(
                 "name='x'\ntitle=''\nvendor=''\nsource=''\n[identify]\n[[object]]\nat='0x6130:1-1'\nname='pv'\ntype='i32'\naccess='ro'",
@@ -387,11 +375,39 @@ mod tests {
     #[test]
     fn other_objects_of_a_signal_and_objects_without_signal() {
         let d20 = node(REAL, &[0x2090_0020], |_| {});
-        // Without a description 2090h's type is not known; it is the signal all the same.
-        assert_eq!(rows(&d20, &[], "181#D2040000"), [row("pressure", "1.234", "")]);
+        // Without a description the type of 2090h is unknown: no value. It is the signal all the same.
+        assert_eq!(rows(&d20, &[], "181#D2040000"), [row("pressure", "", "")]);
         let raw = node(REAL, &[0x7100_0110, 0x0005_0008], |_| {});
         assert_eq!(rows(&raw, &[], "181#100E00"), [row("0x7100:1", "3600", "")]);
         // The D-20-9 sends no data while its mapping is switched off.
         assert_eq!(rows(&d20, &[], "181#"), []);
+    }
+
+    #[test]
+    fn unknown_type_has_no_value_and_the_bytes_as_received() {
+        let mut other = node(REAL, &[0x6010_0010, 0x2100_0120], |_| {});
+        other.signals.clear();
+        assert_eq!(rows(&other, &[], "181#2EFB0000AC41"), [row("0x6010:0", "", ""), row("0x2100:1", "", "")]);
+        let stated = |object, data_type| Wanted::Object(object, Some(data_type));
+        let wanted = [
+            stated(ObjectId::new(0x6010, 0), DataType::Integer(2)),
+            stated(ObjectId::new(0x2100, 1), DataType::Real32),
+            // The type has another width than the mapped bits.
+            stated(ObjectId::new(0x6010, 0), DataType::Integer(4)),
+        ];
+        let found = rows(&other, &wanted, "181#2EFB0000AC41");
+        let expected = [("0x6010:0/i16", "-1234"), ("0x6010:0/i32", ""), ("0x2100:1/r32", "21.5")];
+        assert_eq!(found, expected.map(|(signal, value)| row(signal, value, "")));
+    }
+
+    #[test]
+    fn net_value_has_the_unit_and_digits_of_its_channel() {
+        let real = node(REAL, &[0x6140_0120], |_| {});
+        assert_eq!(rows(&real, &[], "181#3333C442"), [row("0x6140:1", "98.1", "")]);
+        let integer = node(REAL, &[0x9140_0120], |_| {});
+        assert_eq!(rows(&integer, &[], "181#D2040000"), [row("0x9140:1", "1.234", "")]);
+        let mut decoder = Decoder::default();
+        decoder.add(integer.layout(), &[]);
+        assert_eq!(&*decoder.sources()[0].unit, "bar");
     }
 }

@@ -6,6 +6,7 @@ use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
 use crate::canopen::value::DataType;
 use crate::device::catalog::Model;
 use crate::device::unit::Unit;
+use crate::device::{profiles, standard};
 
 /// One measured signal of a node.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,8 +15,8 @@ pub struct Signal {
     pub name: String,
     /// The CiA 404 channel.
     pub channel: u8,
-    /// The object that holds the process value, and its type.
-    pub value: (ObjectId, DataType),
+    /// The object that holds the process value, and its type; `None` if no source states the type.
+    pub value: (ObjectId, Option<DataType>),
     /// Other objects that hold the same process value.
     pub also: Vec<ObjectId>,
     /// The status object (6150h), if the node has one.
@@ -26,6 +27,20 @@ pub struct Signal {
     pub unit: Option<Unit>,
     /// The decimal digits (6132h); `None` if they are unknown.
     pub digits: Option<u8>,
+    /// The measuring range of the device.
+    pub range: MeasuringRange,
+}
+
+/// What is known of the measuring range of a signal.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum MeasuringRange {
+    /// Nothing.
+    #[default]
+    Unknown,
+    /// Its limits are unknown, and the manual warns that narrow integers may be clipped.
+    MayClip,
+    /// The start and the end (6148h, 6149h), in the unit of the signal.
+    Known(f64, f64),
 }
 
 impl Signal {
@@ -68,6 +83,8 @@ pub struct Tpdo {
 pub struct Layout<'a> {
     /// The node-ID.
     pub node: NodeId,
+    /// The device profile, the low word of 1000h; `None` if it is unknown.
+    pub profile: Option<u32>,
     /// The device description, if the node was recognised or the user named one.
     pub model: Option<&'a Model>,
     /// The signals.
@@ -77,15 +94,82 @@ pub struct Layout<'a> {
 }
 
 impl Layout<'_> {
-    /// The type of a mapped object of `bits` bits.
-    ///
-    /// It comes from the description, else from CiA 404 for a process value. If neither fits the number of bits, it is
-    /// an unsigned number.
-    pub fn mapped_type(&self, object: ObjectId, bits: u8) -> DataType {
-        let described = self.model.and_then(|model| model.dictionary.get(object)).map(|entry| entry.data_type);
-        let fits = |data_type: &DataType| data_type.width() == Some(usize::from(bits.div_ceil(8)));
-        let standard =
-            PROCESS_VALUES.iter().find(|&&(index, _)| index == object.index).map(|&(_, data_type)| data_type);
-        described.or(standard).filter(fits).unwrap_or(DataType::Unsigned(bits.div_ceil(8).clamp(1, 8)))
+    /// The type of an object: from the description or EDS file, else from the device profile, else from the standard.
+    /// `None` if no source states it.
+    pub fn data_type(&self, object: ObjectId) -> Option<DataType> {
+        let described = self.model.and_then(|model| {
+            let is_open = model.untyped.contains(&object);
+            model.dictionary.get(object).filter(|_| !is_open).map(|entry| entry.data_type)
+        });
+        let of_profile = || self.profile.and_then(|profile| profiles::data_type(profile, object));
+        described.or_else(of_profile).or_else(|| standard::entry(object).map(|entry| entry.data_type))
+    }
+
+    /// The type of a mapped object of `bits` bits. `None` if no source states it, or if the type has another width.
+    pub fn mapped_type(&self, object: ObjectId, bits: u8) -> Option<DataType> {
+        self.data_type(object).filter(|data_type| fits(*data_type, bits))
+    }
+
+    /// The signal whose unit and decimal digits an object has: a process value of CiA 404 in the channel of the signal.
+    pub fn signal_of(&self, object: ObjectId) -> Option<&Signal> {
+        let is_process_value = profiles::meaning(object) == Some(profiles::Meaning::Process);
+        let is_404 = self.profile == Some(profiles::MEASURING) && is_process_value;
+        self.signals.iter().find(|signal| is_404 && signal.channel == object.sub && object.sub > 0)
+    }
+}
+
+/// A signal that is sent as an integer which is too narrow for its measuring range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NarrowValue {
+    /// The signal.
+    pub signal: String,
+    /// The object that carries it.
+    pub object: ObjectId,
+    /// The largest value of its type, in the unit of the signal.
+    pub largest: f64,
+    /// The unit.
+    pub unit: Option<Unit>,
+    /// The end of the measuring range that is farther from zero; `None` if it is unknown.
+    pub range_end: Option<f64>,
+}
+
+impl Layout<'_> {
+    /// Signals whose values in valid TPDOs may be clipped.
+    pub fn narrow_values(&self) -> Vec<NarrowValue> {
+        let valid = self.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
+        let entries = valid.flat_map(|tpdo| &tpdo.mapping);
+        let narrow = entries.filter_map(|entry| {
+            let signal = self.signals.iter().find(|signal| signal.is_value(entry.object))?;
+            signal.narrow_value(entry.object, self.mapped_type(entry.object, entry.bits)?)
+        });
+        narrow.collect()
+    }
+}
+
+impl Signal {
+    /// Whether an object of this type is too narrow for the measuring range of the signal.
+    pub fn narrow_value(&self, object: ObjectId, data_type: DataType) -> Option<NarrowValue> {
+        let DataType::Integer(width @ 1..=3) = data_type else { return None };
+        let digits = self.digits.unwrap_or(0).min(9);
+        let largest = ((1i64 << (8 * u32::from(width) - 1)) - 1) as f64 / 10f64.powi(i32::from(digits));
+        let range_end = match self.range {
+            MeasuringRange::Unknown => return None,
+            MeasuringRange::MayClip => None,
+            MeasuringRange::Known(start, end) => Some(if start.abs() > end.abs() { start } else { end }),
+        };
+        let is_narrow = range_end.is_none_or(|end| end.abs() > largest);
+        let (signal, unit) = (self.name.clone(), self.unit);
+        is_narrow.then_some(NarrowValue { signal, object, largest, unit, range_end })
+    }
+}
+
+/// Whether a mapped field of `bits` bits holds a value of this type. Unsigned numbers may have fewer bits.
+pub fn fits(data_type: DataType, bits: u8) -> bool {
+    let width = data_type.width().map(|width| 8 * width);
+    match data_type {
+        DataType::Boolean | DataType::Unsigned(_) => {
+            width.is_some_and(|width| (1..=width).contains(&usize::from(bits)))
+        }
+        _ => width == Some(usize::from(bits)),
     }
 }

@@ -89,6 +89,8 @@ pub enum Status {
     OverloadHigh,
     /// Below the measuring range.
     OverloadLow,
+    /// The value is at the end of its integer type, and the measuring range goes further.
+    Clipped,
 }
 
 impl Status {
@@ -112,6 +114,7 @@ impl Status {
             Status::Invalid => "invalid",
             Status::OverloadHigh => "overload-high",
             Status::OverloadLow => "overload-low",
+            Status::Clipped => "clipped",
         }
     }
 }
@@ -169,6 +172,23 @@ pub struct Sample {
     pub status: Option<Status>,
     /// The bytes in wire order.
     pub raw: Raw,
+    /// Why the value is missing or may be wrong.
+    pub doubt: Option<Doubt>,
+}
+
+/// Why a value is missing or may be wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Doubt {
+    /// No source states the type of the object. There is no value.
+    UnknownType,
+    /// The decimal digits (6132h) are above 9. There is no value.
+    ImpossibleDigits(u8),
+    /// The decimal digits (6132h) are unknown. The value is the integer.
+    UnknownDigits,
+    /// The bytes are a REAL32 next to zero, as an integer would look. There is no value.
+    LooksLikeInteger,
+    /// The value is at the end of its integer type, and the measuring range is unknown. The value stays.
+    EndOfType,
 }
 
 #[cfg(test)]

@@ -90,11 +90,17 @@ impl Node {
 
     /// The part that decoding needs.
     pub fn layout(&self) -> Layout<'_> {
-        Layout { node: self.id, model: self.model.as_deref(), signals: &self.signals, tpdos: &self.tpdos }
+        Layout {
+            node: self.id,
+            profile: self.identity.profile(),
+            model: self.model.as_deref(),
+            signals: &self.signals,
+            tpdos: &self.tpdos,
+        }
     }
 
     /// The type of a mapped object: see [`Layout::mapped_type`].
-    pub fn mapped_type(&self, object: ObjectId, bits: u8) -> DataType {
+    pub fn mapped_type(&self, object: ObjectId, bits: u8) -> Option<DataType> {
         self.layout().mapped_type(object, bits)
     }
 

@@ -53,11 +53,13 @@ impl Node {
         self.entry(object).filter(|_| !is_open).map(|entry| entry.data_type)
     }
 
-    /// The type of an object of the device profile: as [`Node::known_type`], else by the first digit of the index
-    /// (CiA 404), else UNSIGNED32.
+    /// The type of an object that a setting needs: as [`Layout::data_type`], else by the first digit of the index
+    /// (CiA 404), else UNSIGNED32. Do not use it for measured values.
+    ///
+    /// [`Layout::data_type`]: crate::measure::layout::Layout::data_type
     pub fn data_type(&self, object: ObjectId) -> DataType {
-        if let Some(entry) = self.entry(object) {
-            return entry.data_type;
+        if let Some(data_type) = self.layout().data_type(object) {
+            return data_type;
         }
         let family = PROCESS_VALUES.iter().find(|(index, _)| index >> 12 == object.index >> 12);
         family.map_or(DataType::Unsigned(4), |&(_, data_type)| data_type)

@@ -16,7 +16,8 @@ use crate::device::description::SignalEntry;
 use crate::device::quirk::Quirk;
 use crate::device::unit::Unit;
 use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
-use crate::measure::layout::{PROCESS_VALUES, Signal, Tpdo};
+use crate::measure::layout::{MeasuringRange, PROCESS_VALUES, Signal, Tpdo};
+use crate::measure::sample::Number;
 pub use background::BackgroundSurvey;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -106,6 +107,7 @@ pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overri
     read_tpdos(master, &mut instruments)?;
     find_signals(master, &mut instruments)?;
     read_units(master, &mut instruments)?;
+    read_ranges(master, &mut instruments)?;
     Ok(instruments)
 }
 
@@ -260,43 +262,36 @@ fn find_signals<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), 
         };
         known.sort_unstable();
         known.dedup();
-        let (index, data_type) = family.map_or(PROCESS_VALUES[0], |(&family, _)| family);
+        let (index, _) = family.map_or(PROCESS_VALUES[0], |(&family, _)| family);
         instrument.signals = known
             .into_iter()
             .map(|channel| Signal {
                 name: format!("ch{channel}"),
                 channel,
-                value: (
-                    ObjectId::new(index, channel),
-                    instrument.mapped_type(ObjectId::new(index, channel), bits(data_type)),
-                ),
+                value: (ObjectId::new(index, channel), instrument.layout().data_type(ObjectId::new(index, channel))),
                 also: Vec::new(),
                 status: Some(ObjectId::new(0x6150, channel)),
                 marker: false,
                 unit: None,
                 digits: None,
+                range: MeasuringRange::Unknown,
             })
             .collect();
     }
     Ok(())
 }
 
-fn bits(data_type: DataType) -> u8 {
-    data_type.width().and_then(|width| u8::try_from(8 * width).ok()).unwrap_or(32)
-}
-
 fn described(instrument: &Node, entry: &SignalEntry) -> Signal {
-    let model = instrument.model.as_ref();
-    let known = model.and_then(|model| model.dictionary.get(entry.value)).map(|entry| entry.data_type);
     Signal {
         name: entry.name.clone(),
         channel: entry.channel,
-        value: (entry.value, known.unwrap_or(DataType::Real32)),
+        value: (entry.value, instrument.layout().data_type(entry.value)),
         also: entry.also.clone(),
         status: entry.status,
         marker: entry.marker,
         unit: None,
         digits: None,
+        range: if entry.may_clip { MeasuringRange::MayClip } else { MeasuringRange::Unknown },
     }
 }
 
@@ -325,6 +320,62 @@ fn read_units<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A:
             values.next().flatten().as_ref().and_then(Value::as_u64).and_then(|digits| u8::try_from(digits).ok());
     }
     Ok(())
+}
+
+/// Reads the measuring ranges (6148h, 6149h) where a value depends on them: an integer that may be too narrow, and a
+/// described signal without a status.
+fn read_ranges<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
+    let mut wanted: Vec<(usize, usize, [(ObjectId, DataType); 2])> = Vec::new();
+    for (at, node) in instruments.iter().enumerate() {
+        for (number, signal) in node.signals.iter().enumerate() {
+            if !needs_range(node, signal) {
+                continue;
+            }
+            let entries = node.model.iter().flat_map(|model| &model.description.signals);
+            let entry = entries.into_iter().find(|entry| entry.name == signal.name);
+            let object = |described: Option<ObjectId>, low: u16| {
+                let object = described.unwrap_or(ObjectId::new(low, signal.channel));
+                Some((object, node.layout().data_type(object)?))
+            };
+            let start = object(entry.and_then(|entry| entry.span_start), 0x6148);
+            let end = object(entry.and_then(|entry| entry.span_end), 0x6149);
+            if let Some((start, end)) = start.zip(end) {
+                wanted.push((at, number, [start, end]));
+            }
+        }
+    }
+    let items: Vec<Item> = wanted
+        .iter()
+        .flat_map(|(at, _, objects)| {
+            let node = instruments[*at].id;
+            objects.map(|(object, data_type)| (node, object, data_type))
+        })
+        .collect();
+    let values = read_known(master, &items)?;
+    for (&(at, number, _), ends) in wanted.iter().zip(values.chunks(2)) {
+        let signal = &mut instruments[at].signals[number];
+        let digits = signal.digits.unwrap_or(0);
+        let number = |value: &Option<Value>| Number::from_value(value.as_ref()?, digits).map(Number::as_f64);
+        if let [start, end] = ends
+            && let Some((start, end)) = number(start).zip(number(end))
+            && start.is_finite()
+            && end.is_finite()
+            && start != end
+        {
+            signal.range = MeasuringRange::Known(start, end);
+        }
+    }
+    Ok(())
+}
+
+/// Whether the samples of a signal depend on its measuring range.
+fn needs_range(node: &Node, signal: &Signal) -> bool {
+    let is_narrow = |data_type: Option<DataType>| matches!(data_type, Some(DataType::Integer(1..=3)));
+    let mut mapped = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
+    let has_no_status = node.model.is_some() && signal.status.is_none() && !signal.marker;
+    has_no_status
+        || is_narrow(signal.value.1)
+        || mapped.any(|entry| signal.is_value(entry.object) && is_narrow(node.mapped_type(entry.object, entry.bits)))
 }
 
 /// Reads the identity of a node whose description was not looked for yet.

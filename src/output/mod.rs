@@ -3,6 +3,7 @@
 pub mod check_progress;
 pub mod console;
 pub mod csv;
+pub mod doubt;
 mod elapsed;
 pub mod events;
 pub mod failure;

@@ -11,7 +11,7 @@ use crate::measure::expression::Expression;
 use crate::measure::expression::bind::AvailableSignals;
 use crate::measure::expression::evaluator::Evaluator;
 use crate::measure::expression::verdict::{MissingData, Outcome, Reason, Verdict};
-use crate::measure::sample::{Sample, Source};
+use crate::measure::sample::{Doubt, Sample, Source};
 use crate::node::survey::survey_each;
 use crate::node::{Node, Overrides};
 use crate::tasks::Failure;
@@ -127,11 +127,16 @@ fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<Chec
     let sources: Vec<Source> = all.iter().map(|target| target.source.clone()).collect();
     let mut answers = master.transfer(all.iter().flat_map(requests).collect(), &mut |_| {})?.into_iter();
     let mut samples: Vec<Sample> = Vec::new();
+    let mut remarks = Vec::new();
     for target in &all {
         let value = answers.next();
         let status = target.status.and_then(|_| answers.next());
         match value.map(|value| sample(target, value, status)) {
-            Some(Ok(sample)) => samples.push(sample),
+            Some(Ok(sample)) => {
+                let name = target.source.signal.to_string();
+                remarks.extend(sample.doubt.map(|doubt| Remark::Doubt(target.source.node, name, doubt)));
+                samples.push(sample);
+            }
             Some(Err(error)) => {
                 let (node, signal) = (target.source.node, Some(target.source.signal.to_string()));
                 missing.push(MissingData { node, signal, reason: Reason::Failed(failures.len()) });
@@ -144,7 +149,7 @@ fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<Chec
     let verdicts = evaluator.verdicts(None, &missing);
     let started = samples.first().map(|sample| sample.at);
     let length = started.zip(samples.last()).map_or(Duration::ZERO, |(first, last)| last.at.mono.since(first.mono));
-    Ok(CheckReport { verdicts, started, length, failures, remarks: Vec::new() })
+    Ok(CheckReport { verdicts, started, length, failures, remarks })
 }
 
 /// The objects to read of all nodes.
@@ -154,10 +159,24 @@ fn wanted_targets(nodes: &[Node], evaluator: &Evaluator) -> Result<Vec<Target>, 
         let wanted = evaluator.wanted_of(node.id);
         // An empty list would select all signals.
         if !wanted.is_empty() {
-            all.extend(targets(node, &wanted, &mut number)?);
+            let own = targets(node, &wanted, &mut number)?;
+            refuse_unknown_types(&own)?;
+            all.extend(own);
         }
     }
     Ok(all)
+}
+
+/// A verdict needs a value, and a value needs a type.
+fn refuse_unknown_types(targets: &[Target]) -> Result<(), Failure> {
+    match targets.iter().find(|target| target.reading.data_type().is_none()) {
+        Some(target) => Err(unknown_type(&target.source)),
+        None => Ok(()),
+    }
+}
+
+fn unknown_type(source: &Source) -> Failure {
+    Failure::at(source.node, CheckFailure::UnknownType { signal: source.signal.to_string() })
 }
 
 /// Records samples as `log` does, and evaluates each of them.
@@ -243,6 +262,13 @@ impl<'a> Checker<'a> {
                 return ControlFlow::Break(());
             }
         }
+        let has_no_type = |sample: &&Sample| sample.doubt == Some(Doubt::UnknownType);
+        for source in samples.iter().filter(has_no_type).filter_map(|sample| sources.get(sample.source)) {
+            if self.evaluator.wanted_of(source.node).iter().any(|wanted| wanted.name() == *source.signal) {
+                self.failure = Some(unknown_type(source));
+                return ControlFlow::Break(());
+            }
+        }
         self.started = self.started.or(samples.first().map(|sample| sample.at));
         self.evaluator.add(samples, sources);
         ControlFlow::Continue(())
@@ -274,6 +300,7 @@ impl Observer for Checker<'_> {
         let available = AvailableSignals::from_layouts(nodes.iter().map(Node::layout));
         self.evaluator.bind(&self.nodes, &available, self.skip_unsupported, &[])?;
         self.is_bound = true;
+        wanted_targets(nodes, &self.evaluator)?;
         self.observer.begin(nodes)
     }
 

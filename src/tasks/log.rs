@@ -229,6 +229,9 @@ pub fn log(
     recording.excuse_nodes_without_signals();
     observer.sources(recording.decoder.sources())?;
     recording.report_shared_cob_ids(master.bus().now(), observer);
+    if recording.poll.is_none() {
+        recording.report_narrow_values(master.bus().now(), observer);
+    }
     master.listen(&recording.filters())?;
     // Nodes may restart between their survey and the recording.
     let mut restarted = BTreeSet::new();

@@ -68,25 +68,29 @@ pub fn targets(instrument: &Node, wanted: &[Wanted], number: &mut usize) -> Resu
                     })?;
                     plain(instrument, object, &format!("{name}.status"), take())
                 }
-                Wanted::Object(object) => plain(instrument, *object, &object.to_string(), take()),
+                Wanted::Object(object, Some(stated)) => {
+                    typed(instrument, *object, &item.name(), Reading::plain(Some(*stated), take()))
+                }
+                Wanted::Object(object, None) => plain(instrument, *object, &item.name(), take()),
             })
         })
         .collect()
 }
 
+/// The target for an object by its address.
 fn plain(instrument: &Node, object: ObjectId, name: &str, number: usize) -> Target {
-    let entry = instrument.model.as_ref().and_then(|model| model.dictionary.get(object));
-    let data_type = entry.map(|entry| entry.data_type).unwrap_or_else(|| match object.index {
-        0x6150 => DataType::Unsigned(1),
-        _ => instrument.mapped_type(object, 32),
-    });
+    let layout = instrument.layout();
+    let reading = Reading::of_object(layout, object, layout.data_type(object), number);
+    let signal = layout.signal_of(object).filter(|signal| !signal.is_value(object));
     Target {
-        source: source(instrument.id, name, None),
-        unit: None,
-        object,
-        status: None,
-        reading: Reading::plain(data_type, number),
+        source: source(instrument.id, name, signal),
+        unit: signal.and_then(|signal| signal.unit),
+        ..typed(instrument, object, name, reading)
     }
+}
+
+fn typed(instrument: &Node, object: ObjectId, name: &str, reading: Reading) -> Target {
+    Target { source: source(instrument.id, name, None), unit: None, object, status: None, reading }
 }
 
 pub(super) fn find<'a>(instrument: &'a Node, name: &str) -> Result<&'a Signal, Failure> {
@@ -109,7 +113,19 @@ pub fn sample(
 ) -> Result<Sample, SdoError> {
     let node = target.source.node;
     let answer = value?;
-    let (number, _) = answer.value(node, target.object, Some(target.reading.data_type()))?;
+    let not_a_number = || SdoError {
+        node,
+        object: target.object,
+        operation: crate::master::Operation::Read,
+        failure: SdoFailure::NotANumber,
+    };
+    let Some(data_type) = target.reading.data_type() else {
+        // Bytes without a stated type stay bytes.
+        let bytes = answer.uploaded.as_ref().map(|uploaded| uploaded.bytes.as_slice()).unwrap_or_default();
+        let sample = target.reading.sample(answer.at, bytes, None).filter(|_| bytes.len() <= 8);
+        return sample.ok_or_else(not_a_number);
+    };
+    let (number, _) = answer.value(node, target.object, Some(data_type))?;
     let bits = match status {
         None | Some(Err(SdoError { failure: SdoFailure::Refused(_), .. })) => None,
         Some(Err(error)) => return Err(error),
@@ -118,13 +134,8 @@ pub fn sample(
             answer.value(node, object, Some(DataType::Unsigned(1)))?.0.as_u64()
         }
     };
-    let bytes = wire_bytes(&number, target.reading.data_type());
-    target.reading.sample(answer.at, &bytes, bits).ok_or(SdoError {
-        node,
-        object: target.object,
-        operation: crate::master::Operation::Read,
-        failure: SdoFailure::NotANumber,
-    })
+    let bytes = wire_bytes(&number, data_type);
+    target.reading.sample(answer.at, &bytes, bits).ok_or_else(not_a_number)
 }
 
 /// The value's bytes in the width of its type: an answer may have had more or fewer.

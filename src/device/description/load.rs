@@ -179,10 +179,11 @@ fn signal(table: &mut Table<'_>) -> Option<SignalEntry> {
     let also = table.list("also");
     let (unit, digits, status) = (table.optional("unit"), table.optional("digits"), table.optional("status"));
     let marker = table.or_default("marker");
+    let may_clip = table.or_default("may_clip");
     let (span_start, span_end) = (table.optional("span_start"), table.optional("span_end"));
     table.finish();
     let (name, channel, value) = (name?, channel?, value?);
-    Some(SignalEntry { name, channel, value, also, unit, digits, status, marker, span_start, span_end })
+    Some(SignalEntry { name, channel, value, also, unit, digits, status, marker, may_clip, span_start, span_end })
 }
 
 fn object(table: &mut Table<'_>) -> Option<ObjectEntry> {

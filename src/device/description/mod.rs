@@ -251,6 +251,8 @@ pub struct SignalEntry {
     pub status: Option<ObjectId>,
     /// Whether an overload replaces the value itself (REAL32 NaN, smallest integer).
     pub marker: bool,
+    /// Whether the manual warns that narrow integers may be clipped: their largest number is then no value.
+    pub may_clip: bool,
     /// The object with the start of the measuring range (6148h), if the device has it.
     pub span_start: Option<ObjectId>,
     /// The object with the end of the measuring range (6149h), if the device has it.

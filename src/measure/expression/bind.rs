@@ -74,7 +74,7 @@ impl AvailableSignals {
     fn find(&self, node: NodeId, signal: &SignalName) -> Option<Option<Unit>> {
         let name = signal.name();
         let known = self.signals.iter().find(|known| known.node == node && known.name == name);
-        let is_readable = || matches!(signal.what, Wanted::Object(_)) && self.readable.contains(&node);
+        let is_readable = || matches!(signal.what, Wanted::Object(..)) && self.readable.contains(&node);
         known.map(|known| known.unit).or_else(|| is_readable().then_some(None))
     }
 

@@ -4,6 +4,7 @@ use super::LocatedError;
 use super::tree::{Position, SignalName};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
 use crate::measure::decode::Wanted;
 
 /// A token of an expression.
@@ -103,7 +104,9 @@ fn number_or_signal(text: &str, at: Position) -> Result<(Token, usize), LocatedE
     let rest = &text[word.len()..];
     if rest.starts_with(':') {
         let (object, length) = object(text, at)?;
-        return Ok((Token::Signal(SignalName { node: None, what: Wanted::Object(object), at }), length));
+        let (stated, type_length) = stated_type(&text[length..]);
+        let what = Wanted::Object(object, stated);
+        return Ok((Token::Signal(SignalName { node: None, what, at }), length + type_length));
     }
     if let Some(signal) = rest.strip_prefix('.')
         && is_signal(signal)
@@ -128,6 +131,17 @@ fn number_or_signal(text: &str, at: Position) -> Result<(Token, usize), LocatedE
     let number = text[..length].parse().ok().filter(|number: &f64| number.is_finite());
     let number = number.ok_or_else(|| LocatedError::new(at, format!("{} is too large", &text[..length])))?;
     Ok((Token::Number(number), length))
+}
+
+/// The type after an object, and the length of its text: `/i16`. Anything else after the slash is a divisor.
+fn stated_type(text: &str) -> (Option<DataType>, usize) {
+    let Some(word) = text.strip_prefix('/').map(alphanumeric) else { return (None, 0) };
+    match word.parse().ok().filter(|data_type: &DataType| data_type.is_number()) {
+        Some(data_type) if word.starts_with(|first: char| first.is_ascii_alphabetic()) => {
+            (Some(data_type), 1 + word.len())
+        }
+        _ => (None, 0),
+    }
 }
 
 /// The letters and digits at the start of a text.

@@ -108,7 +108,7 @@ fn signal() -> impl Strategy<Value = Quantity> {
             .prop_filter("no keyword", |name| !["in", "and", "or", "not"].contains(&name.as_str()))
             .prop_map(Wanted::Signal),
         "z[a-z]{0,3}".prop_map(Wanted::Status),
-        (any::<u16>(), any::<u8>()).prop_map(|(index, sub)| Wanted::Object(ObjectId::new(index, sub))),
+        (any::<u16>(), any::<u8>()).prop_map(|(index, sub)| Wanted::Object(ObjectId::new(index, sub), None)),
     ];
     (proptest::option::of(1u8..=127), what).prop_map(|(node, what)| {
         Quantity::Signal(SignalName { node: node.and_then(|node| NodeId::new(node).ok()), what, at: Position(0) })
@@ -241,7 +241,7 @@ fn sample(at_ms: u64, source: usize, value: Option<f64>) -> Sample {
     let since = Duration::from_millis(at_ms);
     let at = Stamp { mono: Mono::at(since), wall: Wall::at(since) };
     let status = Some(if value.is_some() { Status::Ok } else { Status::OverloadHigh });
-    Sample { at, source, value: value.map(Number::Real64), status, raw: Raw::new(&[]) }
+    Sample { at, source, value: value.map(Number::Real64), status, raw: Raw::new(&[]), doubt: None }
 }
 
 /// The verdict on these values. NaN is an invalid value.

@@ -31,11 +31,7 @@ pub struct SignalName {
 impl SignalName {
     /// The name without the node, as in [`crate::measure::sample::Source`].
     pub fn name(&self) -> String {
-        match &self.what {
-            Wanted::Signal(name) => name.clone(),
-            Wanted::Status(name) => format!("{name}.status"),
-            Wanted::Object(object) => object.to_string(),
-        }
+        self.what.name()
     }
 }
 

@@ -123,6 +123,8 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::SyncsOmittedWhileDown(count) => format!("{count} SYNC omitted: the interface was down"),
         Remark::SyncsOmittedTooSlow(count) => format!("{count} SYNC omitted: the program was stopped or too slow"),
         Remark::SmallReceiveBuffer(buffer) => format!("frames were dropped: {}", buffer_text(*buffer)),
+        Remark::Doubt(node, signal, doubt) => crate::output::doubt::doubt(*node, signal, *doubt),
+        Remark::MayClip(node, value) => crate::output::doubt::may_clip(*node, value),
         Remark::NoMeasurements(node, reason) => {
             format!("node {node}: no measurements: {}", reason_text(*reason))
         }

@@ -2,6 +2,7 @@
 
 use super::Words;
 use crate::measure::expression::verdict::Verdict;
+use crate::output::doubt;
 use crate::output::verdict::findings;
 use crate::tasks::Failure;
 use crate::tasks::check::CheckFailure;
@@ -10,7 +11,7 @@ use crate::tasks::check::CheckFailure;
 const MAX_LISTED: usize = 3;
 
 /// The message and the hint for a cause.
-pub(super) fn words(_failure: &Failure, cause: &CheckFailure) -> Words {
+pub(super) fn words(failure: &Failure, cause: &CheckFailure) -> Words {
     match cause {
         CheckFailure::NotSatisfied { failed, all } => {
             let mut list: Vec<String> = failed.iter().take(MAX_LISTED).map(describe).collect();
@@ -18,6 +19,13 @@ pub(super) fn words(_failure: &Failure, cause: &CheckFailure) -> Words {
                 list.push(format!("{} more", failed.len() - MAX_LISTED));
             }
             Words::new(format!("{} of {all} {} failed: {}", failed.len(), checks(*all), list.join("; ")))
+        }
+        CheckFailure::UnknownType { signal } => {
+            let words = Words::new(doubt::unknown_type(signal));
+            match failure.node {
+                Some(node) => words.hint(doubt::type_remedy(node, signal)),
+                None => words,
+            }
         }
         CheckFailure::NoData { without, all } => Words::new(format!("no data for {without} of {all} {}", checks(*all))),
     }

@@ -50,7 +50,7 @@ fn at(us: u64) -> Stamp {
 }
 
 fn sample(at_us: u64, value: Option<Number>, status: Option<Status>, raw: &[u8]) -> Sample {
-    Sample { at: at(at_us), source: 0, value, status, raw: Raw::new(raw) }
+    Sample { at: at(at_us), source: 0, value, status, raw: Raw::new(raw), doubt: None }
 }
 
 fn source(signal: &str, unit: &str) -> Source {

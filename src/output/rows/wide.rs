@@ -169,7 +169,7 @@ mod tests {
 
     fn sample(ms: u64, source: usize, value: i128) -> Sample {
         let value = Some(Number::Decimal { mantissa: value, digits: 0 });
-        Sample { at: at(ms), source, value, status: None, raw: Raw::new(&[]) }
+        Sample { at: at(ms), source, value, status: None, raw: Raw::new(&[]), doubt: None }
     }
 
     /// `12: 1 -`: the time in milliseconds and the cells.

@@ -14,6 +14,11 @@ pub enum CheckFailure {
         /// The number of all verdicts.
         all: usize,
     },
+    /// No source states the type of an object that an expression needs.
+    UnknownType {
+        /// The object as the user named it.
+        signal: String,
+    },
     /// There is no data for at least one expression.
     NoData {
         /// The number of verdicts without data.
@@ -29,6 +34,7 @@ impl CheckFailure {
         match self {
             CheckFailure::NotSatisfied { .. } => Kind::CheckFailed,
             CheckFailure::NoData { .. } => Kind::NoAnswer,
+            CheckFailure::UnknownType { .. } => Kind::Usage,
         }
     }
 }

@@ -24,7 +24,7 @@ pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), F
             };
             match item {
                 Wanted::Signal(name) => node.mapped_signals().any(|signal| signal.name == *name),
-                Wanted::Object(object) => entries().any(|entry| entry.object == *object),
+                Wanted::Object(object, _) => entries().any(|entry| entry.object == *object),
                 Wanted::Status(name) => node
                     .signals
                     .iter()
@@ -46,7 +46,7 @@ pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), F
                 }
                 Wanted::Signal(name) => name.clone(),
                 Wanted::Status(name) => format!("{name}.status"),
-                Wanted::Object(object) => object.to_string(),
+                Wanted::Object(..) => item.name(),
             };
             if !polled {
                 return Err(Failure::general(LogFailure::NotMapped { name }));

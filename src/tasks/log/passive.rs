@@ -11,7 +11,8 @@ use crate::canopen::value::DataType;
 use crate::device::catalog::{Model, recognise};
 use crate::device::unit::Unit;
 use crate::measure::decode::{Decoder, Wanted};
-use crate::measure::layout::{PROCESS_VALUES, Signal, Tpdo};
+use crate::measure::layout::{MeasuringRange, PROCESS_VALUES, Signal, Tpdo};
+use crate::measure::sample::Number;
 use crate::node::{Identity, Node, Overrides};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -161,7 +162,7 @@ impl SetupListener {
                 let signal = node.signals.iter().find(|signal| signal.is_value(entry.object));
                 signal.is_none_or(|signal| {
                     let digits = ObjectId::new(0x6132, signal.channel);
-                    let is_integer = matches!(node.mapped_type(entry.object, entry.bits), DataType::Integer(_));
+                    let is_integer = matches!(node.mapped_type(entry.object, entry.bits), Some(DataType::Integer(_)));
                     !is_integer || signal.digits.is_some() || self.refused.contains(&(id, digits))
                 })
             })
@@ -205,6 +206,17 @@ impl SetupListener {
         Some(Tpdo { number, cob_id, transmission, event_timer_ms: None, mapping: mapping? })
     }
 
+    /// The measuring range (6148h, 6149h), if another master read it.
+    fn range(&self, node: &Node, channel: u8, digits: Option<u8>) -> MeasuringRange {
+        let end_of_range = |index: u16| {
+            let object = ObjectId::new(index, channel);
+            let value = node.layout().data_type(object)?.decode(self.known.get(&(node.id, object))?).ok()?;
+            Number::from_value(&value, digits.unwrap_or(0)).map(Number::as_f64)
+        };
+        let ends = end_of_range(0x6148).zip(end_of_range(0x6149));
+        ends.map_or(MeasuringRange::Unknown, |(start, end)| MeasuringRange::Known(start, end))
+    }
+
     fn signals(&self, node: &Node) -> Vec<Signal> {
         let id = node.id;
         let unit_and_digits = |channel| {
@@ -218,12 +230,13 @@ impl SetupListener {
                 Signal {
                     name: entry.name.clone(),
                     channel: entry.channel,
-                    value: (entry.value, node.mapped_type(entry.value, 32)),
+                    value: (entry.value, node.layout().data_type(entry.value)),
                     also: entry.also.clone(),
                     status: entry.status,
                     marker: entry.marker,
                     unit,
                     digits,
+                    range: self.range(node, entry.channel, digits),
                 }
             };
             return described.iter().map(signal).collect();
@@ -243,6 +256,7 @@ impl SetupListener {
                     marker: false,
                     unit,
                     digits,
+                    range: self.range(node, channel, digits),
                 }
             })
             .collect();

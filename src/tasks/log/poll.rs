@@ -69,7 +69,7 @@ impl Poll {
         // Of several nodes each is polled for the signals it has. At least one has them: that was checked before.
         let has = |item: &&Wanted| match item {
             Wanted::Signal(name) | Wanted::Status(name) => node.signals.iter().any(|signal| signal.name == *name),
-            Wanted::Object(_) => true,
+            Wanted::Object(..) => true,
         };
         let own: Vec<Wanted> = wanted.iter().filter(has).cloned().collect();
         if own.is_empty() && !wanted.is_empty() {

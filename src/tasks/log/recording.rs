@@ -16,7 +16,7 @@ use crate::bus::{Bus, Filters, ReceiveBuffer, Received, TimestampSource};
 use crate::canopen::id::{CanId, NodeId};
 use crate::master::{Answer, Error, Master, SdoError, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
-use crate::measure::sample::Sample;
+use crate::measure::sample::{Doubt, Sample};
 use crate::node::Node;
 use emergencies::Emergencies;
 use liveness::Liveness;
@@ -42,6 +42,8 @@ pub(super) struct Recording<'o> {
     /// Nodes whose TPDOs were reported to have a wrong length.
     wrong_length_reported: BTreeSet<NodeId>,
     pub(super) remarks: Vec<Remark>,
+    /// Doubts about sources that were reported.
+    doubts: BTreeSet<(usize, Doubt)>,
     interrupted: bool,
     /// The samples of the current frame. It is kept to avoid allocations.
     samples: Vec<Sample>,
@@ -69,6 +71,7 @@ impl<'o> Recording<'o> {
             link_is_up: true,
             wrong_length_reported: BTreeSet::new(),
             remarks: Vec::new(),
+            doubts: BTreeSet::new(),
             interrupted: false,
             samples: Vec::new(),
         }
@@ -167,6 +170,16 @@ impl<'o> Recording<'o> {
         let at = last.at;
         let sources = self.decoder.sources();
         let node = sources[last.source].node;
+        for sample in &self.samples {
+            if let Some(doubt) = sample.doubt
+                && self.doubts.insert((sample.source, doubt))
+            {
+                let source = &sources[sample.source];
+                let remark = Remark::Doubt(source.node, source.signal.to_string(), doubt);
+                observer.event(&LogEvent::Remark(remark.clone()), at);
+                self.remarks.push(remark);
+            }
+        }
         if let Some(gap) = self.tally.add(&self.samples, self.options.max_gap) {
             observer.event(&LogEvent::Gap(node, gap), at);
         }

@@ -4,6 +4,8 @@ use crate::bus::ReceiveBuffer;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::pdo::TpdoNumber;
 use crate::master::SdoError;
+use crate::measure::layout::NarrowValue;
+use crate::measure::sample::Doubt;
 use crate::tasks::Failure;
 use std::time::Duration;
 
@@ -30,6 +32,10 @@ pub enum Remark {
     SyncsOmittedTooSlow(u64),
     /// Frames were dropped, and the kernel did not allow a larger receive buffer.
     SmallReceiveBuffer(ReceiveBuffer),
+    /// A value of this signal is missing or may be wrong.
+    Doubt(NodeId, String, Doubt),
+    /// The values of a signal may be clipped.
+    MayClip(NodeId, NarrowValue),
     /// The node sent no measurements, for this reason.
     NoMeasurements(NodeId, SilenceReason),
 }

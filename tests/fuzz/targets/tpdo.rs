@@ -24,12 +24,13 @@ fuzz_target!(|data: &[u8]| {
     instrument.signals.push(Signal {
         name: "pressure".into(),
         channel: 1,
-        value: (ObjectId::new(0x9130, 1), DataType::Integer(4)),
+        value: (ObjectId::new(0x9130, 1), Some(DataType::Integer(4))),
         also: Vec::new(),
         status: (head & 1 != 0).then_some(ObjectId::new(0x6150, 1)),
         marker: head & 2 != 0,
         unit: Some(Unit(bytes.long())),
         digits: Some(bytes.byte()),
+        range: cangauge::measure::layout::MeasuringRange::Unknown,
     });
     let mapping: Vec<MappingEntry> = (0..head >> 4).map(|_| MappingEntry::from_word(bytes.long())).collect();
     let bits: usize = mapping.iter().map(|entry| usize::from(entry.bits)).sum();

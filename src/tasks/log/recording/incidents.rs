@@ -20,6 +20,16 @@ impl Recording<'_> {
         }
     }
 
+    /// Reports signals whose values may be clipped.
+    pub(in crate::tasks::log) fn report_narrow_values(&mut self, at: Stamp, observer: &mut dyn Observer) {
+        let narrow: Vec<Remark> = self
+            .nodes
+            .iter()
+            .flat_map(|node| node.layout().narrow_values().into_iter().map(|value| Remark::MayClip(node.id, value)))
+            .collect();
+        narrow.into_iter().for_each(|remark| self.remark(remark, at, observer));
+    }
+
     /// Reports something now and in the summary.
     fn remark(&mut self, remark: Remark, at: Stamp, observer: &mut dyn Observer) {
         observer.event(&LogEvent::Remark(remark.clone()), at);

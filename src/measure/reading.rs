@@ -1,0 +1,246 @@
+//! From the bytes of one value to a sample: type, decimal digits, status, and the cases in which there is no value.
+
+use super::layout::{Layout, MeasuringRange, Signal};
+use super::sample::{Doubt, Number, Raw, Sample, Status};
+use crate::bus::Stamp;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::{DataType, Value};
+
+/// How the bytes of one value become a sample.
+#[derive(Clone, Debug)]
+pub struct Reading {
+    /// The number of the source.
+    pub source: usize,
+    data_type: Option<DataType>,
+    scaling: Scaling,
+    marker: bool,
+    has_status: bool,
+    range: MeasuringRange,
+}
+
+/// Whether a number has decimal digits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scaling {
+    /// It is as it was sent.
+    Plain,
+    /// It is a measured value; its decimal digits (6132h) are known or not.
+    Digits(Option<u8>),
+}
+
+/// More decimal digits are impossible: CiA 404 has 0 to 9.
+const MAX_DIGITS: u8 = 9;
+
+/// A REAL32 nearer to zero than this is no measured value: INTEGER32 up to 2.3e8 look like this.
+const SMALLEST_REAL: f32 = 1e-30;
+
+/// An overload starts this share of the measuring range beyond its ends (CiA 404 devices: 3.125 %).
+const OVERLOAD_MARGIN: f64 = 0.03125;
+
+impl Reading {
+    /// For the process value of a signal. `source` is the number of the source.
+    pub fn of_signal(signal: &Signal, data_type: Option<DataType>, source: usize) -> Reading {
+        Reading {
+            source,
+            data_type,
+            scaling: Scaling::Digits(signal.digits),
+            marker: signal.marker,
+            has_status: signal.status.is_some(),
+            range: signal.range,
+        }
+    }
+
+    /// For an object by its address: as it was sent. Other process values of a channel than the measured one (net
+    /// value, limits) have the decimal digits of the channel.
+    pub fn of_object(layout: Layout<'_>, object: ObjectId, data_type: Option<DataType>, source: usize) -> Reading {
+        let signal = layout.signal_of(object).filter(|signal| !signal.is_value(object));
+        let scaling = signal.map_or(Scaling::Plain, |signal| Scaling::Digits(signal.digits));
+        Reading { scaling, ..Reading::plain(data_type, source) }
+    }
+
+    /// For a number without unit and decimal digits.
+    pub fn plain(data_type: Option<DataType>, source: usize) -> Reading {
+        let range = MeasuringRange::Unknown;
+        Reading { source, data_type, scaling: Scaling::Plain, marker: false, has_status: true, range }
+    }
+
+    /// The data type of the value; `None` if no source states it.
+    pub fn data_type(&self) -> Option<DataType> {
+        self.data_type
+    }
+
+    /// The sample for the bytes of a value and, if there are any, its status bits. `None` if the bytes do not fit the type.
+    pub fn sample(&self, at: Stamp, bytes: &[u8], status_bits: Option<u64>) -> Option<Sample> {
+        let without_value =
+            |status, doubt| Sample { at, source: self.source, value: None, status, raw: Raw::new(bytes), doubt };
+        let Some(data_type) = self.data_type else { return Some(without_value(None, Some(Doubt::UnknownType))) };
+        let value = data_type.decode(bytes).ok()?;
+        let is_integer = matches!(value, Value::Integer(_) | Value::Unsigned(_));
+        let (digits, mut doubt) = match self.scaling {
+            Scaling::Digits(Some(digits)) if digits > MAX_DIGITS && is_integer => {
+                return Some(without_value(Some(Status::Invalid), Some(Doubt::ImpossibleDigits(digits))));
+            }
+            Scaling::Digits(None) if is_integer => (0, Some(Doubt::UnknownDigits)),
+            Scaling::Digits(digits) => (digits.unwrap_or(0), None),
+            Scaling::Plain => (0, None),
+        };
+        let number = Number::from_value(&value, digits)?;
+        if let (Number::Real32(real), Scaling::Digits(_)) = (number, self.scaling)
+            && real != 0.0
+            && real.abs() < SMALLEST_REAL
+        {
+            return Some(without_value(Some(Status::Invalid), Some(Doubt::LooksLikeInteger)));
+        }
+        let reported = status_bits.map(Status::from_bits);
+        let marked = !number.is_finite() || self.marker && is_smallest(&value, data_type);
+        let mut status = match reported {
+            Some((Status::Ok, _)) if marked => Some(Status::Invalid),
+            Some((status, _)) => Some(status),
+            None if marked => Some(Status::Invalid),
+            None if self.marker => Some(Status::Ok),
+            None => None,
+        };
+        let mut valid = !marked && reported.is_none_or(|(_, valid)| valid);
+        if valid && self.scaling != Scaling::Plain && is_at_end(&value, data_type) {
+            if self.range == MeasuringRange::Unknown {
+                doubt = doubt.or(Some(Doubt::EndOfType));
+            }
+            if self.range_goes_beyond(number.as_f64()) {
+                valid = false;
+                status = status.filter(|status| *status != Status::Ok).or(Some(Status::Clipped));
+            }
+        }
+        if doubt == Some(Doubt::UnknownDigits) {
+            status = status.filter(|status| *status != Status::Ok);
+        }
+        if valid && status.is_none() && !self.has_status && doubt.is_none() {
+            status = self.range.overload(number.as_f64());
+        }
+        Some(Sample { value: valid.then_some(number), ..without_value(status, doubt) })
+    }
+
+    /// Whether the measuring range goes beyond a value at the end of its type.
+    fn range_goes_beyond(&self, value: f64) -> bool {
+        match self.range {
+            MeasuringRange::Known(start, end) if value > 0.0 => start.max(end) > value,
+            MeasuringRange::Known(start, end) => start.min(end) < value,
+            MeasuringRange::MayClip => true,
+            MeasuringRange::Unknown => false,
+        }
+    }
+}
+
+impl MeasuringRange {
+    /// The overload that a value outside the measuring range shows.
+    pub fn overload(self, value: f64) -> Option<Status> {
+        let MeasuringRange::Known(start, end) = self else { return None };
+        let margin = (end - start).abs() * OVERLOAD_MARGIN;
+        if value > start.max(end) + margin {
+            Some(Status::OverloadHigh)
+        } else if value < start.min(end) - margin {
+            Some(Status::OverloadLow)
+        } else {
+            None
+        }
+    }
+}
+
+/// Whether an integer of at most 24 bits is the smallest or the largest number of its type.
+fn is_at_end(value: &Value, data_type: DataType) -> bool {
+    match (value, data_type) {
+        (Value::Integer(number), DataType::Integer(width @ 1..=3)) => {
+            let largest = i64::MAX >> (64 - 8 * u32::from(width));
+            *number == largest || *number == -largest - 1
+        }
+        _ => false,
+    }
+}
+
+/// Whether an integer is the smallest number of its type, which marks an overload (MH-4: -32768, -2147483648). Use it only for
+/// signals that have this marker.
+pub fn is_smallest(value: &Value, data_type: DataType) -> bool {
+    match (value, data_type) {
+        (Value::Integer(number), DataType::Integer(width)) => {
+            *number == i64::MIN >> (64 - 8 * u32::from(width.clamp(1, 8)))
+        }
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn signal(digits: Option<u8>, range: MeasuringRange) -> Signal {
+        Signal {
+            name: "pressure".into(),
+            channel: 1,
+            value: (ObjectId::new(0x6130, 1), Some(DataType::Real32)),
+            also: Vec::new(),
+            status: None,
+            marker: false,
+            unit: None,
+            digits,
+            range,
+        }
+    }
+
+    fn sample(signal: &Signal, data_type: DataType, bytes: &[u8], status: Option<u64>) -> (String, &'static str) {
+        let reading = Reading::of_signal(signal, Some(data_type), 0);
+        let sample = reading.sample(Stamp::default(), bytes, status).expect("a number");
+        assert_eq!(sample.raw.bytes(), bytes);
+        (sample.value.map(|value| value.to_string()).unwrap_or_default(), sample.status.map_or("", Status::as_str))
+    }
+
+    const I16: DataType = DataType::Integer(2);
+    const I24: DataType = DataType::Integer(3);
+    const I32: DataType = DataType::Integer(4);
+    const UNKNOWN: MeasuringRange = MeasuringRange::Unknown;
+
+    #[test]
+    fn integer_at_its_end_is_clipped_if_the_range_goes_further() {
+        let psi = signal(Some(3), MeasuringRange::Known(-50.0, 100.0));
+        for status in [None, Some(0)] {
+            assert_eq!(sample(&psi, I16, &[0xff, 0x7f], status), (String::new(), "clipped"));
+            assert_eq!(sample(&psi, I16, &[0x00, 0x80], status), (String::new(), "clipped"));
+        }
+        assert_eq!(sample(&psi, I16, &[0xff, 0x7f], Some(2)), (String::new(), "overload-high"));
+        assert_eq!(sample(&psi, I16, &[0xfe, 0x7f], Some(0)), ("32.766".into(), "ok"));
+        let wide = signal(Some(3), MeasuringRange::Known(0.0, 10_000.0));
+        assert_eq!(sample(&wide, I24, &[0xff, 0xff, 0x7f], None), (String::new(), "clipped"));
+        let fits = signal(Some(3), MeasuringRange::Known(0.0, 32.0));
+        assert_eq!(sample(&fits, I16, &[0xff, 0x7f], Some(0)), ("32.767".into(), "ok"));
+        let warned = signal(Some(3), MeasuringRange::MayClip);
+        assert_eq!(sample(&warned, I16, &[0xff, 0x7f], Some(0)), (String::new(), "clipped"));
+    }
+
+    #[test]
+    fn integer_at_its_end_stays_if_the_range_is_unknown_or_the_value_is_no_signal() {
+        let reading = Reading::of_signal(&signal(Some(0), UNKNOWN), Some(I16), 0);
+        let found = reading.sample(Stamp::default(), &[0xff, 0x7f], None).expect("a number");
+        assert_eq!((found.value.is_some(), found.doubt), (true, Some(Doubt::EndOfType)));
+        let plain = Reading::plain(Some(I16), 0).sample(Stamp::default(), &[0xff, 0x7f], None).expect("a number");
+        assert_eq!((plain.value.is_some(), plain.doubt), (true, None));
+    }
+
+    #[test]
+    fn impossible_numbers_are_not_ok() {
+        for digits in [10, 255] {
+            assert_eq!(sample(&signal(Some(digits), UNKNOWN), I32, &[1, 0, 0, 0], Some(0)), (String::new(), "invalid"));
+        }
+        assert_eq!(sample(&signal(None, UNKNOWN), I32, &[57, 48, 0, 0], Some(0)), ("12345".into(), ""));
+        // INTEGER32 behind REAL32: 12345, 12345678.
+        for bytes in [[57, 48, 0, 0], [0x4e, 0x61, 0xbc, 0]] {
+            let found = sample(&signal(Some(3), UNKNOWN), DataType::Real32, &bytes, Some(0));
+            assert_eq!(found, (String::new(), "invalid"));
+        }
+        assert_eq!(sample(&signal(Some(255), UNKNOWN), DataType::Real32, &[0; 4], Some(0)), ("0".into(), "ok"));
+    }
+
+    #[test]
+    fn value_beyond_the_range_is_an_overload_if_the_device_has_no_status() {
+        let dps = signal(Some(3), MeasuringRange::Known(0.0, 100.0));
+        assert_eq!(sample(&dps, I32, &(-5000i32).to_le_bytes(), None), ("-5.000".into(), "overload-low"));
+        assert_eq!(sample(&dps, I32, &104_000i32.to_le_bytes(), None), ("104.000".into(), "overload-high"));
+        assert_eq!(sample(&dps, I32, &103_000i32.to_le_bytes(), None), ("103.000".into(), ""));
+    }
+}

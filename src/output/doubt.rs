@@ -1,0 +1,58 @@
+//! Text for values that are missing or may be wrong.
+
+use crate::canopen::id::NodeId;
+use crate::measure::layout::NarrowValue;
+use crate::measure::sample::Doubt;
+
+/// Why the value of a signal is missing or may be wrong, with the remedy.
+pub fn doubt(node: NodeId, signal: &str, doubt: Doubt) -> String {
+    match doubt {
+        Doubt::UnknownType => format!("node {node}: {}; {}", unknown_type(signal), type_remedy(node, signal)),
+        Doubt::ImpossibleDigits(digits) => {
+            format!("node {node}: {signal}: no value: it has {digits} decimal digits (6132h); possible are 0 to 9")
+        }
+        Doubt::UnknownDigits => format!(
+            "node {node}: {signal}: the decimal digits (6132h) are unknown: the value is the integer as it was sent"
+        ),
+        Doubt::LooksLikeInteger => format!(
+            "node {node}: {signal}: no value: the REAL32 is next to zero; the object seems to be an integer; name the \
+             device: --device dps (or --eds FILE)"
+        ),
+        Doubt::EndOfType => format!(
+            "node {node}: {signal}: the value is at the end of its integer type and may be clipped; read 0x6130 or \
+             0x9130 instead"
+        ),
+    }
+}
+
+/// The message for an object without a known type.
+pub fn unknown_type(signal: &str) -> String {
+    match signal.split_once('/') {
+        Some((object, stated)) => format!("{object} has another width than {stated}: no value"),
+        None => format!("the type of {signal} is unknown: no value"),
+    }
+}
+
+/// How the user can state the type of an object.
+pub fn type_remedy(node: NodeId, signal: &str) -> String {
+    let object = signal.split_once('/').map_or(signal, |(object, _)| object);
+    if object.starts_with("0x") {
+        format!("state it: {object}/i16 (or u8, i32, r32 ...), --eds {node}=FILE or --device {node}=NAME")
+    } else {
+        format!("state it: --eds {node}=FILE or --device {node}=NAME")
+    }
+}
+
+/// Why the values of a signal may be clipped, with the remedy.
+pub fn may_clip(node: NodeId, value: &NarrowValue) -> String {
+    let unit = value.unit.map(|unit| format!(" {unit}")).unwrap_or_default();
+    let range = value.range_end.map_or_else(
+        || "the measuring range may go further".to_owned(),
+        |end| format!("the measuring range goes to {end}{unit}"),
+    );
+    let (NarrowValue { signal, object, largest, .. }, channel) = (value, value.object.sub);
+    format!(
+        "node {node}: {signal}: {object} ends at {largest}{unit}, and {range}: values may be clipped; use \
+         0x6130:{channel} or 0x9130:{channel}"
+    )
+}
