@@ -123,14 +123,28 @@ pub enum Life {
 
 impl Life {
     /// Parses a heartbeat, boot-up message or node guarding answer. `None` for any other frame, including remote
-    /// frames (guarding requests) and lengths other than 1.
+    /// frames (guarding requests).
+    ///
+    /// Some devices send more than one byte: the first one counts. A frame of 0 bytes on 700h + node-ID proves nothing: it
+    /// is usually a guarding request whose RTR bit was lost. A frame of 0 bytes on 080h + node-ID is the boot-up message of
+    /// devices before CiA 301 version 4.
     pub fn parse(frame: &Frame) -> Option<(NodeId, Life)> {
+        if let (Some(node), []) = (frame.id().emergency_node(), frame.data()) {
+            return (!frame.is_remote()).then_some((node, Life::BootUp));
+        }
         let node = frame.id().heartbeat_node()?;
         match frame.data() {
-            [0x00] => Some((node, Life::BootUp)),
-            [code] => Some((node, Life::State(NmtState::from_code(*code)))),
-            _ => None,
+            [0x00, ..] => Some((node, Life::BootUp)),
+            [code, ..] => Some((node, Life::State(NmtState::from_code(*code)))),
+            [] => None,
         }
+    }
+
+    /// The node and the number of bytes of a frame on 700h + node-ID that has not exactly one byte, as CiA 301 requires.
+    pub fn odd_length(frame: &Frame) -> Option<(NodeId, usize)> {
+        let node = frame.id().heartbeat_node().filter(|_| !frame.is_remote())?;
+        let length = frame.data().len();
+        (length != 1).then_some((node, length))
     }
 }
 

@@ -185,11 +185,14 @@ impl Field {
 }
 
 /// The fields of a mapping: each starts where the previous one ends (CiA 301, 7.5.2.36).
+///
+/// Some devices set the highest bit of an entry's length. A PDO has at most 64 bits, so the lower seven bits are used.
 pub fn lay_out(mapping: &[MappingEntry]) -> Vec<Field> {
     let mut start = 0u16;
     mapping
         .iter()
         .map(|&entry| {
+            let entry = MappingEntry { bits: entry.bits & 0x7f, ..entry };
             let field = Field { entry, start };
             start = start.saturating_add(u16::from(entry.bits));
             field

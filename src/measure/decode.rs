@@ -181,6 +181,11 @@ impl Decoder {
         self.tpdos.keys().copied()
     }
 
+    /// The number of values that are decoded from the TPDO with this COB-ID.
+    pub fn values_of(&self, id: CanId) -> u64 {
+        self.tpdos.get(&id).map_or(0, |tpdo| tpdo.values.len() as u64)
+    }
+
     /// TPDOs of a node that had another length than their mapping.
     pub fn wrong_lengths(&self, node: NodeId) -> u64 {
         self.tpdos.values().filter(|tpdo| tpdo.node == node).map(|tpdo| tpdo.wrong_lengths).sum()

@@ -64,6 +64,8 @@ pub struct Node {
     pub emergency: CanId,
     /// The CAN-ID of the SYNC that it receives (1005h, else 080h).
     pub sync: CanId,
+    /// The synchronous counter overflow value (1019h), 2 to 240; `None` if the node expects SYNC without a counter.
+    pub sync_overflow: Option<u8>,
 }
 
 impl Node {
@@ -79,6 +81,7 @@ impl Node {
             heartbeat_ms: None,
             emergency: CanId::emergency(id),
             sync: CanId::SYNC,
+            sync_overflow: None,
         }
     }
 

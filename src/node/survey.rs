@@ -152,7 +152,12 @@ pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides)
 }
 
 fn read_services<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
-    let objects = [(ObjectId::new(0x1017, 0), U16), (ObjectId::new(0x1014, 0), U32), (ObjectId::new(0x1005, 0), U32)];
+    let objects = [
+        (ObjectId::new(0x1017, 0), U16),
+        (ObjectId::new(0x1014, 0), U32),
+        (ObjectId::new(0x1005, 0), U32),
+        (ObjectId::new(0x1019, 0), U8),
+    ];
     let items: Vec<Item> = instruments
         .iter()
         .flat_map(|instrument| objects.map(|(object, data_type)| (instrument.id, object, data_type)))
@@ -166,6 +171,7 @@ fn read_services<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(),
         if let Some(word) = small(values[2].as_ref()).map(CobId) {
             instrument.sync = word.can_id();
         }
+        instrument.sync_overflow = small(values[3].as_ref()).filter(|overflow| (2..=240).contains(overflow));
     }
     Ok(())
 }

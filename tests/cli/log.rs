@@ -178,6 +178,24 @@ fn sync_count_is_exact_and_does_not_drift() {
 }
 
 #[test]
+fn first_sync_follows_the_starts_of_all_nodes() {
+    for count in [9, 64] {
+        let nodes: Vec<String> = (1..=count).map(|node| format!("mh4@{node}")).collect();
+        let line = format!("log 1-{count} --sync 100ms --duration 1s --summary s.json");
+        let bench = Bench::of(&nodes.join(","));
+        let done = bench.run(&line).exit(0);
+        let last_start = sent(&done, &format!("000#01{count:02X}"));
+        let syncs = sent(&done, "080#");
+        assert_eq!((last_start.len(), syncs.len()), (1, 10), "{count} nodes");
+        assert!(last_start[0] <= syncs[0], "{count} nodes: {last_start:?}, {syncs:?}");
+        let recorded = rows(&done.stdout);
+        let per_node = |node: u32| recorded.iter().filter(|row| row.node == node.to_string()).count();
+        assert!((1..=count).all(|node| per_node(node) == per_node(1) && per_node(1) >= 10), "{count} nodes");
+        assert!(bench.text("s.json").contains("\"missing\":0"), "{}", bench.text("s.json"));
+    }
+}
+
+#[test]
 fn sync_uses_the_cob_id_of_1005h() {
     let done = one("mh4", "set = { \"0x1005\" = 0x90 }\n").run("log 5 --sync 10ms --count 10").exit(0);
     assert_eq!((sent(&done, "090#").len(), sent(&done, "080#").len()), (10, 0));

@@ -17,6 +17,11 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
             Words::new(format!("no TPDO contains {name}")).hint("read it by SDO instead: add --poll 100ms")
         }
         LogFailure::DifferentSyncIds => Words::new("the nodes have different COB-IDs of SYNC (1005h)"),
+        LogFailure::DifferentSyncCounters(values) => {
+            let values: Vec<String> = values.iter().map(|(node, value)| format!("node {node}: {value}")).collect();
+            Words::new(format!("the nodes expect different SYNC counters (1019h): {}", values.join(", ")))
+                .hint("set 1019h to the same value in all nodes, or record them one by one")
+        }
         LogFailure::SecondSyncProducer => Words::new("another node sends SYNC on this bus: nothing was started")
             .hint("omit --sync: the nodes send on the SYNC that is already there"),
         LogFailure::UnknownMapping => {

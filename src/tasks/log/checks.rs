@@ -78,6 +78,10 @@ pub(super) fn refuse_second_sync(
     if ids.len() > 1 {
         return Err(Failure::general(LogFailure::DifferentSyncIds));
     }
+    if nodes.iter().any(|node| node.sync_overflow != nodes[0].sync_overflow) {
+        let values = nodes.iter().map(|node| (node.id, node.sync_overflow.unwrap_or(0))).collect();
+        return Err(Failure::general(LogFailure::DifferentSyncCounters(values)));
+    }
     let length = (period * 3).clamp(Duration::from_millis(200), Duration::from_secs(2));
     let until = master.now() + length;
     let second = wait(master, until, Policy::Command, |_, event| match event {

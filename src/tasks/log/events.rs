@@ -15,6 +15,8 @@ pub struct EventCounts {
     pub not_recorded: u64,
     /// TPDOs whose length differs from their mapping.
     pub wrong_lengths: u64,
+    /// Values that were due after a SYNC of this program and did not arrive.
+    pub missing: u64,
     /// How often the interface went down.
     pub link_losses: u64,
     /// How often the controller went bus-off.

@@ -28,6 +28,8 @@ pub enum LogFailure {
     },
     /// The nodes have different COB-IDs of SYNC (1005h).
     DifferentSyncIds,
+    /// The nodes have different overflow values of the SYNC counter (1019h); 0 if the node expects no counter.
+    DifferentSyncCounters(Vec<(NodeId, u8)>),
     /// Another node sends SYNC.
     SecondSyncProducer,
     /// The node sends TPDOs whose mapping is unknown.
@@ -99,7 +101,9 @@ impl LogFailure {
             | LogFailure::UnknownMapping
             | LogFailure::OtherColumns { .. } => Kind::Usage,
             LogFailure::NotMapped { .. } => Kind::Unexpected,
-            LogFailure::DifferentSyncIds | LogFailure::SecondSyncProducer => Kind::CheckFailed,
+            LogFailure::DifferentSyncIds | LogFailure::DifferentSyncCounters(_) | LogFailure::SecondSyncProducer => {
+                Kind::CheckFailed
+            }
             LogFailure::NothingReceived { .. }
             | LogFailure::NoMeasurements { .. }
             | LogFailure::NodesLost { all: true, .. } => Kind::NoAnswer,

@@ -24,6 +24,8 @@ pub struct SyncStatistics {
 pub(super) struct Producer {
     interval: Duration,
     id: CanId,
+    /// 1019h: the counter in the SYNC message runs from 1 to this value. `None`: SYNC has no counter.
+    overflow: Option<u8>,
     start: Mono,
     slot: u64,
     /// The slot whose SYNC the master has, and the bus has not sent yet.
@@ -32,8 +34,24 @@ pub(super) struct Producer {
 }
 
 impl Producer {
-    pub(super) fn new(interval: Duration, id: CanId, start: Mono) -> Producer {
-        Producer { interval, id, start, slot: 0, waiting: None, statistics: SyncStatistics::default() }
+    pub(super) fn new(interval: Duration, id: CanId, overflow: Option<u8>, start: Mono) -> Producer {
+        Producer { interval, id, overflow, start, slot: 0, waiting: None, statistics: SyncStatistics::default() }
+    }
+
+    /// Moves the first SYNC to `at`.
+    pub(super) fn delay_start(&mut self, at: Mono) {
+        self.start = at;
+    }
+
+    /// The next SYNC message. Its counter goes on only if the previous message was sent.
+    fn frame(&self) -> Frame {
+        match self.overflow {
+            None => Frame::empty(self.id),
+            Some(overflow) => {
+                let counter = self.statistics.sent % u64::from(overflow.max(1)) + 1;
+                Frame::byte(self.id, u8::try_from(counter).unwrap_or(1))
+            }
+        }
     }
 
     /// When the next SYNC is due. It is computed from the start, so that nothing drifts.
@@ -49,7 +67,7 @@ impl Producer {
     /// Sends the SYNC that is due.
     pub(super) fn send(&mut self, master: &mut Master<'_>) {
         self.check_sent(master);
-        if master.send_first(Frame::empty(self.id)) {
+        if master.send_first(self.frame()) {
             self.waiting = Some(self.slot);
         }
         self.slot = next_slot(self.start, master.now(), self.interval, self.slot);

@@ -1,5 +1,6 @@
 //! The recording itself: frames in, samples out.
 
+mod due;
 mod emergencies;
 mod incidents;
 mod liveness;
@@ -18,6 +19,7 @@ use crate::master::{Answer, Error, Master, SdoError, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::sample::{Doubt, Sample};
 use crate::node::Node;
+use due::DueTpdos;
 use emergencies::Emergencies;
 use liveness::Liveness;
 use std::collections::BTreeSet;
@@ -35,6 +37,7 @@ pub(super) struct Recording<'o> {
     tally: Tally,
     liveness: Liveness,
     emergencies: Emergencies,
+    due: DueTpdos,
     rereads: Rereads,
     timestamps: TimestampSource,
     receive_buffer: Option<ReceiveBuffer>,
@@ -65,6 +68,7 @@ impl<'o> Recording<'o> {
             tally: Tally::new(),
             liveness: Liveness::new(expected),
             emergencies,
+            due: DueTpdos::default(),
             rereads: Rereads::new(&options.overrides),
             timestamps: bus.timestamps(),
             receive_buffer: bus.receive_buffer(),
@@ -126,6 +130,7 @@ impl<'o> Recording<'o> {
     fn frame(&mut self, received: &Received, master: &mut Master<'_>, observer: &mut dyn Observer) -> ControlFlow<()> {
         self.tally.extend_to(received.at.mono);
         self.samples.clear();
+        self.due.frame(&received.frame);
         if let Some(listener) = &mut self.listener {
             listener.take(received, &mut self.decoder);
             self.update_sources();

@@ -195,6 +195,7 @@ impl Recording<'_> {
         self.liveness.watch_heartbeat(&node, at.mono);
         self.liveness.restart(id, at.mono);
         self.nodes[place] = node;
+        self.due.set_up(&self.nodes, &self.decoder);
         master.listen(&self.filters())?;
         if was_away {
             self.states.start_again(id, master);

@@ -10,6 +10,9 @@ use crate::tasks::log::{FIRST_SAMPLE_TIMEOUT, LogEvent, Mode, Observer, TICK};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+/// How often it is checked whether the starts of the nodes were sent.
+const START_CHECK_INTERVAL: Duration = Duration::from_millis(1);
+
 /// When the loop has something to do, besides frames, polls and SYNC.
 struct Schedule {
     start: Mono,
@@ -33,6 +36,13 @@ impl Schedule {
             next_tick: start + TICK,
             interrupted_at: None,
         }
+    }
+
+    /// The recording starts later by this time. So `--duration` contains the same number of cycles.
+    fn delay(&mut self, by: Duration) {
+        self.start = self.start + by;
+        self.end = self.end.map(|end| end + by);
+        self.give_up = self.give_up + by;
     }
 
     fn is_over(&self, now: Mono, rows: u64) -> bool {
@@ -61,7 +71,9 @@ impl Recording<'_> {
         let mut producer = match self.options.mode {
             Mode::Sync(interval) => {
                 let id = self.nodes.first().map_or(CanId::SYNC, |first| first.sync);
-                Some(Producer::new(interval, id, start))
+                let overflow = self.nodes.first().and_then(|first| first.sync_overflow);
+                self.due.set_up(&self.nodes, &self.decoder);
+                Some(Producer::new(interval, id, overflow, start))
             }
             _ => None,
         };
@@ -71,6 +83,9 @@ impl Recording<'_> {
         self.timestamps = master.bus().timestamps();
         if let Some(producer) = producer {
             self.tally.syncs = producer.finish(master);
+            if let Mode::Sync(interval) = self.options.mode {
+                self.tally.events.missing = std::mem::take(&mut self.due).missing(self.tally.end(), interval);
+            }
         }
         let late_drops = master.late_drops();
         if late_drops > 0 {
@@ -108,7 +123,14 @@ impl Recording<'_> {
             return ControlFlow::Break(());
         }
         if let Some(producer) = producer.filter(|producer| now >= producer.due()) {
+            if producer.slot() == 0 && master.is_sending() {
+                // A SYNC must not overtake the starts of the nodes: the first TPDOs would be missing.
+                schedule.delay(START_CHECK_INTERVAL);
+                producer.delay_start(now + START_CHECK_INTERVAL);
+                return ControlFlow::Continue(());
+            }
             observer.cycle(producer.slot(), master.bus().now())?;
+            self.due.sync(now);
             producer.send(master);
         }
         if let Some(poll) = &mut self.poll {

@@ -1,0 +1,111 @@
+//! Which values were due after a SYNC, and did not arrive.
+
+use crate::bus::Mono;
+use crate::canopen::frame::Frame;
+use crate::canopen::id::CanId;
+use crate::canopen::pdo::Transmission;
+use crate::measure::decode::Decoder;
+use crate::node::Node;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// A TPDO that is sent at every n-th SYNC.
+#[derive(Debug, Default)]
+struct DueTpdo {
+    /// n, 1 to 240.
+    every: u8,
+    /// The values of the TPDO that are recorded.
+    values: u64,
+    /// SYNC messages whose cycle is over.
+    syncs: u64,
+    /// Frames received in these cycles.
+    received: u64,
+    /// Frames received in the present cycle.
+    current: u64,
+}
+
+/// Counts the values that are due after each SYNC of this program.
+#[derive(Debug, Default)]
+pub(super) struct DueTpdos {
+    tpdos: BTreeMap<CanId, DueTpdo>,
+    /// The last SYNC, while its cycle is not over.
+    last: Option<Mono>,
+}
+
+impl DueTpdos {
+    /// Takes the present setup of the nodes. The counts stay.
+    pub(super) fn set_up(&mut self, nodes: &[Node], decoder: &Decoder) {
+        for tpdo in nodes.iter().flat_map(|node| &node.tpdos).filter(|tpdo| tpdo.cob_id.is_valid()) {
+            if let Some(Transmission::Sync(every)) = tpdo.transmission {
+                let id = tpdo.cob_id.can_id();
+                let due = self.tpdos.entry(id).or_default();
+                (due.every, due.values) = (every, decoder.values_of(id));
+            }
+        }
+    }
+
+    /// A SYNC is sent at `at`: the cycle of the previous one is over.
+    pub(super) fn sync(&mut self, at: Mono) {
+        if self.last.replace(at).is_some() {
+            self.end_cycle();
+        }
+    }
+
+    /// Takes a frame.
+    pub(super) fn frame(&mut self, frame: &Frame) {
+        if let Some(due) = self.tpdos.get_mut(&frame.id()).filter(|_| !frame.is_remote()) {
+            due.current += 1;
+        }
+    }
+
+    fn end_cycle(&mut self) {
+        for due in self.tpdos.values_mut() {
+            due.syncs += 1;
+            due.received += std::mem::take(&mut due.current);
+        }
+    }
+
+    /// The number of values that were due by `end` and did not arrive.
+    pub(super) fn missing(mut self, end: Mono, interval: Duration) -> u64 {
+        if self.last.is_some_and(|last| end.since(last) >= interval) {
+            self.end_cycle();
+        }
+        let missing =
+            |due: &DueTpdo| (due.syncs / u64::from(due.every.max(1))).saturating_sub(due.received) * due.values;
+        self.tpdos.values().map(missing).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(milliseconds: u64) -> Mono {
+        Mono::at(Duration::from_millis(milliseconds))
+    }
+
+    fn missing(every: u8, received: &[u64], end: u64) -> u64 {
+        let due = DueTpdo { every, values: 2, ..DueTpdo::default() };
+        let mut tpdos = DueTpdos { tpdos: BTreeMap::from([(CanId::Standard(0x181), due)]), last: None };
+        for cycle in 0..6 {
+            tpdos.sync(at(cycle * 100));
+            if received.contains(&cycle) {
+                tpdos.frame(&"181#00".parse().expect("a frame"));
+            }
+        }
+        tpdos.missing(at(end), Duration::from_millis(100))
+    }
+
+    #[test]
+    fn value_without_frame_in_its_cycle_is_missing() {
+        assert_eq!(missing(1, &[0, 1, 2, 3, 4, 5], 600), 0);
+        assert_eq!(missing(1, &[1, 2, 4, 5], 600), 4, "two frames of two values");
+        assert_eq!(missing(1, &[1, 2, 4], 520), 4, "the last cycle is not over");
+        assert_eq!(missing(1, &[1, 2, 4], 600), 6);
+    }
+
+    #[test]
+    fn tpdo_at_every_third_sync_is_due_at_every_third() {
+        assert_eq!((missing(3, &[2, 5], 600), missing(3, &[2], 600), missing(240, &[], 600)), (0, 2, 0));
+    }
+}
