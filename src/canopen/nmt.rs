@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn only_one_byte_frames_are_heartbeats_or_boot_ups() {
+    fn first_byte_of_a_heartbeat_is_the_state() {
         let node = NodeId::MAX;
         assert_eq!(Life::parse(&frame("77F#00")), Some((node, Life::BootUp)));
         for (text, state) in [
@@ -191,11 +191,17 @@ mod tests {
             ("77F#FF", NmtState::PreOperational),
             ("77F#85", NmtState::Operational),
             ("77F#01", NmtState::Other(1)),
+            ("77F#0500000000000000", NmtState::Operational),
+            ("77F#7F01", NmtState::PreOperational),
         ] {
             assert_eq!(Life::parse(&frame(text)), Some((node, Life::State(state))), "{text}");
         }
-        for text in ["77F#", "77F#R1", "77F#0000", "700#00", "7FF#7F", "0000077F#00"] {
+        for text in ["77F#", "77F#R1", "080#", "0FF#R0", "0FF#00", "700#00", "7FF#7F", "0000077F#00"] {
             assert_eq!(Life::parse(&frame(text)), None, "{text}");
         }
+        assert_eq!(Life::parse(&frame("77F#0000")), Some((node, Life::BootUp)));
+        assert_eq!(Life::parse(&frame("0FF#")), Some((node, Life::BootUp)), "before CiA 301 version 4");
+        let odd = |text| Life::odd_length(&frame(text)).map(|(_, length)| length);
+        assert_eq!((odd("77F#"), odd("77F#05"), odd("77F#0500"), odd("77F#R1")), (Some(0), None, Some(2), None));
     }
 }
