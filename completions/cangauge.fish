@@ -51,7 +51,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "nmt" -d 'Send NMT
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sdo" -d 'Read and write objects of the object dictionary'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)'
-complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "lss" -d 'Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device\'s own)'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "lss" -d 'Set the node-ID and bit rate of devices (LSS, CiA 305, or objects of the device)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "info" -d 'Show everything about a device on one page'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "status" -d 'Show everything about a device on one page'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "unit" -d 'Show or set the physical unit of a signal (6131h)'
@@ -61,8 +61,8 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "minmax" -d 'Show 
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "errors" -d 'Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "bus" -d 'List CAN interfaces, bring them up and down, find the bit rate of a bus'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "pdo" -d 'Show, change and watch the transmit PDOs of nodes'
-complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "autozero" -d 'Make the present reading of a channel zero (6125h), with checks before and after'
-complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "zero" -d 'Make the present reading of a channel zero (6125h), with checks before and after'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "autozero" -d 'Set the zero of a channel (6125h), with checks before and after'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "zero" -d 'Set the zero of a channel (6125h), with checks before and after'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "store" -d 'Save settings to non-volatile memory (1010h)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "restore" -d 'Restore factory defaults (1011h); node-ID and bit rate stay'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
@@ -510,14 +510,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "scan" -d 'List who can be given a node-ID: those that have one by SDO, those that have none by fastscan'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "inquire" -d 'Ask a device for its identity and node-ID by LSS'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set-id" -d 'Give a device its node-ID: checked to be free, configured, stored, reset, and confirmed'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set-bitrate" -d 'Give a device its bit rate, by its own table'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set" -d 'Give a device its node-ID and its bit rate: one store, one reset'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "activate" -d 'Bring configured bit rates into force: so long they go on, as long again they are silent'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "store" -d 'Make node-ID and bit rate last'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "identify" -d 'Ask whether there are devices with numbers within limits; exit 3 where nobody answers'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "scan" -d 'List devices with a node-ID (found by SDO) and without one (found by fastscan)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "inquire" -d 'Read the identity and node-ID of a device by LSS'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set-id" -d 'Set the node-ID of a device: check that it is free, configure, store, reset, confirm'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set-bitrate" -d 'Set the bit rate of a device, by its own bit rate table'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "set" -d 'Set the node-ID and bit rate of a device, with one store and one reset'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "activate" -d 'Activate a configured bit rate. The device is silent for the delay, changes, and is silent for it again'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "store" -d 'Store node-ID and bit rate in non-volatile memory'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "identify" -d 'Check whether devices have an identity in a range. Exit code 3 if none answers'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
@@ -559,7 +559,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l via -d 'By LSS, by objects of the device\'s own, or what its description says' -r -f -a "auto\t''
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l via -d 'Method: LSS, objects of the device (sdo), or what its description prefers (auto)' -r -f -a "auto\t''
 lss\t''
 sdo\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
@@ -577,15 +577,15 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l no-store -d 'Only until power off'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l force -d '"only" goes on where more than one device shows itself: all of them take it'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l no-store -d 'Do not store: a power cycle restores the old values'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l force -d 'Accept more than one device for "only": all of them change'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l table-index -d 'The entry of the device\'s bit rate table, where that table is not known' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l via -d 'By LSS, by objects of the device\'s own, or what its description says' -r -f -a "auto\t''
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l table-index -d 'Index in the bit rate table of the device, if its table is unknown' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l via -d 'Method: LSS, objects of the device (sdo), or what its description prefers (auto)' -r -f -a "auto\t''
 lss\t''
 sdo\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
@@ -603,18 +603,18 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l retime -d 'Take this side to the new bit rate, too, and store only once the device is heard there. Only for a device alone with this machine'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l no-store -d 'Only until power off'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l force -d '"only" goes on where more than one device shows itself: all of them take it'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l retime -d 'Switch the host interface as well; store after the device responds at the new bit rate. Requires that the device is the only one on the bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l no-store -d 'Do not store: a power cycle restores the old values'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l force -d 'Accept more than one device for "only": all of them change'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l id -d 'Its new node-ID' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l bitrate -d '250k, 1M, 125000, auto where the device has it' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l table-index -d 'The entry of the device\'s bit rate table, where that table is not known' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l via -d 'By LSS, by objects of the device\'s own, or what its description says' -r -f -a "auto\t''
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l id -d 'New node-ID' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l bitrate -d '250k, 1M, 125000; auto if the device supports it' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l table-index -d 'Index in the bit rate table of the device, if its table is unknown' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l via -d 'Method: LSS, objects of the device (sdo), or what its description prefers (auto)' -r -f -a "auto\t''
 lss\t''
 sdo\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
@@ -632,9 +632,9 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l retime -d 'Take this side to the new bit rate, too, and store only once the device is heard there. Only for a device alone with this machine'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l no-store -d 'Only until power off'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l force -d '"only" goes on where more than one device shows itself: all of them take it'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l retime -d 'Switch the host interface as well; store after the device responds at the new bit rate. Requires that the device is the only one on the bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l no-store -d 'Do not store: a power cycle restores the old values'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l force -d 'Accept more than one device for "only": all of them change'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s v -l verbose -d 'Print more on stderr'
@@ -655,7 +655,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l force -d '"only" goes on where more than one device shows itself'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l force -d 'Accept more than one device for "only"'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s v -l verbose -d 'Print more on stderr'
@@ -676,7 +676,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l force -d '"only" goes on where more than one device shows itself'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l force -d 'Accept more than one device for "only"'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s v -l verbose -d 'Print more on stderr'
@@ -702,14 +702,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "scan" -d 'List who can be given a node-ID: those that have one by SDO, those that have none by fastscan'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "inquire" -d 'Ask a device for its identity and node-ID by LSS'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set-id" -d 'Give a device its node-ID: checked to be free, configured, stored, reset, and confirmed'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set-bitrate" -d 'Give a device its bit rate, by its own table'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set" -d 'Give a device its node-ID and its bit rate: one store, one reset'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "activate" -d 'Bring configured bit rates into force: so long they go on, as long again they are silent'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "store" -d 'Make node-ID and bit rate last'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "identify" -d 'Ask whether there are devices with numbers within limits; exit 3 where nobody answers'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "scan" -d 'List devices with a node-ID (found by SDO) and without one (found by fastscan)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "inquire" -d 'Read the identity and node-ID of a device by LSS'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set-id" -d 'Set the node-ID of a device: check that it is free, configure, store, reset, confirm'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set-bitrate" -d 'Set the bit rate of a device, by its own bit rate table'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "set" -d 'Set the node-ID and bit rate of a device, with one store and one reset'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "activate" -d 'Activate a configured bit rate. The device is silent for the delay, changes, and is silent for it again'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "store" -d 'Store node-ID and bit rate in non-volatile memory'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "identify" -d 'Check whether devices have an identity in a range. Exit code 3 if none answers'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
@@ -1069,9 +1069,9 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from help" -f -a "map" -d 'Set the mapping of a TPDO, and when it is sent'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from help" -f -a "watch" -d 'Show received TPDOs, decoded, until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l channel -d 'Which channel; not given: the only one that has a zero' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l limit -d 'The largest reading that is taken for zero: 0.1 in the present unit, 100mbar, 2% of the measuring range [default: 1%]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l samples -d 'How many readings, 100 ms apart, before and after' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l channel -d 'Channel [default: the only one with a zero]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l limit -d 'Largest accepted reading: 0.1 (in the present unit), 100mbar, 2% (of the measuring range) [default: 1%]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l samples -d 'Number of readings before and after, 100 ms apart' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
@@ -1087,17 +1087,17 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l force -d 'Whatever speaks against it'
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l store -d 'Store it, with the other application settings'
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l dry-run -d 'Measure and check, and change nothing'
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l force -d 'Skip the safety checks'
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l store -d 'Store the offset, with the other application settings'
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l dry-run -d 'Measure and check only; change nothing'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l channel -d 'Which channel; not given: the only one that has a zero' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l limit -d 'The largest reading that is taken for zero: 0.1 in the present unit, 100mbar, 2% of the measuring range [default: 1%]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l samples -d 'How many readings, 100 ms apart, before and after' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l channel -d 'Channel [default: the only one with a zero]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l limit -d 'Largest accepted reading: 0.1 (in the present unit), 100mbar, 2% (of the measuring range) [default: 1%]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l samples -d 'Number of readings before and after, 100 ms apart' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
@@ -1113,9 +1113,9 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l force -d 'Whatever speaks against it'
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l store -d 'Store it, with the other application settings'
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l dry-run -d 'Measure and check, and change nothing'
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l force -d 'Skip the safety checks'
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l store -d 'Store the offset, with the other application settings'
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l dry-run -d 'Measure and check only; change nothing'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s v -l verbose -d 'Print more on stderr'
@@ -1215,7 +1215,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "lss" -d 'Give devices their node-ID and bit rate (LSS, CiA 305, or objects of the device\'s own)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "lss" -d 'Set the node-ID and bit rate of devices (LSS, CiA 305, or objects of the device)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "info" -d 'Show everything about a device on one page'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "unit" -d 'Show or set the physical unit of a signal (6131h)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "filter" -d 'Show or set the filter of a signal: type (61A0h) and constant (61A1h)'
@@ -1224,7 +1224,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "errors" -d 'Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "bus" -d 'List CAN interfaces, bring them up and down, find the bit rate of a bus'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "pdo" -d 'Show, change and watch the transmit PDOs of nodes'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "autozero" -d 'Make the present reading of a channel zero (6125h), with checks before and after'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "autozero" -d 'Set the zero of a channel (6125h), with checks before and after'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "store" -d 'Save settings to non-volatile memory (1010h)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "restore" -d 'Restore factory defaults (1011h); node-ID and bit rate stay'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
@@ -1240,14 +1240,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "startup" -d 'Show or set how a device starts after power on: wait for the master, or auto (by itself)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from sdo" -f -a "read" -d 'Read objects: the value is never scaled; several objects print "OBJECT VALUE" lines'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from sdo" -f -a "write" -d 'Write an object, or several OBJECT=VALUE'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "scan" -d 'List who can be given a node-ID: those that have one by SDO, those that have none by fastscan'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "inquire" -d 'Ask a device for its identity and node-ID by LSS'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "set-id" -d 'Give a device its node-ID: checked to be free, configured, stored, reset, and confirmed'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "set-bitrate" -d 'Give a device its bit rate, by its own table'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "set" -d 'Give a device its node-ID and its bit rate: one store, one reset'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "activate" -d 'Bring configured bit rates into force: so long they go on, as long again they are silent'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "store" -d 'Make node-ID and bit rate last'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "identify" -d 'Ask whether there are devices with numbers within limits; exit 3 where nobody answers'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "scan" -d 'List devices with a node-ID (found by SDO) and without one (found by fastscan)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "inquire" -d 'Read the identity and node-ID of a device by LSS'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "set-id" -d 'Set the node-ID of a device: check that it is free, configure, store, reset, confirm'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "set-bitrate" -d 'Set the bit rate of a device, by its own bit rate table'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "set" -d 'Set the node-ID and bit rate of a device, with one store and one reset'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "activate" -d 'Activate a configured bit rate. The device is silent for the delay, changes, and is silent for it again'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "store" -d 'Store node-ID and bit rate in non-volatile memory'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from lss" -f -a "identify" -d 'Check whether devices have an identity in a range. Exit code 3 if none answers'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from bus" -f -a "list" -d 'List the CAN interfaces of this computer with bit rate, state and error counters'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from bus" -f -a "up" -d 'Bring an interface up at a bit rate'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from bus" -f -a "down" -d 'Bring an interface down'

@@ -24,8 +24,8 @@ pub const STORE_TIMEOUT: Duration = Duration::from_secs(3);
 /// The pause after a frame without an answer. Some slaves can buffer only one frame.
 const FRAME_PAUSE: Duration = Duration::from_millis(2);
 
-/// The pause when an address is repeated. python-canopen waits 200 ms.
-const RETRY_PAUSE: Duration = Duration::from_millis(50);
+/// The pause between frames that are repeated, for slow slaves. python-canopen waits as long.
+const RETRY_PAUSE: Duration = Duration::from_millis(200);
 
 /// The wait for answers of further slaves after the first answer.
 const FURTHER_ANSWERS_TIMEOUT: Duration = Duration::from_millis(20);

@@ -1,10 +1,7 @@
 //! JSON Lines: one object a line.
 
-use super::notes::{Told, notes};
 use super::text::steers;
-use crate::canopen::id::NodeId;
 use crate::measure::sample::{Number, Source, Status};
-use crate::tasks::autozero::Zeroed;
 use serde::Serialize;
 use serde_json::ser::Formatter;
 use std::io::{self, Write};
@@ -31,36 +28,6 @@ impl Formatter for Safe {
         }
         Ok(())
     }
-}
-
-/// A zero that was set.
-pub fn zeroed(out: &mut dyn Write, node: NodeId, zeroed: &Zeroed) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Row<'a> {
-        node: u8,
-        channel: u8,
-        unit: Option<&'a str>,
-        before: Option<f64>,
-        after: Option<f64>,
-        offset_before: JsonNumber,
-        offset: JsonNumber,
-        stored: bool,
-        notes: Vec<Told>,
-    }
-    // Two digits more than those that tell something: a mean has as many as it likes.
-    let round = |mean: f64| format!("{mean:.*}", zeroed.decimals + 2).parse().unwrap_or(mean);
-    let row = Row {
-        node: node.get(),
-        channel: zeroed.channel,
-        unit: Some(zeroed.unit.as_str()).filter(|unit| !unit.is_empty()),
-        before: zeroed.before.map(round),
-        after: zeroed.after.map(round),
-        offset_before: JsonNumber(zeroed.offset_before),
-        offset: JsonNumber(zeroed.offset),
-        stored: zeroed.stored,
-        notes: notes(&zeroed.notes),
-    };
-    line(out, &row)
 }
 
 /// A number as JSON has them: decimals keep their digits, what is not finite is null.

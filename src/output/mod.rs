@@ -1,5 +1,6 @@
 //! Rows and text: what goes to stdout, stderr and files. Knows no bus and no command line.
 
+pub mod autozero;
 pub mod check_progress;
 pub mod console;
 pub mod csv;

@@ -41,7 +41,7 @@ fn the_zero_is_set_where_each_device_keeps_it() {
     let done = still(0.0625, 0.0, 0.0).run("autozero 1 --store -f json").exit(0);
     assert!(
         done.stdout.starts_with(
-            "{\"node\":1,\"channel\":1,\"unit\":\"bar\",\"before\":0.0625,\"after\":0.0,\"offset_before\":0.0,\
+            "{\"node\":1,\"channel\":1,\"signal\":\"pressure\",\"unit\":\"bar\",\"before\":0.0625,\"after\":0.0,\"offset_before\":0.0,\
              \"offset\":-0.0625,\"stored\":true,\"notes\":[{\"code\":\"undo\","
         ),
         "{}",
@@ -52,7 +52,7 @@ fn the_zero_is_set_where_each_device_keeps_it() {
     let done = bench.run("autozero 127 -f csv --dry-run").exit(0);
     assert_eq!(
         done.stdout,
-        "node,channel,unit,before,after,offset_before,offset,stored\n127,1,psi,0.5000,,0.000,,false\n"
+        "node,channel,signal,unit,before,after,offset_before,offset,stored\n127,1,pressure,psi,0.5000,,0.000,,false\n"
     );
 }
 
@@ -172,7 +172,7 @@ fn a_device_that_is_not_known_is_treated_by_the_standard() {
 fn arguments_are_checked_before_the_bus_is_opened() {
     let bench = Bench::of("mh4@1");
     bench.run("autozero 1 --limit 1x").refuses("\"1x\" is not a limit (0.1, 100mbar, 2%)");
-    bench.run("autozero 1 --limit 0").refuses("\"0\": a limit is more than 0");
+    bench.run("autozero 1 --limit 0").refuses("\"0\": a limit must be greater than 0");
     bench.run("autozero 1 --samples 1").exit(2);
     let done = bench.run("autozero 1 --limit 5degC").exit(2);
     assert!(done.stderr.contains("pressure is in bar, and a limit in degC does not convert"), "{}", done.stderr);

@@ -95,6 +95,22 @@ fn rejected_store_is_reverted_and_no_success() {
 }
 
 #[test]
+fn silent_lss_uses_the_objects_of_the_description() {
+    let silent = format!(", lss = {{ lose = {:?} }}", [0x43; 16]);
+    let mut bus = bus(&bench("mh4", &silent));
+    let done = run(&mut bus, "5", &id(12));
+    assert!(done.warns("its own objects are used instead"), "{:?}", done.notes);
+    done.result.unwrap();
+    assert_eq!(all_held(&bus)[0].2, Some(12));
+    // Not if the user chose LSS. The hint contains the identity.
+    let mut bus = super::bus(&bench("mh4", &silent));
+    let done = run(&mut bus, "5", &Wanted { via: Via::Lss, ..id(12) });
+    assert_eq!(done.failure().0, Kind::NoAnswer);
+    let hint = ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap();
+    assert!(hint.contains("cangauge nmt stop 5; cangauge lss inquire 0x47:0x1:0x10007:100"), "{hint}");
+}
+
+#[test]
 fn lost_acknowledgement_of_a_store_is_no_success() {
     let mut bus = bus(&bench("mh4", ", lss = { lose = [0x17] }"));
     let done = run(&mut bus, "5", &id(12));
