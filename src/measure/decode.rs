@@ -53,6 +53,12 @@ struct TpdoDecoder {
     is_held: bool,
     /// TPDOs received with another length.
     wrong_lengths: u64,
+    /// The length of the first TPDO with another length.
+    other_length: Option<usize>,
+    /// TPDOs had more than one length.
+    is_mixed: bool,
+    /// TPDOs of [`TpdoDecoder::other_length`] are used up to the mapped length.
+    uses_longer: bool,
 }
 
 /// Decodes the TPDOs of several nodes.
@@ -63,6 +69,10 @@ pub struct Decoder {
     /// COB-IDs of two nodes that were not reported yet.
     shared: BTreeMap<CanId, (NodeId, NodeId)>,
 }
+
+/// Lengths of TPDOs that differ from their mapping: the first one, and whether there were others.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LengthsSeen(BTreeMap<CanId, (usize, bool)>);
 
 /// What a decoder did with a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,6 +117,34 @@ impl Decoder {
         self.add(layout, wanted);
     }
 
+    /// Uses the TPDOs of a node that are always longer than their mapping, up to the mapped length. Call it only if the
+    /// mapping was read from the device and read again without a difference. `before` has the lengths received before the
+    /// mapping was read again. Returns the mapped and the received length of each such TPDO.
+    pub fn use_longer(&mut self, node: NodeId, before: &LengthsSeen) -> Vec<(CanId, usize, usize)> {
+        let mut used = Vec::new();
+        for (&id, tpdo) in self.tpdos.iter_mut().filter(|(_, tpdo)| tpdo.node == node) {
+            let Some(&(length, is_mixed)) = before.0.get(&id) else { continue };
+            (tpdo.other_length, tpdo.is_mixed) = (Some(length), is_mixed);
+            tpdo.uses_longer = !is_mixed && length > tpdo.length;
+            if tpdo.uses_longer {
+                used.push((id, tpdo.length, length));
+            }
+        }
+        used
+    }
+
+    /// The lengths that the TPDOs of a node had, if they differ from the mapping.
+    pub fn lengths_seen(&self, node: NodeId) -> LengthsSeen {
+        let of_node = self.tpdos.iter().filter(|(_, tpdo)| tpdo.node == node);
+        LengthsSeen(of_node.filter_map(|(&id, tpdo)| Some((id, (tpdo.other_length?, tpdo.is_mixed)))).collect())
+    }
+
+    /// The mapped and the received length in bytes of the first TPDO of a node whose length differs from its mapping.
+    pub fn wrong_length(&self, node: NodeId) -> Option<(usize, usize)> {
+        let mut of_node = self.tpdos.values().filter(|tpdo| tpdo.node == node && !tpdo.uses_longer);
+        of_node.find_map(|tpdo| Some((tpdo.length, tpdo.other_length?)))
+    }
+
     /// Removes the TPDOs of a node.
     pub fn remove(&mut self, node: NodeId) {
         self.tpdos.retain(|_, tpdo| tpdo.node != node);
@@ -119,7 +157,7 @@ impl Decoder {
 
     fn tpdo_decoder(&mut self, layout: Layout<'_>, tpdo: &Tpdo, wanted: &[Wanted]) -> TpdoDecoder {
         let fields = lay_out(&tpdo.mapping);
-        let bits: usize = tpdo.mapping.iter().map(|entry| usize::from(entry.bits)).sum();
+        let bits: usize = fields.iter().map(|field| usize::from(field.entry.bits)).sum();
         let mut values = Vec::new();
         for field in &fields {
             let object = field.entry.object;
@@ -163,7 +201,16 @@ impl Decoder {
                 }
             }
         }
-        TpdoDecoder { node: layout.node, length: bits.div_ceil(8), values, is_held: false, wrong_lengths: 0 }
+        TpdoDecoder {
+            node: layout.node,
+            length: bits.div_ceil(8),
+            values,
+            is_held: false,
+            wrong_lengths: 0,
+            other_length: None,
+            is_mixed: false,
+            uses_longer: false,
+        }
     }
 
     /// Every source, in the order of their numbers.
@@ -203,9 +250,19 @@ impl Decoder {
             return Decoded::Held(tpdo.node);
         }
         let data = frame.data();
-        if data.len() != tpdo.length {
+        if data.len() != tpdo.length || tpdo.uses_longer {
             tpdo.wrong_lengths += 1;
-            return Decoded::WrongLength(tpdo.node);
+            let other = *tpdo.other_length.get_or_insert(data.len());
+            if other != data.len() {
+                // Two devices send with this COB-ID, or the mapping has changed.
+                tpdo.is_mixed = true;
+                tpdo.uses_longer = false;
+            }
+            if !tpdo.uses_longer {
+                return Decoded::WrongLength(tpdo.node);
+            }
+        } else if tpdo.other_length.is_some() {
+            tpdo.is_mixed = true;
         }
         for value in &tpdo.values {
             let Some((bytes, len)) = value.field.bytes(data) else { continue };
@@ -333,6 +390,46 @@ mod tests {
         });
         assert_eq!(rows(&second, &[], "181#030000803F00"), [row("0x6150:1", "3", ""), row("pressure", "1", "ok")]);
         assert_eq!(rows(&second, &[], "181#000000803F01"), [row("0x6150:1", "0", ""), row("pressure", "", "invalid")]);
+    }
+
+    /// Decodes the frames; after the first `before` ones the mapping is read again. Returns the values of the later ones.
+    fn after_reread(words: &[u32], before: usize, frames: &[&str]) -> Vec<String> {
+        let node = node(REAL, words, |_| {});
+        let mut decoder = Decoder::default();
+        decoder.add(node.layout(), &[]);
+        let mut samples = Vec::new();
+        for (at, frame) in frames.iter().enumerate() {
+            if at == before {
+                let seen = decoder.lengths_seen(node.id);
+                decoder.replace(node.layout(), &[]);
+                decoder.use_longer(node.id, &seen);
+                samples.clear();
+            }
+            let received = Received { frame: frame.parse().expect("a frame"), at: Stamp::default() };
+            decoder.decode(&received, &mut samples);
+        }
+        samples.iter().filter_map(|sample| Some(sample.value?.to_string())).collect()
+    }
+
+    #[test]
+    fn longer_tpdo_is_used_after_a_reread_if_its_length_is_constant() {
+        let long = "181#0000803F00000000";
+        assert_eq!(after_reread(&[0x6130_0120], 1, &[long, long, long]), ["1", "1"]);
+        assert_eq!(after_reread(&[0x7130_0110], 1, &["181#640000", "181#650000"]), ["0.101"]);
+        let none: [&str; 0] = [];
+        assert_eq!(after_reread(&[0x6130_0120], 9, &[long, long]), none, "not read again");
+        assert_eq!(after_reread(&[0x6130_0120], 1, &["181#0000", "181#0000"]), none, "shorter");
+        assert_eq!(after_reread(&[0x6130_0120], 2, &[long, "181#0000803F00", long]), none, "two lengths");
+        assert_eq!(after_reread(&[0x6130_0120], 1, &[long, "181#0000803F00", long]), none, "two lengths, later");
+        assert_eq!(after_reread(&[0x6130_0120], 2, &["181#0000803F", long, long]), ["1"], "long since the reread");
+    }
+
+    #[test]
+    fn highest_bit_of_a_mapped_length_is_ignored() {
+        let odd = node(REAL, &[0x7130_0190], |_| {});
+        assert_eq!(rows(&odd, &[], "181#85FF"), [row("pressure", "-0.123", "")]);
+        let real = node(REAL, &[0x6130_01a0], |_| {});
+        assert_eq!(rows(&real, &[], "181#0000803F"), [row("pressure", "1", "")]);
     }
 
     #[test]

@@ -178,11 +178,16 @@ fn read_services<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(),
 
 fn read_tpdos<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
     let numbers = |instrument: &Node| -> Vec<TpdoNumber> {
-        let described = |number: &TpdoNumber| match &instrument.model {
-            Some(model) => model.dictionary.has_index(number.communication(0).index),
-            None => number.get() <= TPDOS_TRIED,
+        let has = |number: &TpdoNumber| {
+            let dictionary = instrument.model.as_ref().map(|model| &model.dictionary);
+            dictionary.is_some_and(|dictionary| dictionary.has_index(number.communication(0).index))
         };
-        (1..=512).filter_map(TpdoNumber::new).filter(described).collect()
+        let described: Vec<TpdoNumber> = (1..=512).filter_map(TpdoNumber::new).filter(has).collect();
+        if described.is_empty() {
+            // No description, or one without TPDOs: the device knows.
+            return (1..=TPDOS_TRIED).filter_map(TpdoNumber::new).collect();
+        }
+        described
     };
     let wanted: Vec<(usize, TpdoNumber)> = instruments
         .iter()

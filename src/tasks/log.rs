@@ -106,8 +106,14 @@ pub enum LogEvent {
     Silent(NodeId, Duration),
     /// The node sends samples again.
     Back(NodeId),
-    /// A TPDO of the node has another length than its mapping.
-    WrongLength(NodeId),
+    /// A TPDO of the node has another length than its mapping: mapped and received length in bytes. It makes no row.
+    WrongLength(NodeId, usize, usize),
+    /// A TPDO of the node is always longer than its mapping: mapped and received length in bytes. The mapped bytes are used.
+    LongerTpdo(NodeId, usize, usize),
+    /// The heartbeats of the node have this many bytes, not one.
+    HeartbeatLength(NodeId, usize),
+    /// A node sent this emergency with this meaning again, so many times.
+    EmergencyRepeated(NodeId, Emergency, String, u64),
     /// The controller reports a fault.
     Fault(Fault),
     /// The receive buffer of the kernel.

@@ -52,9 +52,28 @@ pub fn event_text(event: &LogEvent) -> EventText {
             of_node(*node, "lost", Warning, format!("node {node}: silent for {}", spoken(*since)))
         }
         LogEvent::Back(node) => of_node(*node, "back", Info, format!("node {node} is back")),
-        LogEvent::WrongLength(node) => {
-            let text = format!("node {node}: a TPDO has another length than its mapping: it makes no row");
+        LogEvent::WrongLength(node, mapped, received) => {
+            let text = format!("node {node}: a TPDO has {received} bytes, its mapping {mapped}: it makes no row");
             of_node(*node, "length", Warning, text)
+        }
+        LogEvent::LongerTpdo(node, mapped, received) => {
+            let text = format!(
+                "node {node}: a TPDO has {received} bytes, its mapping {mapped}: the first {mapped} bytes are used from now on"
+            );
+            of_node(*node, "length", Warning, text)
+        }
+        LogEvent::HeartbeatLength(node, 0) => {
+            let text = format!("node {node}: frames of 0 bytes on its heartbeat COB-ID are ignored");
+            of_node(*node, "heartbeat-length", Info, text)
+        }
+        LogEvent::HeartbeatLength(node, length) => {
+            let text = format!("node {node}: its heartbeats have {length} bytes, not 1: the first byte is the state");
+            of_node(*node, "heartbeat-length", Info, text)
+        }
+        LogEvent::EmergencyRepeated(node, emergency, meaning, count) => {
+            let times = if *count == 1 { "once more".to_owned() } else { format!("{count} times more") };
+            let text = format!("node {node}: {}: {times}", emergency_text(*emergency, meaning));
+            of_node(*node, "emcy", Warning, text)
         }
         LogEvent::Fault(fault) => of_all("fault", fault_weight(*fault), fault.to_string()),
         LogEvent::Buffer(buffer) => EventText { event: None, node: None, text: buffer_text(*buffer), weight: Detail },

@@ -3,6 +3,7 @@
 use super::Words;
 use crate::bus::time::spoken;
 use crate::canopen::id::NodeId;
+use crate::canopen::nmt::NmtState;
 use crate::tasks::Failure;
 use crate::tasks::log::{LogFailure, SilenceReason};
 
@@ -74,30 +75,72 @@ fn count(rows: u64) -> String {
     if rows == 1 { "1 row".to_owned() } else { format!("{rows} rows") }
 }
 
+/// What cannot be told apart without a heartbeat.
+const NOT_RUNNING: &str = "the node is not operational, or has no power or cable";
+
 /// Why a node sends no measurements.
 pub(in crate::output) fn reason_text(reason: SilenceReason) -> String {
     match reason {
         SilenceReason::NoAnswer => "it does not answer".to_owned(),
+        SilenceReason::NotOperational { state, was_started, emergency } => {
+            let again = if was_started { " again after the start" } else { "" };
+            let emergency = emergency.map(|code| format!(", emergency {code:04X}h")).unwrap_or_default();
+            format!("it is {state}{again}{emergency}")
+        }
         SilenceReason::NoTpdo => "it has no TPDO".to_owned(),
-        SilenceReason::AllTpdosDisabled => "all its TPDOs are disabled (bit 31 of 1800h:1)".to_owned(),
-        SilenceReason::NothingMapped => "nothing is mapped into its TPDOs".to_owned(),
+        SilenceReason::AllTpdosDisabled(number) => {
+            format!("its TPDOs are disabled (bit 31 of {:04X}h:1)", number.communication(1).index)
+        }
+        SilenceReason::NothingMapped(number) => format!(
+            "nothing is mapped into its TPDOs, or they are multiplexed PDOs ({:04X}h:0)",
+            number.mapping(0).index
+        ),
+        SilenceReason::OnlyOnRequest(number) => {
+            format!("{number} is sent on remote request only ({:04X}h:2 is 252 or 253)", number.communication(2).index)
+        }
+        SilenceReason::SteadyAtSync(number) => format!(
+            "{number} is sent at a SYNC only after a change ({:04X}h:2 is 0): its value is steady, or {NOT_RUNNING}",
+            number.communication(2).index
+        ),
+        SilenceReason::TooFewSyncs(number, every, sent) => {
+            format!("{number} is sent at every {every}th SYNC, and {sent} SYNC were sent")
+        }
+        SilenceReason::NotSentAtSync(number) => {
+            format!("{number} is sent at SYNC; SYNC was sent, and no {number} was received: {NOT_RUNNING}")
+        }
+        SilenceReason::SlowEventTimer(number, timer) => {
+            format!("the event timer of {number} is longer ({:04X}h:5 is {timer} ms)", number.communication(5).index)
+        }
         SilenceReason::WaitsForSync(number) => format!("{number} waits for SYNC, and no node sends SYNC"),
         SilenceReason::NoEventTimer(number) => {
-            format!("{number} has no event timer (1800h:5 is 0), and its value does not change enough")
+            let index = number.communication(5).index;
+            format!(
+                "{number} has no event timer ({index:04X}h:5 is 0): its value does not change enough, or {NOT_RUNNING}"
+            )
         }
-        SilenceReason::WrongLength => "its TPDOs have another length than their mapping".to_owned(),
-        SilenceReason::Unknown => "its TPDOs should be sent; is it started?".to_owned(),
+        SilenceReason::WrongLength { mapped, received } => {
+            format!("its TPDOs have {received} bytes, their mapping {mapped}")
+        }
+        SilenceReason::Unknown => format!("its TPDOs are due: {NOT_RUNNING}"),
     }
 }
 
 fn reason_hint(reason: SilenceReason, node: NodeId) -> Option<String> {
     match reason {
-        SilenceReason::NoAnswer | SilenceReason::WrongLength => None,
+        SilenceReason::NoAnswer => None,
+        SilenceReason::NotOperational { state: NmtState::Stopped, .. } => Some(format!("cangauge nmt preop {node}")),
+        SilenceReason::NotOperational { emergency: Some(_), .. } => Some(format!("cangauge errors {node}")),
+        SilenceReason::NotOperational { .. } => Some(format!("cangauge nmt start {node}")),
         SilenceReason::NoTpdo
-        | SilenceReason::AllTpdosDisabled
-        | SilenceReason::NothingMapped
+        | SilenceReason::AllTpdosDisabled(_)
+        | SilenceReason::NothingMapped(_)
+        | SilenceReason::OnlyOnRequest(_)
+        | SilenceReason::SteadyAtSync(_)
+        | SilenceReason::TooFewSyncs(..)
+        | SilenceReason::SlowEventTimer(..)
+        | SilenceReason::WrongLength { .. }
         | SilenceReason::NoEventTimer(_) => Some("read by SDO instead: add --poll 100ms".to_owned()),
         SilenceReason::WaitsForSync(_) => Some(format!("add --sync 100ms, or read by SDO: --poll 100ms (node {node})")),
-        SilenceReason::Unknown => Some(format!("cangauge nmt state {node}")),
+        SilenceReason::Unknown | SilenceReason::NotSentAtSync(_) => Some(format!("cangauge nmt state {node}")),
     }
 }

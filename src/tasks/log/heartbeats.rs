@@ -65,6 +65,12 @@ impl HeartbeatMonitor {
         }
     }
 
+    /// Whether the heartbeat of a node is not lost and shows OPERATIONAL.
+    pub(super) fn is_operational(&self, node: NodeId) -> bool {
+        let heartbeat = self.heartbeats.get(&node).filter(|heartbeat| !heartbeat.is_lost);
+        heartbeat.is_some_and(|heartbeat| heartbeat.state == Some(NmtState::Operational))
+    }
+
     /// A node whose heartbeat has stopped, and since when. Each loss is returned once.
     pub(super) fn next_lost(&mut self, now: Mono) -> Option<(NodeId, Duration)> {
         let is_late =

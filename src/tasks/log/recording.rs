@@ -11,6 +11,7 @@ mod tally;
 use super::passive::SetupListener;
 use super::poll::Poll;
 use super::rereads::Rereads;
+use super::silence::Evidence;
 use super::states::NmtStates;
 use super::{LogEvent, LogOptions, Mode, Observer, Remark};
 use crate::bus::{Bus, Filters, ReceiveBuffer, Received, TimestampSource};
@@ -22,7 +23,7 @@ use crate::node::Node;
 use due::DueTpdos;
 use emergencies::Emergencies;
 use liveness::Liveness;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use tally::Tally;
 
@@ -44,6 +45,10 @@ pub(super) struct Recording<'o> {
     link_is_up: bool,
     /// Nodes whose TPDOs were reported to have a wrong length.
     wrong_length_reported: BTreeSet<NodeId>,
+    /// Nodes whose heartbeats were reported to have not one byte.
+    odd_heartbeats: BTreeSet<NodeId>,
+    /// What each node sent last.
+    pub(super) evidence: BTreeMap<NodeId, Evidence>,
     pub(super) remarks: Vec<Remark>,
     /// Doubts about sources that were reported.
     doubts: BTreeSet<(usize, Doubt)>,
@@ -74,11 +79,18 @@ impl<'o> Recording<'o> {
             receive_buffer: bus.receive_buffer(),
             link_is_up: true,
             wrong_length_reported: BTreeSet::new(),
+            odd_heartbeats: BTreeSet::new(),
+            evidence: BTreeMap::new(),
             remarks: Vec::new(),
             doubts: BTreeSet::new(),
             interrupted: false,
             samples: Vec::new(),
         }
+    }
+
+    /// SYNC messages that this program sent.
+    pub(super) fn syncs(&self) -> u64 {
+        self.tally.syncs.sent
     }
 
     /// Values recorded so far.

@@ -111,6 +111,11 @@ impl Rereads {
         true
     }
 
+    /// Whether a node is to be read again.
+    pub(super) fn is_pending(&self, node: NodeId) -> bool {
+        self.pending.contains_key(&node)
+    }
+
     /// When the next survey starts.
     pub(super) fn due(&self) -> Option<Mono> {
         self.pending.values().filter(|pending| pending.survey.is_none()).map(|pending| pending.due).min()

@@ -52,6 +52,11 @@ impl NmtStates {
         }
     }
 
+    /// Whether this recording has started a node.
+    pub(super) fn has_started(&self, node: NodeId) -> bool {
+        self.started.contains_key(&node)
+    }
+
     /// Returns each node to its previous state if that is known.
     pub(super) fn restore(&mut self, master: &mut Master<'_>) -> Result<(), Error> {
         master.cancel();

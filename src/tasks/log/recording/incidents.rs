@@ -42,7 +42,12 @@ impl Recording<'_> {
         if let Some((node, emergency)) = self.emergencies.parse(frame) {
             self.emergency(node, emergency, at, observer);
         } else if let Some((node, life)) = Life::parse(frame) {
+            if let Some((node, length)) = Life::odd_length(frame) {
+                self.odd_heartbeat(node, length, at, observer);
+            }
             self.life(node, life, at, master, observer);
+        } else if let Some((node, length)) = Life::odd_length(frame) {
+            self.odd_heartbeat(node, length, at, observer);
         } else if let Some(node) = writes_setup(frame) {
             self.request_reread(node, RereadReason::Written, at.mono, master);
         }
@@ -53,7 +58,28 @@ impl Recording<'_> {
             return;
         }
         self.tally.emergencies += 1;
+        if emergency.code != 0 {
+            self.evidence.entry(node).or_default().emergency = Some(emergency.code);
+        }
+        if !self.emergencies.is_new(node, emergency, at.mono) {
+            return;
+        }
         observer.event(&LogEvent::Emergency(node, emergency, self.emergencies.meaning(node, emergency)), at);
+    }
+
+    /// Reports once that the heartbeats of a node have not one byte.
+    fn odd_heartbeat(&mut self, node: NodeId, length: usize, at: Stamp, observer: &mut dyn Observer) {
+        if self.liveness.has(node) && self.odd_heartbeats.insert(node) {
+            observer.event(&LogEvent::HeartbeatLength(node, length), at);
+        }
+    }
+
+    /// Reports how often emergencies were repeated.
+    pub(super) fn report_repeated(&mut self, at: Stamp, at_end: bool, observer: &mut dyn Observer) {
+        while let Some((node, emergency, count)) = self.emergencies.next_repeated(at.mono, at_end) {
+            let meaning = self.emergencies.meaning(node, emergency);
+            observer.event(&LogEvent::EmergencyRepeated(node, emergency, meaning, count), at);
+        }
     }
 
     /// Takes a heartbeat or boot-up message.
@@ -66,6 +92,10 @@ impl Recording<'_> {
         if !self.liveness.has(node) {
             return;
         }
+        self.evidence.entry(node).or_default().state = match life {
+            Life::State(state) => Some(state),
+            Life::BootUp => None,
+        };
         match self.liveness.take_life(node, life, at.mono) {
             HeartbeatChange::None => {}
             HeartbeatChange::Back => {
@@ -152,10 +182,15 @@ impl Recording<'_> {
         observer: &mut dyn Observer,
     ) {
         self.tally.events.wrong_lengths += 1;
-        if self.wrong_length_reported.insert(node) {
-            observer.event(&LogEvent::WrongLength(node), at);
-        }
         self.request_reread(node, RereadReason::WrongLength, at.mono, master);
+        // A longer TPDO may be used once its mapping was read again.
+        let may_be_used = |mapped, received| received > mapped && self.rereads.is_pending(node);
+        if let Some((mapped, received)) = self.decoder.wrong_length(node)
+            && !may_be_used(mapped, received)
+            && self.wrong_length_reported.insert(node)
+        {
+            observer.event(&LogEvent::WrongLength(node, mapped, received), at);
+        }
     }
 
     /// Takes the result of a transfer of a reread.
@@ -188,11 +223,19 @@ impl Recording<'_> {
                     observer.event(&LogEvent::Unreadable(id, Box::new(failure)), at);
                 }
             }
-            None => self.decoder.replace(node.layout(), &self.options.wanted),
+            None => {
+                let seen = self.decoder.lengths_seen(id);
+                self.decoder.replace(node.layout(), &self.options.wanted);
+                if changes.is_empty() {
+                    for (_, mapped, received) in self.decoder.use_longer(id, &seen) {
+                        observer.event(&LogEvent::LongerTpdo(id, mapped, received), at);
+                    }
+                }
+            }
         }
         self.update_sources();
         self.emergencies.watch(&node);
-        self.liveness.watch_heartbeat(&node, at.mono);
+        self.liveness.watch_heartbeat(&node, self.options.mode, at.mono);
         self.liveness.restart(id, at.mono);
         self.nodes[place] = node;
         self.due.set_up(&self.nodes, &self.decoder);

@@ -5,7 +5,9 @@ use super::super::interval::IntervalTracker;
 use crate::bus::Mono;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::Life;
+use crate::canopen::pdo::Transmission;
 use crate::node::Node;
+use crate::tasks::log::Mode;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -21,6 +23,8 @@ struct NodeLiveness {
     samples: IntervalTracker,
     /// Reported as silent, until the next sample.
     is_silent: bool,
+    /// It sends only on change: silence proves nothing while its heartbeat shows OPERATIONAL.
+    sends_on_change: bool,
 }
 
 impl Liveness {
@@ -46,8 +50,11 @@ impl Liveness {
     }
 
     /// Watches the heartbeat of a node from now on, if it has one.
-    pub(super) fn watch_heartbeat(&mut self, node: &Node, now: Mono) {
+    pub(super) fn watch_heartbeat(&mut self, node: &Node, mode: Mode, now: Mono) {
         self.heartbeats.watch(node, now);
+        if let Some(liveness) = self.nodes.get_mut(&node.id) {
+            liveness.sends_on_change = sends_on_change(node, mode);
+        }
     }
 
     /// Takes samples of a node. Returns whether it had been reported as silent.
@@ -77,7 +84,11 @@ impl Liveness {
 
     /// A node that stopped sending samples, and for how long. Each silence is returned once.
     pub(super) fn next_silent(&mut self, now: Mono) -> Option<(NodeId, Duration)> {
+        let heartbeats = &self.heartbeats;
         self.nodes.iter_mut().find_map(|(&node, liveness)| {
+            if liveness.sends_on_change && heartbeats.is_operational(node) {
+                return None;
+            }
             let silence = liveness.samples.silence(now).filter(|_| !liveness.is_silent)?;
             liveness.is_silent = true;
             Some((node, silence))
@@ -91,12 +102,75 @@ impl Liveness {
 
     /// The nodes that sent no samples at all, or stopped before `end`.
     pub(super) fn lost(&self, end: Mono) -> Vec<NodeId> {
-        let lost = self.nodes.iter().filter(|(_, liveness)| liveness.samples.is_lost(end));
+        let is_lost = |node: NodeId, liveness: &NodeLiveness| {
+            liveness.samples.is_lost(end) && !(liveness.sends_on_change && self.heartbeats.is_operational(node))
+        };
+        let lost = self.nodes.iter().filter(|&(&node, liveness)| is_lost(node, liveness));
         lost.map(|(&node, _)| node).collect()
     }
 
     /// Whether this node sent at least one sample.
     pub(super) fn has_sent(&self, node: NodeId) -> bool {
         self.nodes.get(&node).is_some_and(|liveness| liveness.samples.has_received())
+    }
+}
+
+/// Whether none of a node's valid TPDOs is due at any time: no event timer, and no SYNC that causes it.
+fn sends_on_change(node: &Node, mode: Mode) -> bool {
+    let mut valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).peekable();
+    let is_due = |transmission, event_timer_ms: Option<u16>| match transmission {
+        Some(Transmission::AcyclicSync) => false,
+        Some(Transmission::Manufacturer | Transmission::Profile) => event_timer_ms.is_some_and(|timer| timer > 0),
+        _ => true,
+    };
+    !matches!(mode, Mode::Poll(_) | Mode::Passive)
+        && valid.peek().is_some()
+        && valid.all(|tpdo| !is_due(tpdo.transmission, tpdo.event_timer_ms))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::canopen::nmt::NmtState;
+    use crate::canopen::pdo::{CobId, TpdoNumber};
+    use crate::measure::layout::Tpdo;
+
+    fn at(milliseconds: u64) -> Mono {
+        Mono::at(Duration::from_millis(milliseconds))
+    }
+
+    /// Whether a node that sent two samples, and then heartbeats of `state` until 9 s, is lost at 10 s.
+    fn is_lost(transmission: u8, timer: u16, cob_id: u32, state: NmtState, end: u64) -> bool {
+        let id = NodeId::new(5).expect("a node-ID");
+        let mut node = Node::new(id);
+        node.heartbeat_ms = Some(1000);
+        node.tpdos.push(Tpdo {
+            number: TpdoNumber::new(1).expect("a number"),
+            cob_id: CobId(cob_id),
+            transmission: Some(Transmission::from_code(transmission)),
+            event_timer_ms: Some(timer),
+            mapping: Vec::new(),
+        });
+        let mut liveness = Liveness::new([id].into_iter());
+        liveness.watch_heartbeat(&node, Mode::AsSent, at(0));
+        liveness.take_samples(id, at(100));
+        liveness.take_samples(id, at(200));
+        for second in 1..10 {
+            liveness.take_life(id, Life::State(state), at(second * 1000));
+        }
+        while liveness.next_lost_heartbeat(at(end)).is_some() {}
+        !liveness.lost(at(end)).is_empty()
+    }
+
+    #[test]
+    fn node_that_sends_on_change_is_not_lost_while_operational() {
+        let operational = NmtState::Operational;
+        assert!(!is_lost(255, 0, 0x185, operational, 10_000));
+        assert!(!is_lost(0, 0, 0x185, operational, 10_000), "at a SYNC after a change");
+        assert!(is_lost(255, 0, 0x185, operational, 20_000), "the heartbeat stopped");
+        assert!(is_lost(255, 0, 0x185, NmtState::PreOperational, 10_000));
+        assert!(is_lost(254, 100, 0x185, operational, 10_000), "the event timer is due");
+        assert!(is_lost(1, 0, 0x185, operational, 10_000), "a SYNC is due");
+        assert!(is_lost(255, 0, 0x8000_0185, operational, 10_000), "the TPDO is off");
     }
 }

@@ -1,7 +1,6 @@
 //! The result of a recording.
 
 use super::Recording;
-use crate::canopen::id::NodeId;
 use crate::tasks::log::silence::{silence_reason, why_nothing};
 use crate::tasks::log::{RecordingReport, Remark};
 
@@ -9,7 +8,7 @@ impl Recording<'_> {
     /// Ends the recording.
     pub(in crate::tasks::log) fn report(mut self) -> RecordingReport {
         let lost = self.liveness.lost(self.tally.end());
-        self.remark_at_end(&lost);
+        self.remark_at_end();
         let nothing = (self.tally.rows == 0).then(|| why_nothing(&self, self.options));
         RecordingReport {
             rows: self.tally.rows,
@@ -30,7 +29,7 @@ impl Recording<'_> {
         }
     }
 
-    fn remark_at_end(&mut self, lost: &[NodeId]) {
+    fn remark_at_end(&mut self) {
         match self.tally.syncs.left_out {
             0 => {}
             count if self.tally.events.link_losses > 0 => self.remarks.push(Remark::SyncsOmittedWhileDown(count)),
@@ -42,12 +41,9 @@ impl Recording<'_> {
         if self.tally.rows == 0 {
             return;
         }
-        for &id in lost {
-            if let Some(node) = self.nodes.iter().find(|node| node.id == id)
-                && !self.liveness.has_sent(id)
-            {
-                self.remarks.push(Remark::NoMeasurements(id, silence_reason(node, self.options.mode)));
-            }
-        }
+        let silent = self.nodes.iter().filter(|node| self.liveness.has(node.id) && !self.liveness.has_sent(node.id));
+        let reasons = silent.map(|node| Remark::NoMeasurements(node.id, silence_reason(self, node, self.options)));
+        let reasons: Vec<Remark> = reasons.collect();
+        self.remarks.extend(reasons);
     }
 }

@@ -66,7 +66,7 @@ impl Recording<'_> {
         let start = master.now();
         self.tally.extend_to(start);
         for node in &self.nodes {
-            self.liveness.watch_heartbeat(node, start);
+            self.liveness.watch_heartbeat(node, self.options.mode, start);
         }
         let mut producer = match self.options.mode {
             Mode::Sync(interval) => {
@@ -92,6 +92,7 @@ impl Recording<'_> {
             self.tally.dropped += u64::from(late_drops);
             observer.event(&LogEvent::Dropped(late_drops), master.bus().now());
         }
+        self.report_repeated(master.bus().now(), true, observer);
         result
     }
 
@@ -147,6 +148,7 @@ impl Recording<'_> {
             return ControlFlow::Continue(());
         }
         schedule.next_tick = now + TICK;
+        self.report_repeated(master.bus().now(), false, observer);
         observer.tick(master.bus().now(), self.tally.rows)
     }
 
