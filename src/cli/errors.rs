@@ -3,8 +3,8 @@
 use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
-use crate::tasks::settings::Device;
 use crate::tasks::settings::errors::{ErrorReport, clear, read};
+use crate::tasks::settings::open as open_node;
 use clap::Args;
 
 /// Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history
@@ -29,12 +29,12 @@ impl Errors {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let overrides = open::overrides(global, &[self.node])?;
         let report = global.with_master(|master| {
-            let device = Device::open(master, self.node, &overrides)?;
+            let node = open_node(master, self.node, &overrides)?;
             let (errors, cleared) = if self.clear {
-                let (before, now) = clear(master, &device)?;
+                let (before, now) = clear(master, &node)?;
                 (now, before.count)
             } else {
-                (read(master, &device)?, None)
+                (read(master, &node)?, None)
             };
             Ok(ErrorReport { node: self.node, errors, cleared })
         })?;

@@ -4,8 +4,9 @@ use super::args::Duration;
 use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
-use crate::tasks::settings::Device;
-use crate::tasks::settings::filter::{FilterReport, FilterType, Wanted, set, show};
+use crate::output::notes;
+use crate::tasks::settings::filter::{FilterReport, FilterRequest, FilterType, set, show};
+use crate::tasks::settings::open as open_node;
 use clap::{Args, ValueEnum};
 
 /// Show or set the filter of a signal: type (61A0h) and constant (61A1h)
@@ -47,7 +48,7 @@ impl Filter {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let wanted = Wanted {
+        let wanted = FilterRequest {
             kind: self.kind.map(|kind| match kind {
                 Type::None => FilterType::None,
                 Type::Moving => FilterType::Moving,
@@ -58,30 +59,22 @@ impl Filter {
         };
         let overrides = open::overrides(global, &[self.node])?;
         let signal = self.signal.as_deref();
-        if wanted == Wanted::default() {
+        if wanted == FilterRequest::default() {
             let filters = global.with_master(|master| {
-                let device = Device::open(master, self.node, &overrides)?;
-                Ok(show(master, &device, signal)?)
+                let node = open_node(master, self.node, &overrides)?;
+                Ok(show(master, &node, signal)?)
             })?;
-            let filters = filters.into_iter().map(|filter| FilterReport { filter, damping_shown: None });
+            let filters =
+                filters.into_iter().map(|filter| FilterReport { filter, damping_shown: None, notes: Vec::new() });
             return global.print(&filters.collect::<Vec<_>>());
         }
         let change = global.with_master(|master| {
-            let device = Device::open(master, self.node, &overrides)?;
-            Ok(set(master, &device, signal, wanted)?)
+            let node = open_node(master, self.node, &overrides)?;
+            Ok(set(master, &node, signal, wanted)?)
         })?;
-        let (console, node) = (global.console(), self.node);
-        let constant = change.now.constant.map_or_else(|| "unknown".to_owned(), |constant| constant.to_string());
-        let changed = change.before != change.now;
-        global.print(&[FilterReport { filter: change.now, damping_shown: change.damping_shown }])?;
-        if change.damping_shown == Some(false) {
-            console.warn(&format!(
-                "node {node}: the damping was acknowledged, but the filter constant did not change ({constant})"
-            ));
-        }
-        if changed {
-            console.note(&format!("node {node}: lost at power-off unless stored: cangauge store {node}"));
-        }
+        let report = change.into_report();
+        global.print(std::slice::from_ref(&report))?;
+        report.notes.iter().for_each(|note| notes::print(&global.console(), note));
         Ok(())
     }
 }

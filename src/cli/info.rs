@@ -3,8 +3,8 @@
 use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
-use crate::tasks::settings::Device;
 use crate::tasks::settings::info::read;
+use crate::tasks::settings::open as open_node;
 use clap::Args;
 
 /// Show everything about a device on one page
@@ -28,8 +28,8 @@ impl Info {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let overrides = open::overrides(global, &[self.node])?;
         let page = global.with_master(|master| {
-            let device = Device::open(master, self.node, &overrides)?;
-            Ok(read(master, &device)?)
+            let node = open_node(master, self.node, &overrides)?;
+            Ok(read(master, &node)?)
         })?;
         global.print(&[page])
     }

@@ -3,8 +3,10 @@
 use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
-use crate::tasks::settings::Device;
+use crate::output::failure::ErrorMessage;
+use crate::output::notes;
 use crate::tasks::settings::limits::{Limit, set, show};
+use crate::tasks::settings::open as open_node;
 use clap::Args;
 
 /// Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)
@@ -52,28 +54,19 @@ impl Limits {
         for (limit, number) in wanted.iter().filter(|(limit, _)| matches!(limit, Limit::Delta | Limit::Hysteresis)) {
             if *number < 0.0 {
                 let message = format!("{} must not be negative: {number}", limit.as_str());
-                return Err(crate::tasks::Failure::new(crate::tasks::Kind::Usage, message).into());
+                return Err(ErrorMessage::usage(message).into());
             }
         }
         let overrides = open::overrides(global, &[self.node])?;
         let report = global.with_master(|master| {
-            let device = Device::open(master, self.node, &overrides)?;
+            let node = open_node(master, self.node, &overrides)?;
             Ok(match wanted.is_empty() {
-                true => show(master, &device, &self.signal)?,
-                false => set(master, &device, &self.signal, &wanted)?,
+                true => show(master, &node, &self.signal)?,
+                false => set(master, &node, &self.signal, &wanted)?,
             })
         })?;
         global.print(std::slice::from_ref(&report))?;
-        let console = global.console();
-        for tpdo in &report.silent {
-            console.warn(&format!(
-                "node {}: {tpdo} is sent on events, its event timer and delta are 0: it may never be sent",
-                self.node
-            ));
-        }
-        if !wanted.is_empty() {
-            console.note(&format!("node {0}: lost at power-off unless stored: cangauge store {0}", self.node));
-        }
+        report.notes.iter().for_each(|note| notes::print(&global.console(), note));
         Ok(())
     }
 }

@@ -3,8 +3,8 @@
 use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
-use crate::tasks::settings::Device;
 use crate::tasks::settings::minmax::{reset, show};
+use crate::tasks::settings::open as open_node;
 use clap::Args;
 
 /// Show the lowest and highest value that the device has measured, or reset them
@@ -27,8 +27,8 @@ impl Minmax {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let overrides = open::overrides(global, &[self.node])?;
         let report = global.with_master(|master| {
-            let device = Device::open(master, self.node, &overrides)?;
-            let report = if self.reset { reset(master, &device) } else { show(master, &device) };
+            let node = open_node(master, self.node, &overrides)?;
+            let report = if self.reset { reset(master, &node) } else { show(master, &node) };
             Ok(report?)
         })?;
         global.print(&report)?;

@@ -5,10 +5,10 @@ use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit as Code;
-use crate::output::console::Console;
-use crate::tasks::settings::Device;
-use crate::tasks::settings::unit::{UnitChange, set, show};
-use crate::tasks::{Failure, Kind};
+use crate::output::failure::ErrorMessage;
+use crate::output::notes;
+use crate::tasks::settings::open as open_node;
+use crate::tasks::settings::unit::{set, show};
 use clap::Args;
 
 /// Show or set the physical unit of a signal (6131h)
@@ -35,24 +35,23 @@ impl Unit {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let (signal, unit) = self.words().map_err(|message| Failure::new(Kind::Usage, message))?;
+        let (signal, unit) = self.words().map_err(ErrorMessage::usage)?;
         let overrides = open::overrides(global, &[self.node])?;
-        let console = global.console();
         match unit {
             None => {
                 let units = global.with_master(|master| {
-                    let device = Device::open(master, self.node, &overrides)?;
-                    Ok(show(&device, signal)?)
+                    let node = open_node(master, self.node, &overrides)?;
+                    Ok(show(&node, signal)?)
                 })?;
                 global.print(&units)
             }
             Some(unit) => {
                 let change = global.with_master(|master| {
-                    let mut device = Device::open(master, self.node, &overrides)?;
-                    Ok(set(master, &mut device, signal, unit)?)
+                    let mut node = open_node(master, self.node, &overrides)?;
+                    Ok(set(master, &mut node, signal, unit)?)
                 })?;
                 global.print(std::slice::from_ref(&change))?;
-                self.comment(&change, &console);
+                change.notes.iter().for_each(|note| notes::print(&global.console(), note));
                 Ok(())
             }
         }
@@ -68,19 +67,5 @@ impl Unit {
             },
             [signal, unit, ..] => Ok((Some(signal), Some(parse_unit(unit)?))),
         }
-    }
-
-    /// Notes about the change on stderr.
-    fn comment(&self, change: &UnitChange, console: &Console) {
-        let node = self.node;
-        if change.before == change.now.unit {
-            console.note(&format!("node {node}: {} is already in {}", change.now.signal, change.before));
-            return;
-        }
-        for item in change.rescaled.iter().filter(|item| item.stale) {
-            let number = item.after.map(|after| after.to_string()).unwrap_or_default();
-            console.warn(&format!("node {node}: the device did not convert {}: it is now {number}", item.name));
-        }
-        console.note(&format!("node {node}: lost at power-off unless stored: cangauge store {node}"));
     }
 }

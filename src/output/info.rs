@@ -35,7 +35,7 @@ fn row(label: &str, text: impl Into<String>) -> Vec<String> {
 
 /// The page as text.
 pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
-    let instrument = &info.instrument;
+    let instrument = &info.node;
     let described = instrument.model.as_ref().map(|model| &model.description);
     let title = described.map_or("not a device that is known", |description| description.title.as_str());
     writeln!(out, "node {}: {title}", instrument.id)?;
@@ -60,13 +60,13 @@ pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
 
 /// The NMT state, or how it is found out.
 fn state(info: &Info) -> String {
-    let ask = || format!("no heartbeat tells it: cangauge nmt state {} (--probe)", info.instrument.id);
+    let ask = || format!("no heartbeat tells it: cangauge nmt state {} (--probe)", info.node.id);
     info.state.map_or_else(ask, |state| format!("{state}, by its heartbeat"))
 }
 
 fn identity(info: &Info) -> Rows {
-    let identity = &info.instrument.identity;
-    let described = info.instrument.model.as_ref().map(|model| &model.description);
+    let identity = &info.node.identity;
+    let described = info.node.model.as_ref().map(|model| &model.description);
     let mut rows: Rows = Vec::new();
     rows.extend(identity.name.as_ref().map(|name| row("name", super::text::safe(name))));
     rows.extend(described.map(|description| row("description", &description.name)));
@@ -156,7 +156,7 @@ fn settings(channels: &[Channel]) -> Rows {
 }
 
 fn tpdos(info: &Info) -> Rows {
-    let instrument = &info.instrument;
+    let instrument = &info.node;
     let mut rows: Rows = Vec::new();
     for (tpdo, inhibit) in instrument.tpdos.iter().zip(&info.inhibit_100us) {
         let id = tpdo.cob_id.can_id().number();
@@ -184,8 +184,8 @@ fn mapped(info: &Info, object: String, bits: u8) -> String {
 }
 
 pub(super) fn name_of(info: &Info, object: &str) -> Option<String> {
-    info.instrument.signals.iter().find_map(|signal| {
-        let mut values = info.instrument.tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object);
+    info.node.signals.iter().find_map(|signal| {
+        let mut values = info.node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object);
         let is_value = values.any(|entry| entry.to_string() == object && signal.is_value(entry));
         let is_status = signal.status.is_some_and(|status| status.to_string() == object);
         match (is_value, is_status) {

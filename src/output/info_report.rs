@@ -33,7 +33,7 @@ impl Report for Info {
     ];
 
     fn cells(&self) -> Vec<Cell> {
-        let node = &self.instrument;
+        let node = &self.node;
         let description = node.model.as_ref().map(|model| &model.description);
         let tpdos = node.tpdos.iter().zip(&self.inhibit_100us).map(|(tpdo, inhibit)| tpdo_cell(self, tpdo, *inhibit));
         let of_channels = self.channels.iter().flat_map(|channel| &channel.settings);
@@ -77,7 +77,7 @@ fn settings_cell(settings: &[Setting]) -> Cell {
 }
 
 fn identity_cell(info: &Info) -> Cell {
-    let node = &info.instrument;
+    let node = &info.node;
     let identity = &node.identity;
     let numbers = [identity.vendor, identity.product, identity.revision, identity.serial];
     let [vendor, vendor_name, product, revision, serial] = identity::cells(numbers, node.model.as_deref());

@@ -1,6 +1,7 @@
 //! The settings of a device.
 
 use super::info;
+use super::notes;
 use super::report::{Cell, Column, Report};
 use super::table::{self, Align};
 use crate::canopen::object::ObjectId;
@@ -42,7 +43,7 @@ impl Report for UnitOf {
         let choice = |unit: &UnitOf| match (unit.fixed, unit.takes.as_slice()) {
             (true, _) => "(fixed)".to_owned(),
             (false, []) => String::new(),
-            (false, takes) => format!("(takes {})", list(takes)),
+            (false, takes) => format!("(accepts {})", list(takes)),
         };
         let row = |unit: &UnitOf| vec![unit.signal.clone(), unit.unit.to_string(), choice(unit)];
         table::write(out, &[Align::Left; 3], &units.iter().map(row).collect::<Vec<_>>())
@@ -68,6 +69,7 @@ impl Report for UnitChange {
                 Column::new("stale"),
             ],
         ),
+        Column::new("notes").json_only(),
     ];
 
     fn cells(&self) -> Vec<Cell> {
@@ -85,6 +87,7 @@ impl Report for UnitChange {
             after,
             Cell::hex(self.now.unit.0, 8),
             Cell::Rows(rescaled.collect()),
+            notes::cell(&self.notes),
         ]
     }
 
@@ -113,12 +116,14 @@ impl Report for FilterReport {
         Column::new("type"),
         Column::new("constant"),
         Column::new("damping_shown").json_only(),
+        Column::new("notes").json_only(),
     ];
 
     fn cells(&self) -> Vec<Cell> {
         let FilterOf { node, signal, code, kind, constant } = &self.filter;
         let damping_shown = self.damping_shown.into();
-        vec![(*node).into(), signal.into(), (*code).into(), kind.into(), (*constant).into(), damping_shown]
+        let notes = notes::cell(&self.notes);
+        vec![(*node).into(), signal.into(), (*code).into(), kind.into(), (*constant).into(), damping_shown, notes]
     }
 
     /// `pressure  moving average (1)  constant 8`.
@@ -143,6 +148,7 @@ impl Report for Limits {
         Column::new("unit").json_only(),
         Column::new("silent").json_only(),
         Column::nested("values", &[Column::new("limit"), Column::new("value"), Column::new("unit")]).csv_only(),
+        Column::new("notes").json_only(),
     ];
 
     fn cells(&self) -> Vec<Cell> {
@@ -157,6 +163,7 @@ impl Report for Limits {
         let mut cells = vec![self.node.into(), self.signal.as_str().into()];
         cells.extend(all);
         cells.extend([unit.into(), Cell::list(&self.silent), Cell::Rows(self.values.iter().map(row).collect())]);
+        cells.push(notes::cell(&self.notes));
         cells
     }
 
@@ -194,7 +201,7 @@ impl Report for MinMax {
         vec![self.now.node.into(), signal, min, max, unit.into(), object, before_min, before_max]
     }
 
-    /// After a reset the previous values: they are worth more than the new ones.
+    /// After a reset the previous values are shown: the new ones are only starting to form.
     fn text(all: &[MinMax], out: &mut dyn Write) -> io::Result<()> {
         let row = |report: &MinMax| {
             let extremes = report.before.as_ref().unwrap_or(&report.now);

@@ -4,6 +4,7 @@
 
 use super::autozero::{AutozeroEffect, AutozeroFact};
 use super::lss::{LssEffect, LssFact};
+use super::settings::{SettingsEffect, SettingsFact};
 use crate::canopen::id::NodeId;
 
 /// What a task that failed had changed before, or what state it left behind.
@@ -26,6 +27,8 @@ pub enum Effect {
     Autozero(AutozeroEffect),
     /// A change of node-ID or bit rate failed.
     Lss(Box<LssEffect>),
+    /// A change of a setting failed.
+    Settings(SettingsEffect),
     /// Text of a task that has no typed effects yet.
     Text(String),
     /// The hint of a task that has no typed causes yet.
@@ -54,6 +57,8 @@ pub enum Fact {
     Autozero(AutozeroFact),
     /// An LSS task reports a step or a warning.
     Lss(Box<LssFact>),
+    /// A setting was changed or shown.
+    Settings(SettingsFact),
     /// Text of a task that has no typed notes yet.
     Text(String),
     /// The state of the node before a reset is unknown; it is in the state in which it boots.
@@ -65,6 +70,7 @@ impl Fact {
     pub fn is_warning(&self) -> bool {
         match self {
             Fact::Lss(fact) => fact.event.is_warning(),
+            Fact::Settings(fact) => fact.is_warning(),
             Fact::KeptUntilPowerOff
             | Fact::OperationalAgain
             | Fact::LeftOperational

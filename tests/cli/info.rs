@@ -183,7 +183,7 @@ fn a_hydac_boots_operational_and_takes_its_node_id_with_1010h_4_alone() {
     kept.run("nmt startup 1").prints("wait\n");
     bench.run("sdo write 1 0x2003:2 9 --type u8").exit(0);
     bench.run("unit 1 psi").exit(0);
-    bench.run("unit 1 kPa").fails(2, "cangauge: node 1: pressure takes bar, psi, not kPa\n");
+    bench.run("unit 1 kPa").fails(2, "cangauge: node 1: pressure accepts bar, psi, not kPa\n");
 }
 
 #[test]

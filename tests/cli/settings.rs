@@ -5,7 +5,7 @@ use serde_json::json;
 use std::fs;
 use std::path::Path;
 
-/// Devices whose quantities stand still: a DPS at 50 psi, an MH-4 at 1.25 bar and 25.5 degC, an MC1609.
+/// Devices with constant values: a DPS at 50 psi, an MH-4 at 1.25 bar and 25.5 degC, an MC1609.
 fn still() -> Bench {
     Bench::described(&format!(
         "[[device]]\nkind = \"mh4\"\nnode = 5\n{}{}[[device]]\nkind = \"dps\"\nnode = 127\n{}\
@@ -21,14 +21,21 @@ fn channel(number: u8, base: f64) -> String {
     format!("[[device.channel]]\nchannel = {number}\nbase = {base:?}\namplitude = 0.0\nnoise = 0.0\n")
 }
 
-const STORE: &str = "lost at power-off unless stored: cangauge store";
+const STORE: &str = "not stored: the node loses the new values at power off; to keep them: cangauge store";
+
+fn kept(node: u8) -> serde_json::Value {
+    json!({"code": "kept-until-power-off", "message": "not stored: the node loses the new values at power off",
+        "command": format!("cangauge store {node}")})
+}
 
 #[test]
 fn the_unit_of_one_signal_is_bare() {
     let bench = still();
     bench.run("unit 127").prints("psi\n");
     bench.run("unit 5 temperature").prints("degC\n");
-    bench.run("unit 5").prints("pressure     bar   (takes bar, psi, MPa)\ntemperature  degC  (takes degC, degF, K)\n");
+    bench
+        .run("unit 5")
+        .prints("pressure     bar   (accepts bar, psi, MPa)\ntemperature  degC  (accepts degC, degF, K)\n");
     let done = bench.run("unit 5 pressure -f json").exit(0);
     assert_eq!(
         done.json(),
@@ -56,15 +63,15 @@ fn table_19_and_what_the_new_unit_rescales() {
     assert_eq!(writes, ["2231610100004E00"], "one write, as printed");
     let answers = done.frames_of("5FF");
     assert!(answers.contains(&"4230610150C30000"), "50.000 psi: {answers:?}");
-    // What is read after the write is read after it.
+    // The values after the write are read after it.
     let at = answers.iter().position(|frame| *frame == "6031610100000000").expect("acknowledged");
     assert_eq!(answers[at + 1], "4231610100004E00", "read back first");
     assert!(answers[at + 1..].contains(&"42306101770D0000"), "{answers:?}");
 }
 
-/// MH-4, 4.2.15: NaN, -32768 and -2147483648 stand for no value, and are none in any unit.
+/// MH-4, 4.2.15: NaN, -32768 and -2147483648 mean "no value" in every unit.
 #[test]
-fn a_value_that_is_none_is_not_converted() {
+fn an_invalid_value_is_not_converted() {
     let bench = Bench::described(
         "[[device]]\nkind = \"mh4\"\nnode = 5\n\
          [[device.overload]]\nchannel = 1\nfrom = \"0ms\"\nuntil = \"900s\"\ndirection = \"low\"\n",
@@ -81,7 +88,7 @@ fn a_value_that_is_none_is_not_converted() {
     assert_eq!((&pressure["before"], &pressure["after"]), (&json!(null), &json!(null)));
 }
 
-/// The same with answers as the table prints them: reads answered with 60h.
+/// The same with answers as printed in the table: reads are answered with 60h.
 #[test]
 fn table_19_with_its_60h() {
     let devices = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/device/devices/dps.toml");
@@ -99,33 +106,33 @@ fn table_19_with_its_60h() {
     for printed in ["603161010000AB00", "6030610150C30000", "6031610100000000", "6031610100004E00"] {
         assert!(answers.contains(&printed), "{printed}");
     }
-    // Without the quirk such an answer is no value.
+    // Without the quirk such an answer is a protocol error.
     bench.run("unit 127 bar").exit(6);
 }
 
 #[test]
-fn units_that_a_device_does_not_take_are_refused_with_those_that_it_takes() {
+fn a_unit_that_the_device_does_not_accept_is_rejected_with_the_list() {
     let bench = still();
     let written = |done: &super::Done, id: &str| done.frames_of(id).iter().any(|frame| frame.starts_with('2'));
     let done = bench.run("unit 5 pressure kPa").exit(2);
-    assert_eq!(done.stderr, "cangauge: node 5: pressure takes bar, psi, MPa, not kPa\n");
+    assert_eq!(done.stderr, "cangauge: node 5: pressure accepts bar, psi, MPa, not kPa\n");
     assert!(!written(&done, "605"));
     let done = bench.run("unit 5 degF").exit(0);
     assert!(done.stdout.starts_with("temperature "), "the only signal that is a temperature: {}", done.stdout);
-    // Table 20 of the DPS manual prints the codes in the order of the bytes on the bus.
+    // Table 20 of the DPS manual prints the codes in wire order.
     let done = bench.run("unit 127 0x0000AB00").exit(2);
     assert_eq!(
         done.stderr,
-        "cangauge: node 127: pressure takes psi, bar, kPa, not 0x0000AB00\n\
-         hint: 0x0000AB00 is psi in the order of the bytes on the bus: 0x00AB0000\n"
+        "cangauge: node 127: pressure accepts psi, bar, kPa, not 0x0000AB00\n\
+         hint: 0x0000AB00 is psi in wire order: use 0x00AB0000\n"
     );
-    bench.run("unit 3 ch4 K").fails(2, "cangauge: node 3: ch4 is in degC, and this device cannot change it\n");
+    bench.run("unit 3 ch4 K").fails(2, "cangauge: node 3: ch4 is in degC, and the device cannot change it\n");
     bench.run("unit 5 pressure furlong").exit(2);
     bench.run("unit 5 pressure bar psi").exit(2);
     let done = bench.run("unit 127 psi").exit(0);
     assert_eq!(done.stderr, "node 127: pressure is already in psi\n");
     assert!(!written(&done, "67F"));
-    // By its raw code, and by an EDS that knows no choice: the device decides.
+    // By its code.
     bench.run("unit 5 pressure 0x00AB0000").exit(0);
 }
 
@@ -133,14 +140,14 @@ fn units_that_a_device_does_not_take_are_refused_with_those_that_it_takes() {
 fn filters() {
     let bench = still();
     bench.run("filter 5").prints("pressure  none (0)  constant 1\n");
-    bench.run("filter 5 temperature").fails(6, "cangauge: node 5: temperature has no filter (61A0h, 61A1h)\n");
+    bench.run("filter 5 temperature").fails(4, "cangauge: node 5: temperature has no filter (61A0h, 61A1h)\n");
     let done = bench.run("filter 5 --type moving --constant 8 -f json").exit(0);
     assert_eq!(
         done.json(),
         [json!({"node": 5, "signal": "pressure", "code": 1, "type": "moving average", "constant": 8,
-            "damping_shown": null})]
+            "damping_shown": null, "notes": [kept(5)]})]
     );
-    // A damping is written, and shown by the constant that comes of it.
+    // A damping is written; the constant shows its effect.
     let done = bench.run("filter 5 --type moving --damping 100ms -f json").exit(0);
     let filter = &done.json()[0];
     assert_eq!((&filter["constant"], &filter["damping_shown"]), (&json!(34), &json!(true)));
@@ -148,27 +155,27 @@ fn filters() {
     let done = bench.run("filter 5 --damping 100ms").exit(2);
     assert_eq!(
         done.stderr,
-        "cangauge: node 5: pressure: a damping sets the moving average (none)\nhint: add --type moving\n"
+        "cangauge: node 5: pressure: a damping needs the moving average (the filter is: none)\nhint: add --type moving\n"
     );
-    // A damping that makes what stood there before cannot be told from none.
+    // A damping that results in the same constant cannot be confirmed.
     let done = bench.run("filter 5 --type moving --damping 1ms").exit(0);
     assert!(
         done.stderr
-            .starts_with("warning: node 5: the damping was acknowledged, but the filter constant did not change (1)")
+            .starts_with("warning: node 5: it acknowledged the damping, but the filter constant did not change (1)")
     );
-    // 0 is none of the filter types of the MC1609, whatever one of its tables says.
+    // 0 is not "no filter" on the MC1609, although one of its tables says so.
     let done = bench.run("filter 3 ch1 --type none").exit(2);
     assert_eq!(
         done.stderr.lines().next(),
         Some(
-            "cangauge: node 3: ch1 has no filter type \"none\", but repeating average (0), moving average (1), \
-             repeating average (2)"
+            "cangauge: node 3: ch1 has no filter type \"none\" (it has: repeating average (0), moving average (1), \
+             repeating average (2))"
         )
     );
     bench.run("filter 3 ch1").prints("ch1  repeating average (0)  constant 0\n");
     bench.run("filter 3 ch1 --type repeating").prints("ch1  repeating average (2)  constant 0\n");
     bench.run("filter 3 --type moving").exit(2);
-    bench.run("filter 127").fails(6, "cangauge: node 127: it has no filter (61A0h, 61A1h)\n");
+    bench.run("filter 127").fails(4, "cangauge: node 127: it has no filter (61A0h, 61A1h)\n");
 }
 
 #[test]
@@ -181,22 +188,22 @@ fn limits() {
     let done = bench.run("limits 5 temperature").exit(0);
     assert_eq!(
         done.stderr,
-        "warning: node 5: TPDO2 is sent on events, its event timer and delta are 0: it may never be sent\n"
+        "warning: node 5: TPDO2 is sent on events, and its event timer and the delta are 0: it may never be sent\n"
     );
     let done = bench.run("limits 5 temperature --delta 0.5 --lower -20 --upper 80 --hysteresis 1 -f json").exit(0);
     assert_eq!(
         done.json(),
         [json!({"node": 5, "signal": "temperature", "delta": 0.5, "lower": -20.0, "upper": 80.0, "hysteresis": 1.0,
-            "unit": "degC", "silent": []})]
+            "unit": "degC", "silent": [], "notes": [kept(5)]})]
     );
     assert_eq!(done.stderr, format!("node 5: {STORE} 5\n"));
     bench
         .run("limits 5 pressure --lower 11")
-        .fails(2, "cangauge: node 5: pressure: the lower limit 11 is above the upper one, 10\n");
+        .fails(2, "cangauge: node 5: pressure: the lower limit 11 is above the upper limit 10\n");
     bench.run("limits 5 pressure --delta -1").refuses("delta must not be negative: -1");
     bench.run("limits 5 pressure --delta x").refuses("\"x\" is not a number (0.5, -20)");
     bench.run("limits 5 pressure --delta inf").exit(2);
-    // What rises begins with the upper one.
+    // Rising limits start with the upper one.
     let done = bench.run("limits 5 pressure --lower 12 --upper 14").exit(0);
     let writes: Vec<String> = done
         .frames_of("605")
@@ -213,7 +220,7 @@ fn limits() {
 
 #[test]
 fn minimum_and_maximum() {
-    // Pressure that moves, so that there is something to reset.
+    // The pressure changes, so that there is something to reset.
     let bench = Bench::of("mh4@5");
     let done = bench.run("minmax 5 -f json").exit(0);
     let rows = done.json();
@@ -229,14 +236,14 @@ fn minimum_and_maximum() {
     still.run("minmax 2").prints("pressure  min 4.000 bar  max 4.000 bar\n");
     still
         .run("minmax 2 --reset")
-        .fails(6, "cangauge: node 2: no object of this device is known to reset minimum and maximum of pressure\n");
+        .fails(6, "cangauge: node 2: no object that resets minimum and maximum of pressure is known for this device\n");
     still
         .run("minmax 127")
-        .fails(6, "cangauge: node 127: no object of this device is known to keep minimum and maximum\n");
+        .fails(6, "cangauge: node 127: no object with minimum and maximum is known for this device\n");
 }
 
 #[test]
-fn errors_in_the_words_of_the_device() {
+fn errors_are_explained_by_the_description() {
     let overload = "[[device.overload]]\nchannel = 1\nfrom = \"0s\"\ndirection = \"high\"\n";
     let bench = Bench::described(&format!(
         "[[device]]\nkind = \"mh4\"\nnode = 5\n{overload}[[device]]\nkind = \"dps\"\nnode = 127\n{overload}\
@@ -261,14 +268,14 @@ fn errors_in_the_words_of_the_device() {
     // The DPS counts its errors; the entries cannot be read.
     bench.run("errors 127").prints("register  0x05 generic, voltage\nhistory   1 error\n");
     bench.run("errors 2").prints("register  0x00 no error\nhistory   none is kept\n");
-    bench.run("errors 2 --clear").fails(6, "cangauge: node 2: it keeps no error history (1003h)\n");
+    bench.run("errors 2 --clear").fails(6, "cangauge: node 2: it has no error history (1003h)\n");
     let done = bench.run("errors 9").exit(3);
     assert!(done.stdout.is_empty());
 }
 
-/// A device of CiA 404 that no description fits goes by the standard, and says itself what it does not take.
+/// A CiA 404 device without a description is used by the standard, and rejects values itself.
 #[test]
-fn a_device_that_nothing_describes() {
+fn a_device_without_a_description() {
     let devices = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/device/devices/mh4.toml");
     let text = fs::read_to_string(devices).expect("the description");
     let text = text.replacen("name = \"mh4\"", "name = \"other\"", 1);
@@ -300,7 +307,7 @@ fn a_device_that_nothing_describes() {
 }
 
 #[test]
-fn what_was_set_is_put_back_where_a_later_limit_is_refused() {
+fn a_rejected_limit_restores_the_limits_before_it() {
     let devices = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/device/devices/mh4.toml");
     let text = fs::read_to_string(devices).expect("the description");
     let at = text.find("at = \"0x6134:1-1\"").expect("the lower limit");
@@ -312,8 +319,8 @@ fn what_was_set_is_put_back_where_a_later_limit_is_refused() {
     let done = bench.run("limits 5 pressure --lower 6 --upper 14").exit(4);
     assert_eq!(
         done.stderr,
-        "cangauge: node 5: write 0x6134:1: refused by the device (0x06090031, value too high)\n\
-         hint: the limits are as before: cangauge limits 5 pressure\n"
+        "cangauge: node 5: write 0x6134:1: refused by the device (0x06090031, value too high); the previous limits are set again\n\
+         hint: show the limits: cangauge limits 5 pressure\n"
     );
     let writes: Vec<&str> = done.frames_of("605").into_iter().filter(|frame| frame.starts_with("23")).collect();
     assert_eq!(writes, ["2335610100006041", "233461010000C040", "2335610100002041"], "14, 6, and 10 again");

@@ -146,9 +146,9 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             Claim::Values(values)
         }
         Command::Info { node: id } => {
-            let device = settings::Device::open(master, node(*id), &none)?;
+            let device = settings::open(master, node(*id), &none)?;
             let read = info::read(master, &device)?;
-            Claim::Found(vec![(*id, read.instrument.identity.serial)])
+            Claim::Found(vec![(*id, read.node.identity.serial)])
         }
         Command::PdoShow { node: id } => {
             let number = TpdoNumber::new(1);
@@ -290,9 +290,9 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             Claim::Stored
         }
         Command::Unit { node: id, signal, unit: code } => {
-            let mut device = settings::Device::open(master, node(*id), &none)?;
+            let mut device = settings::open(master, node(*id), &none)?;
             unit::set(master, &mut device, *signal, Unit(*code))?;
-            match device.signal(*signal) {
+            match settings::find_signal(&device, *signal) {
                 Ok(signal) => {
                     let object = ObjectId::new(0x6131, signal.channel);
                     Claim::Values(vec![(*id, object, code.to_le_bytes().to_vec())])
@@ -301,7 +301,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             }
         }
         Command::Filter { node: id, kind, constant } => {
-            let device = settings::Device::open(master, node(*id), &none)?;
+            let device = settings::open(master, node(*id), &none)?;
             let kinds = [
                 None,
                 Some(filter::FilterType::None),
@@ -309,17 +309,17 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
                 Some(filter::FilterType::Repeating),
             ];
             let kind = kinds[usize::from(*kind)];
-            filter::set(master, &device, None, filter::Wanted { kind, constant: *constant, damping: None })?;
+            filter::set(master, &device, None, filter::FilterRequest { kind, constant: *constant, damping: None })?;
             Claim::Nothing
         }
         Command::Limits { node: id, lower, upper } => {
-            let device = settings::Device::open(master, node(*id), &none)?;
+            let device = settings::open(master, node(*id), &none)?;
             let wanted = [(limits::Limit::Lower, *lower), (limits::Limit::Upper, *upper)];
             limits::set(master, &device, "pressure", &wanted)?;
             Claim::Nothing
         }
         Command::Errors { node: id, clear } => {
-            let device = settings::Device::open(master, node(*id), &none)?;
+            let device = settings::open(master, node(*id), &none)?;
             match clear {
                 true => drop(errors::clear(master, &device)?),
                 false => drop(errors::read(master, &device)?),
@@ -327,7 +327,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             Claim::Nothing
         }
         Command::Minmax { node: id } => {
-            let device = settings::Device::open(master, node(*id), &none)?;
+            let device = settings::open(master, node(*id), &none)?;
             minmax::reset(master, &device)?;
             Claim::Nothing
         }

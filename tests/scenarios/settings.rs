@@ -10,9 +10,10 @@ use cangauge::canopen::value::{DataType, Value};
 use cangauge::device::catalog;
 use cangauge::device::unit::Unit;
 use cangauge::master::{Master, Timing};
+use cangauge::node::Node;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, Direction, Overload, Setup};
-use cangauge::tasks::settings::filter::{FilterType, Wanted};
+use cangauge::tasks::settings::filter::{FilterRequest, FilterType};
 use cangauge::tasks::settings::limits::Limit;
 use cangauge::tasks::settings::{self, errors, filter, limits, minmax, unit};
 use cangauge::tasks::{Failure, Kind};
@@ -28,7 +29,7 @@ fn node() -> NodeId {
 /// What is done, and what the device must then hold.
 struct Deed {
     name: &'static str,
-    run: fn(&mut Master<'_>, &mut settings::Device) -> Result<(), Failure>,
+    run: fn(&mut Master<'_>, &mut Node) -> Result<(), Failure>,
     held: &'static [(u16, u8, DataType, Value)],
 }
 
@@ -41,7 +42,7 @@ const DEEDS: [Deed; 4] = [
     Deed {
         name: "filter",
         run: |master, device| {
-            let wanted = Wanted { kind: Some(FilterType::Moving), constant: Some(8), damping: None };
+            let wanted = FilterRequest { kind: Some(FilterType::Moving), constant: Some(8), damping: None };
             filter::set(master, device, None, wanted).map(|_| ())
         },
         held: &[
@@ -79,7 +80,7 @@ fn run(deed: &Deed, plan: FaultPlan, retries: u32) -> Result<(), Failure> {
     let told = format!("{} {plan:?}", deed.name);
     let mut bus = bus(plan);
     let mut master = Master::new(&mut bus, Timing { timeout: Duration::from_millis(100), retries });
-    let result = settings::Device::open(&mut master, node(), &BTreeMap::new())
+    let result = settings::open(&mut master, node(), &BTreeMap::new())
         .and_then(|mut device| (deed.run)(&mut master, &mut device));
     let late = master.now() + Duration::from_secs(2);
     while master.now() < late {
@@ -173,7 +174,7 @@ fn the_signature_of_a_reset_is_sent_once_and_its_silence_is_looked_into() {
     let reset = |plan: FaultPlan| {
         let mut bus = bus(plan);
         let mut master = Master::new(&mut bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
-        let device = settings::Device::open(&mut master, node(), &BTreeMap::new())?;
+        let device = settings::open(&mut master, node(), &BTreeMap::new())?;
         // Something to forget.
         for _ in 0..5 {
             minmax::show(&mut master, &device)?;
@@ -233,11 +234,11 @@ impl Station for Deaf {
 
 #[test]
 fn an_acknowledge_is_no_proof() {
-    let refused = |deed: fn(&mut Master<'_>, &mut settings::Device) -> Result<(), Failure>| {
+    let refused = |deed: fn(&mut Master<'_>, &mut Node) -> Result<(), Failure>| {
         let mut bus = MemoryBus::new(Clock::Virtual);
         bus.attach(Deaf);
         let mut master = Master::new(&mut bus, Timing::default());
-        let mut device = settings::Device::open(&mut master, node(), &BTreeMap::new()).expect("it answers");
+        let mut device = settings::open(&mut master, node(), &BTreeMap::new()).expect("it answers");
         let failure = deed(&mut master, &mut device).expect_err("nothing is kept");
         assert_eq!(failure.kind(), Kind::Unexpected, "{failure}");
         ErrorMessage::of(&failure).message
@@ -248,7 +249,7 @@ fn an_acknowledge_is_no_proof() {
     );
     assert_eq!(
         refused(|master, device| {
-            let wanted = Wanted { kind: Some(FilterType::Moving), ..Wanted::default() };
+            let wanted = FilterRequest { kind: Some(FilterType::Moving), ..FilterRequest::default() };
             filter::set(master, device, None, wanted).map(|_| ())
         }),
         "node 5: 0x61A0:1 was acknowledged and reads 0"

@@ -15,7 +15,7 @@ mod node;
 mod pdo;
 mod read;
 mod scan;
-mod settings;
+pub(super) mod settings;
 mod store;
 
 pub(super) use log::reason_text;

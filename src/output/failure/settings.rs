@@ -1,10 +1,154 @@
-//! Text for causes: a setting could not be shown or changed.
+//! Text for causes, effects and notes: a setting could not be shown or changed, and what to report about it.
 
 use super::Words;
+use crate::device::unit::Unit;
+use crate::output::notes::Told;
 use crate::tasks::Failure;
-use crate::tasks::settings::SettingsFailure;
+use crate::tasks::settings::unit::list;
+use crate::tasks::settings::{QuantityError, SettingsEffect, SettingsFact, SettingsFailure};
 
 /// The message and the hint for a cause.
 pub(super) fn words(_failure: &Failure, cause: &SettingsFailure) -> Words {
-    match *cause {}
+    match cause {
+        SettingsFailure::NoMeasuredValue => Words::new("it has no measured value of CiA 404"),
+        SettingsFailure::WhichSignal { available } => {
+            Words::new(format!("name a signal (it has: {})", available.join(", ")))
+        }
+        SettingsFailure::NoErrorObjects => {
+            Words::new("it has neither an error register (1001h) nor an error history (1003h)")
+        }
+        SettingsFailure::NoErrorHistory => Words::new("it has no error history (1003h)"),
+        SettingsFailure::HistoryNotCleared { count } => {
+            Words::new(format!("it acknowledged the write of 0x1003:0, but the history still has {}", errors(*count)))
+        }
+        SettingsFailure::NoUnit { signal } => Words::new(format!("{} has no unit (6131h)", of(signal.as_ref()))),
+        SettingsFailure::UnitFixed { signal, unit } => {
+            Words::new(format!("{signal} is in {unit}, and the device cannot change it"))
+        }
+        SettingsFailure::UnitNotAccepted { signal, unit, accepted } => unit_not_accepted(signal, *unit, accepted),
+        SettingsFailure::NoMinMax => Words::new("no object with minimum and maximum is known for this device"),
+        SettingsFailure::NoMinMaxReset { signal } => {
+            Words::new(format!("no object that resets minimum and maximum of {signal} is known for this device"))
+        }
+        SettingsFailure::MinMaxNotReset { signal } => {
+            Words::new(format!("it acknowledged the reset, but minimum and maximum of {signal} are unchanged"))
+        }
+        SettingsFailure::NoLimits { .. }
+        | SettingsFailure::NoSuchLimit { .. }
+        | SettingsFailure::LimitsCrossed { .. }
+        | SettingsFailure::LimitValue { .. } => of_limits(cause),
+        SettingsFailure::NoFilter { .. }
+        | SettingsFailure::FilterConstant { .. }
+        | SettingsFailure::FilterType { .. }
+        | SettingsFailure::NoDamping { .. }
+        | SettingsFailure::DampingOfOtherType { .. }
+        | SettingsFailure::DampingTooLong => of_filter(cause),
+    }
+}
+
+/// `pressure`, or `it` for the whole device.
+fn of(signal: Option<&String>) -> &str {
+    signal.map_or("it", String::as_str)
+}
+
+fn errors(count: u64) -> String {
+    if count == 1 { "1 error".to_owned() } else { format!("{count} errors") }
+}
+
+fn unit_not_accepted(signal: &str, unit: Unit, accepted: &[Unit]) -> Words {
+    let words = Words::new(format!("{signal} accepts {}, not {unit}", list(accepted)));
+    let swapped = Unit(unit.0.swap_bytes());
+    match accepted.contains(&swapped) {
+        true => words.hint(format!("0x{:08X} is {swapped} in wire order: use 0x{:08X}", unit.0, swapped.0)),
+        false => words,
+    }
+}
+
+fn of_limits(cause: &SettingsFailure) -> Words {
+    match cause {
+        SettingsFailure::NoLimits { signal, objects: [first, last] } => {
+            Words::new(format!("{signal} has no delta and no limits ({first} to {last})"))
+        }
+        SettingsFailure::NoSuchLimit { signal, limit, object } => {
+            Words::new(format!("{signal} has no {} ({object})", limit.as_str()))
+        }
+        SettingsFailure::LimitsCrossed { signal, lower, upper } => {
+            Words::new(format!("{signal}: the lower limit {lower} is above the upper limit {upper}"))
+        }
+        SettingsFailure::LimitValue { signal, limit, error } => {
+            let reason = match error {
+                QuantityError::TooFine { number, digits } => {
+                    format!("{number} has more than the {digits} decimal digits of the device")
+                }
+                QuantityError::Value(error) => error.to_string(),
+            };
+            Words::new(format!("{signal} {}: {reason}", limit.as_str()))
+        }
+        _ => Words::default(),
+    }
+}
+
+fn of_filter(cause: &SettingsFailure) -> Words {
+    match cause {
+        SettingsFailure::NoFilter { signal } => {
+            Words::new(format!("{} has no filter (61A0h, 61A1h)", of(signal.as_ref())))
+        }
+        SettingsFailure::FilterConstant { signal, constant } => {
+            Words::new(format!("{signal} does not accept the filter constant {constant}"))
+        }
+        SettingsFailure::FilterType { signal, wanted, available, doubt } => {
+            let available: Vec<String> =
+                available.iter().map(|(code, meaning)| format!("{meaning} ({code})")).collect();
+            let available = available.join(", ");
+            let words = Words::new(format!("{signal} has no filter type \"{}\" (it has: {available})", wanted.word()));
+            if doubt.is_empty() { words } else { words.hint(format!("61A0h: {doubt}")) }
+        }
+        SettingsFailure::NoDamping { signal } => {
+            Words::new(format!("no object that sets a damping of {signal} is known for this device"))
+                .hint("set the filter constant instead: --constant N")
+        }
+        SettingsFailure::DampingOfOtherType { signal, present } => {
+            let present = match present {
+                Some(present) => format!("the filter is: {present}"),
+                None => "--type sets another filter".to_owned(),
+            };
+            Words::new(format!("{signal}: a damping needs the moving average ({present})")).hint("add --type moving")
+        }
+        SettingsFailure::DampingTooLong => Words::new("the damping is limited to 65535 ms"),
+        _ => Words::default(),
+    }
+}
+
+/// The text for an effect.
+pub(in crate::output) fn effect(node: &str, effect: &SettingsEffect) -> Told {
+    let (code, message, signal) = match effect {
+        SettingsEffect::LimitsRestored { signal } => ("limits-restored", "the previous limits are set again", signal),
+        SettingsEffect::LimitsNotRestored { signal } => {
+            ("limits-not-restored", "not all previous limits could be set again", signal)
+        }
+        SettingsEffect::LimitsUnknown { signal } => ("limits-unknown", "the present limits are unknown", signal),
+    };
+    Told::new(code, message).command("show the limits", format!("cangauge limits {node} {signal}"))
+}
+
+/// The text for a note.
+pub(in crate::output) fn fact(fact: &SettingsFact) -> Told {
+    match fact {
+        SettingsFact::AlreadyInUnit { signal, unit } => {
+            Told::new("already-in-unit", format!("{signal} is already in {unit}"))
+        }
+        SettingsFact::NotConverted { name, now } => {
+            let now = now.map_or_else(String::new, |now| format!(": it is now {now}"));
+            Told::new("not-converted", format!("the device did not convert {name}{now}"))
+        }
+        SettingsFact::DampingNotShown { constant } => {
+            let constant = constant.map_or_else(|| "unknown".to_owned(), |constant| constant.to_string());
+            let message = format!("it acknowledged the damping, but the filter constant did not change ({constant})");
+            Told::new("damping-not-shown", message)
+        }
+        SettingsFact::MayNeverSend { tpdo } => Told::new(
+            "may-never-send",
+            format!("{tpdo} is sent on events, and its event timer and the delta are 0: it may never be sent"),
+        ),
+    }
 }

@@ -1,21 +1,253 @@
-//! Causes of failures: a setting could not be shown or changed.
+//! Causes of failures, effects and facts: a setting could not be shown or changed.
 
+use super::Quantity;
+use super::filter::FilterType;
+use super::limits::Limit;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::ValueError;
+use crate::device::unit::Unit;
 use crate::tasks::Kind;
 use crate::tasks::failure::Cause;
+use crate::tasks::note::{Effect, Fact};
 
 /// A setting could not be shown or changed.
 #[derive(Clone, Debug, PartialEq)]
-pub enum SettingsFailure {}
+pub enum SettingsFailure {
+    /// The device has no measured value of CiA 404.
+    NoMeasuredValue,
+    /// The device has several signals, and none was named.
+    WhichSignal {
+        /// The signals of the device.
+        available: Vec<String>,
+    },
+    /// The device has neither an error register (1001h) nor an error history (1003h).
+    NoErrorObjects,
+    /// The device has no error history (1003h).
+    NoErrorHistory,
+    /// The device acknowledged that it cleared the history, and the history is unchanged.
+    HistoryNotCleared {
+        /// The number of errors in the history.
+        count: u64,
+    },
+    /// The signal, or every signal, has no filter (61A0h, 61A1h).
+    NoFilter {
+        /// The signal, if one was named.
+        signal: Option<String>,
+    },
+    /// The device does not accept this filter constant.
+    FilterConstant {
+        /// The signal.
+        signal: String,
+        /// The constant.
+        constant: u16,
+    },
+    /// The device does not have this type of filter.
+    FilterType {
+        /// The signal.
+        signal: String,
+        /// The type.
+        wanted: FilterType,
+        /// Code and meaning of the types that it has.
+        available: Vec<(u64, String)>,
+        /// What is doubtful about them, from the description; may be empty.
+        doubt: String,
+    },
+    /// No object is known that accepts a damping.
+    NoDamping {
+        /// The signal.
+        signal: String,
+    },
+    /// A damping sets the moving average, and the filter is of another type.
+    DampingOfOtherType {
+        /// The signal.
+        signal: String,
+        /// The present type; `None` if the command asks for another type.
+        present: Option<String>,
+    },
+    /// The damping is longer than 65535 ms.
+    DampingTooLong,
+    /// The signal, or every signal, has no unit (6131h).
+    NoUnit {
+        /// The signal, if it is one.
+        signal: Option<String>,
+    },
+    /// The unit of the signal cannot be changed.
+    UnitFixed {
+        /// The signal.
+        signal: String,
+        /// Its unit.
+        unit: Unit,
+    },
+    /// The device does not accept this unit.
+    UnitNotAccepted {
+        /// The signal.
+        signal: String,
+        /// The unit.
+        unit: Unit,
+        /// The units that it accepts.
+        accepted: Vec<Unit>,
+    },
+    /// The signal has neither a delta nor limits.
+    NoLimits {
+        /// The signal.
+        signal: String,
+        /// The first and the last object that were looked for.
+        objects: [ObjectId; 2],
+    },
+    /// The signal does not have this limit.
+    NoSuchLimit {
+        /// The signal.
+        signal: String,
+        /// The limit.
+        limit: Limit,
+        /// The object that was looked for.
+        object: ObjectId,
+    },
+    /// The lower limit would be above the upper limit.
+    LimitsCrossed {
+        /// The signal.
+        signal: String,
+        /// The lower limit, in the unit of the signal.
+        lower: f64,
+        /// The upper limit, in the unit of the signal.
+        upper: f64,
+    },
+    /// The device cannot hold this limit.
+    LimitValue {
+        /// The signal.
+        signal: String,
+        /// The limit.
+        limit: Limit,
+        /// The reason.
+        error: QuantityError,
+    },
+    /// No object is known that contains minimum and maximum.
+    NoMinMax,
+    /// No object is known that resets minimum and maximum.
+    NoMinMaxReset {
+        /// The signal.
+        signal: String,
+    },
+    /// The device acknowledged the reset, and minimum and maximum are unchanged.
+    MinMaxNotReset {
+        /// The signal.
+        signal: String,
+    },
+}
+
+/// A number in the unit of a signal that its object cannot hold.
+#[derive(Clone, Debug, PartialEq)]
+pub enum QuantityError {
+    /// The number has more decimals than the device.
+    TooFine {
+        /// The number.
+        number: f64,
+        /// The decimal digits of the device.
+        digits: u8,
+    },
+    /// The number does not fit the type of the object.
+    Value(ValueError),
+}
+
+/// What a change of limits that failed left behind.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SettingsEffect {
+    /// The previous limits of the signal are set again.
+    LimitsRestored {
+        /// The signal.
+        signal: String,
+    },
+    /// Not all previous limits of the signal could be set again.
+    LimitsNotRestored {
+        /// The signal.
+        signal: String,
+    },
+    /// It is unknown which limits the signal has.
+    LimitsUnknown {
+        /// The signal.
+        signal: String,
+    },
+}
+
+/// What there is to report about a setting.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SettingsFact {
+    /// The signal already has this unit.
+    AlreadyInUnit {
+        /// The signal.
+        signal: String,
+        /// The unit.
+        unit: Unit,
+    },
+    /// The device kept the number of an object when the unit changed, so it means something else now.
+    NotConverted {
+        /// The name of the object.
+        name: String,
+        /// Its value now.
+        now: Option<Quantity>,
+    },
+    /// The device acknowledged the damping, and the filter constant did not change.
+    DampingNotShown {
+        /// The filter constant, if it is known.
+        constant: Option<u64>,
+    },
+    /// The TPDO is sent on events, and its event timer and the delta are 0.
+    MayNeverSend {
+        /// The TPDO.
+        tpdo: String,
+    },
+}
 
 impl SettingsFailure {
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
-        match *self {}
+        match self {
+            SettingsFailure::WhichSignal { .. }
+            | SettingsFailure::FilterConstant { .. }
+            | SettingsFailure::FilterType { .. }
+            | SettingsFailure::NoDamping { .. }
+            | SettingsFailure::DampingOfOtherType { .. }
+            | SettingsFailure::DampingTooLong
+            | SettingsFailure::UnitFixed { .. }
+            | SettingsFailure::UnitNotAccepted { .. }
+            | SettingsFailure::NoSuchLimit { .. }
+            | SettingsFailure::LimitsCrossed { .. }
+            | SettingsFailure::LimitValue { .. } => Kind::Usage,
+            SettingsFailure::NoFilter { .. } => Kind::Refused,
+            SettingsFailure::NoMeasuredValue
+            | SettingsFailure::NoErrorObjects
+            | SettingsFailure::NoErrorHistory
+            | SettingsFailure::HistoryNotCleared { .. }
+            | SettingsFailure::NoUnit { .. }
+            | SettingsFailure::NoLimits { .. }
+            | SettingsFailure::NoMinMax
+            | SettingsFailure::NoMinMaxReset { .. }
+            | SettingsFailure::MinMaxNotReset { .. } => Kind::Unexpected,
+        }
+    }
+}
+
+impl SettingsFact {
+    /// Whether the user should act on it.
+    pub fn is_warning(&self) -> bool {
+        !matches!(self, SettingsFact::AlreadyInUnit { .. })
     }
 }
 
 impl From<SettingsFailure> for Cause {
     fn from(cause: SettingsFailure) -> Cause {
         Cause::Settings(cause)
+    }
+}
+
+impl From<SettingsEffect> for Effect {
+    fn from(effect: SettingsEffect) -> Effect {
+        Effect::Settings(effect)
+    }
+}
+
+impl From<SettingsFact> for Fact {
+    fn from(fact: SettingsFact) -> Fact {
+        Fact::Settings(fact)
     }
 }

@@ -1,22 +1,26 @@
-//! The filter of a signal: type (61A0h), constant (61A1h), and the damping that some devices make a constant
-//! of (MH-4 2023h).
+//! The filter of a signal: type (61A0h), constant (61A1h), and the damping from which some devices calculate the
+//! constant (MH-4 2023h).
 
-use super::Device;
+use super::{SettingsFact, SettingsFailure, find_signal, read_each, set_object};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::master::Master;
 use crate::measure::layout::Signal;
-use crate::tasks::{Failure, Kind};
+use crate::node::Node;
+use crate::node::write::write;
+use crate::tasks::{Fact, Failure, Note};
 use std::time::Duration;
 
 /// A filter as it is reported.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FilterReport {
     /// The filter, read from the device.
     pub filter: FilterOf,
     /// Whether 61A1h shows the new damping; `None` if no damping was set.
     pub damping_shown: Option<bool>,
+    /// What else there is to report.
+    pub notes: Vec<Note>,
 }
 
 /// The filter of a signal.
@@ -26,33 +30,33 @@ pub struct FilterOf {
     pub node: NodeId,
     /// `pressure`, `ch1` …
     pub signal: String,
-    /// 61A0h, where the device tells it.
+    /// The filter type (61A0h); `None` if it cannot be read.
     pub code: Option<u64>,
-    /// What the code means on this device.
+    /// The meaning of the type on this device.
     pub kind: String,
-    /// 61A1h, where the device tells it.
+    /// The filter constant (61A1h); `None` if it cannot be read.
     pub constant: Option<u64>,
 }
 
-/// The types of CiA 404 that can be asked for.
+/// The types of CiA 404 that can be set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FilterType {
-    /// 0.
+    /// No filter (0).
     None,
-    /// 1.
+    /// Moving average (1).
     Moving,
-    /// 2.
+    /// Repeating average (2).
     Repeating,
 }
 
-/// What is to be set; what is `None` stays.
+/// The settings to change. A setting that is `None` is kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Wanted {
-    /// 61A0h.
+pub struct FilterRequest {
+    /// The type (61A0h).
     pub kind: Option<FilterType>,
-    /// 61A1h.
+    /// The constant (61A1h).
     pub constant: Option<u16>,
-    /// Time within which the output follows a step: the device works out the constant.
+    /// The time in which the output follows a step, at most 65535 ms. The device calculates the constant.
     pub damping: Option<Duration>,
 }
 
@@ -63,8 +67,23 @@ pub struct FilterChange {
     pub before: FilterOf,
     /// The filter now, read back.
     pub now: FilterOf,
-    /// Whether 61A1h showed the damping; it cannot be read itself. `None` where none was asked for.
+    /// Whether 61A1h changed with the damping, which cannot be read itself. `None` if no damping was set.
     pub damping_shown: Option<bool>,
+}
+
+impl FilterChange {
+    /// The report, with the notes about the change.
+    pub fn into_report(self) -> FilterReport {
+        let FilterChange { before, now, damping_shown } = self;
+        let mut notes = Vec::new();
+        if damping_shown == Some(false) {
+            notes.push(Note::of_node(now.node, SettingsFact::DampingNotShown { constant: now.constant }));
+        }
+        if before != now {
+            notes.push(Note::of_node(now.node, Fact::KeptUntilPowerOff));
+        }
+        FilterReport { filter: now, damping_shown, notes }
+    }
 }
 
 impl FilterType {
@@ -76,8 +95,8 @@ impl FilterType {
         }
     }
 
-    /// How the meaning of its code begins.
-    fn word(self) -> &'static str {
+    /// The first word of its meaning in descriptions, and the value of `--type`.
+    pub fn word(self) -> &'static str {
         match self {
             FilterType::None => "none",
             FilterType::Moving => "moving",
@@ -94,9 +113,9 @@ fn constant_object(signal: &Signal) -> ObjectId {
     ObjectId::new(0x61a1, signal.channel)
 }
 
-/// What a code of 61A0h means: by the device's description, else by CiA 404.
-pub fn meaning(device: &Device, signal: &Signal, code: u64) -> String {
-    let described = device.described(kind_object(signal)).and_then(|entry| entry.meaning(code));
+/// The meaning of a filter type (61A0h), from the description, else from CiA 404.
+pub(super) fn meaning(node: &Node, signal: &Signal, code: u64) -> String {
+    let described = node.described(kind_object(signal)).and_then(|entry| entry.meaning(code));
     described.map_or_else(
         || match code {
             0 => "none".to_owned(),
@@ -104,120 +123,120 @@ pub fn meaning(device: &Device, signal: &Signal, code: u64) -> String {
             2 => "repeating average".to_owned(),
             3 => "Bessel low-pass".to_owned(),
             4 => "Butterworth low-pass".to_owned(),
-            100.. => format!("the manufacturer's ({code})"),
+            100.. => format!("manufacturer-specific ({code})"),
             _ => format!("unknown ({code})"),
         },
         str::to_owned,
     )
 }
 
-fn has_filter(device: &Device, signal: &Signal) -> bool {
-    device.may_have(kind_object(signal)) || device.may_have(constant_object(signal))
+fn has_filter(node: &Node, signal: &Signal) -> bool {
+    node.may_have(kind_object(signal)) || node.may_have(constant_object(signal))
 }
 
-/// The filters of the signals asked for.
+/// The filter of one signal, or of every signal that has one.
 ///
 /// # Errors
-/// Signals that the device has not, devices without filter, silence.
-pub fn show(master: &mut Master<'_>, device: &Device, signal: Option<&str>) -> Result<Vec<FilterOf>, Failure> {
+/// No such signal, no filter, no answer.
+pub fn show(master: &mut Master<'_>, node: &Node, signal: Option<&str>) -> Result<Vec<FilterOf>, Failure> {
     let signals: Vec<&Signal> = match signal {
-        Some(name) => vec![device.signal(Some(name))?],
-        None => device.instrument.signals.iter().collect(),
+        Some(name) => vec![find_signal(node, Some(name))?],
+        None => node.signals.iter().collect(),
     };
     let mut filters = Vec::new();
-    for signal in signals.into_iter().filter(|signal| has_filter(device, signal)) {
-        filters.extend(filter_of(master, device, signal)?);
+    for signal in signals.into_iter().filter(|signal| has_filter(node, signal)) {
+        filters.extend(filter_of(master, node, signal)?);
     }
     if filters.is_empty() {
-        let message = format!("{} has no filter (61A0h, 61A1h)", signal.unwrap_or("it"));
-        return Err(Failure::of_node(Kind::Unexpected, device.node(), message));
+        return Err(Failure::at(node.id, SettingsFailure::NoFilter { signal: signal.map(str::to_owned) }));
     }
     Ok(filters)
 }
 
-fn filter_of(master: &mut Master<'_>, device: &Device, signal: &Signal) -> Result<Option<FilterOf>, Failure> {
-    let values = device.read_each(master, &[kind_object(signal), constant_object(signal)])?;
+fn filter_of(master: &mut Master<'_>, node: &Node, signal: &Signal) -> Result<Option<FilterOf>, Failure> {
+    let values = read_each(master, node, &[kind_object(signal), constant_object(signal)])?;
     let [code, constant] = [0, 1].map(|at| values.get(at).and_then(Option::as_ref).and_then(Value::as_u64));
-    let kind = code.map(|code| meaning(device, signal, code)).unwrap_or_default();
-    let told = code.is_some() || constant.is_some();
-    Ok(told.then(|| FilterOf { node: device.node(), signal: signal.name.clone(), code, kind, constant }))
+    let kind = code.map(|code| meaning(node, signal, code)).unwrap_or_default();
+    let is_known = code.is_some() || constant.is_some();
+    Ok(is_known.then(|| FilterOf { node: node.id, signal: signal.name.clone(), code, kind, constant }))
 }
 
-/// Sets the filter of a signal, or of the only one that has one, and reads it back.
+/// Sets the filter of a signal, or of the only signal that has one, and reads it back.
 ///
 /// # Errors
-/// What the device does not take by its description, refusals, silence, and a device that keeps something
-/// else.
+/// The device does not accept the settings (known from its description, or from its answer), does not answer, or keeps
+/// other settings.
 pub fn set(
     master: &mut Master<'_>,
-    device: &Device,
+    node: &Node,
     signal: Option<&str>,
-    wanted: Wanted,
+    wanted: FilterRequest,
 ) -> Result<FilterChange, Failure> {
-    let mut with_filter = device.instrument.signals.iter().filter(|signal| has_filter(device, signal));
+    let mut with_filter = node.signals.iter().filter(|signal| has_filter(node, signal));
     let signal = match (signal, with_filter.next(), with_filter.next()) {
         (None, Some(only), None) => only,
-        (name, ..) => device.signal(name)?,
+        (name, ..) => find_signal(node, name)?,
     };
-    let node = device.node();
-    let usage = |message: String| Failure::of_node(Kind::Usage, node, message);
-    let none = || Failure::of_node(Kind::Unexpected, node, format!("{} has no filter (61A0h, 61A1h)", signal.name));
-    if !has_filter(device, signal) {
-        return Err(none());
+    let no_filter = || Failure::at(node.id, SettingsFailure::NoFilter { signal: Some(signal.name.clone()) });
+    if !has_filter(node, signal) {
+        return Err(no_filter());
     }
-    // Everything that can be wrong is found before the first write.
-    let kind = wanted.kind.map(|kind| code_of(device, signal, kind)).transpose()?;
+    // All checks come before the first write.
+    let kind = wanted.kind.map(|kind| code_of(node, signal, kind)).transpose()?;
     let constant = constant_object(signal);
-    if let (Some(number), Some(entry)) = (wanted.constant, device.described(constant))
+    if let (Some(number), Some(entry)) = (wanted.constant, node.described(constant))
         && !entry.allows(f64::from(number))
     {
-        return Err(usage(format!("{} takes no filter constant {number}", signal.name)));
+        let cause = SettingsFailure::FilterConstant { signal: signal.name.clone(), constant: number };
+        return Err(Failure::at(node.id, cause));
     }
-    let before = filter_of(master, device, signal)?.ok_or_else(none)?;
-    let damping = match wanted.damping {
-        None => None,
-        Some(damping) => {
-            let Some(object) = device.of_signal(signal, "damping") else {
-                return Err(usage(format!("no object of {} is known to take a damping", signal.name))
-                    .hint("set the steps of the filter: --constant N"));
-            };
-            if kind.map(u64::from).or(before.code) != Some(1) {
-                let now = if kind.is_some() { "another filter was asked for" } else { before.kind.as_str() };
-                let message = format!("{}: a damping sets the moving average ({now})", signal.name);
-                return Err(usage(message).hint("add --type moving"));
-            }
-            let milliseconds = u16::try_from(damping.as_millis());
-            let milliseconds = milliseconds.map_err(|_| usage("a damping is at most 65535 ms".to_owned()))?;
-            Some((object, milliseconds))
-        }
-    };
+    let before = filter_of(master, node, signal)?.ok_or_else(no_filter)?;
+    let damping = wanted.damping.map(|damping| damping_write(node, signal, damping, kind, &before)).transpose()?;
     if let Some(code) = kind {
-        device.set(master, kind_object(signal), &[code])?;
+        set_object(master, node, kind_object(signal), &[code])?;
     }
     if let Some(number) = wanted.constant {
-        let width = device.data_type(constant).width().unwrap_or(2).min(4);
-        device.set(master, constant, &u32::from(number).to_le_bytes()[..width])?;
+        let width = node.data_type(constant).width().unwrap_or(2).min(4);
+        set_object(master, node, constant, &u32::from(number).to_le_bytes()[..width])?;
     }
     if let Some((object, milliseconds)) = damping {
-        device.write(master, object, &milliseconds.to_le_bytes())?;
+        write(master, node, object, &milliseconds.to_le_bytes())?;
     }
-    let now = filter_of(master, device, signal)?.ok_or_else(none)?;
+    let now = filter_of(master, node, signal)?.ok_or_else(no_filter)?;
     let damping_shown = damping.map(|_| now.constant != before.constant);
     Ok(FilterChange { before, now, damping_shown })
 }
 
-/// The code of a type on this device. A code that means something else there is not taken for it: the
-/// MC1609's 0 may be a filter.
-fn code_of(device: &Device, signal: &Signal, kind: FilterType) -> Result<u8, Failure> {
+/// The object and the number of milliseconds that set a damping. `kind` is the filter type to set.
+fn damping_write(
+    node: &Node,
+    signal: &Signal,
+    damping: Duration,
+    kind: Option<u8>,
+    before: &FilterOf,
+) -> Result<(ObjectId, u16), Failure> {
+    let name = signal.name.clone();
+    let Some(object) = node.object_of(signal, "damping") else {
+        return Err(Failure::at(node.id, SettingsFailure::NoDamping { signal: name }));
+    };
+    if kind.map(u64::from).or(before.code) != Some(1) {
+        let present = kind.is_none().then(|| before.kind.clone());
+        return Err(Failure::at(node.id, SettingsFailure::DampingOfOtherType { signal: name, present }));
+    }
+    let milliseconds = u16::try_from(damping.as_millis());
+    Ok((object, milliseconds.map_err(|_| Failure::at(node.id, SettingsFailure::DampingTooLong))?))
+}
+
+/// The code of a type on this device, if it has the same meaning there: the MC1609 may use 0 for a filter.
+fn code_of(node: &Node, signal: &Signal, kind: FilterType) -> Result<u8, Failure> {
     let code = kind.code();
-    let Some(entry) = device.described(kind_object(signal)).filter(|entry| !entry.values.is_empty()) else {
+    let Some(entry) = node.described(kind_object(signal)).filter(|entry| !entry.values.is_empty()) else {
         return Ok(code);
     };
     if entry.meaning(code.into()).is_some_and(|meaning| meaning.starts_with(kind.word())) {
         return Ok(code);
     }
-    let known: Vec<String> = entry.values.iter().map(|(code, meaning)| format!("{meaning} ({code})")).collect();
-    let message = format!("{} has no filter type \"{}\", but {}", signal.name, kind.word(), known.join(", "));
-    let failure = Failure::of_node(Kind::Usage, device.node(), message);
-    Err(if entry.doubt.is_empty() { failure } else { failure.hint(format!("61A0h: {}", entry.doubt)) })
+    let available = entry.values.iter().map(|(code, meaning)| (*code, meaning.clone())).collect();
+    let (signal, doubt) = (signal.name.clone(), entry.doubt.clone());
+    Err(Failure::at(node.id, SettingsFailure::FilterType { signal, wanted: kind, available, doubt }))
 }

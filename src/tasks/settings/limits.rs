@@ -1,24 +1,28 @@
-//! What makes a TPDO of a signal go out by itself: delta, lower and upper limit, hysteresis (CiA 404, x133h
-//! to x136h, in the family of the process value).
+//! What triggers a TPDO: delta, lower limit, upper limit and hysteresis of a signal (CiA 404, x133h to x136h, in the
+//! family of the process value).
 
-use super::{Device, Quantity, encode_quantity};
+use super::{
+    Quantity, SettingsEffect, SettingsFact, SettingsFailure, encode_quantity, find_signal, quantity, read_each,
+    set_object,
+};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::Transmission;
 use crate::master::Master;
 use crate::measure::layout::Signal;
-use crate::tasks::{Failure, Kind};
+use crate::node::Node;
+use crate::tasks::{Fact, Failure, Kind, Note};
 
-/// One of the four.
+/// One of the four settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
-    /// x133h: a change of at least this sends.
+    /// x133h: a change of at least this triggers the TPDO.
     Delta,
-    /// x134h: below it, it sends.
+    /// x134h: a value that falls below it triggers the TPDO.
     Lower,
-    /// x135h: above it, it sends.
+    /// x135h: a value that rises above it triggers the TPDO.
     Upper,
-    /// x136h: how far back behind a limit before it counts again.
+    /// x136h: the distance from a limit that re-arms it.
     Hysteresis,
 }
 
@@ -26,7 +30,7 @@ impl Limit {
     /// All of them, in the order of their objects.
     pub const ALL: [Limit; 4] = [Limit::Delta, Limit::Lower, Limit::Upper, Limit::Hysteresis];
 
-    /// As it is typed and printed.
+    /// Its name in options and reports.
     pub fn as_str(self) -> &'static str {
         match self {
             Limit::Delta => "delta",
@@ -36,15 +40,15 @@ impl Limit {
         }
     }
 
-    /// Where it stands.
-    pub fn object(self, device: &Device, signal: &Signal) -> ObjectId {
+    /// Its object.
+    pub fn object(self, node: &Node, signal: &Signal) -> ObjectId {
         let low = match self {
             Limit::Delta => 0x133,
             Limit::Lower => 0x134,
             Limit::Upper => 0x135,
             Limit::Hysteresis => 0x136,
         };
-        device.in_family(signal, low)
+        node.in_family(signal, low)
     }
 }
 
@@ -55,98 +59,135 @@ pub struct Limits {
     pub node: NodeId,
     /// `pressure`, `ch1` …
     pub signal: String,
-    /// What the device has of the four, with where it stands.
+    /// The settings that the device has, with their objects.
     pub values: Vec<(Limit, ObjectId, Quantity)>,
-    /// TPDOs that may never send because delta is 0.
+    /// TPDOs that may never be sent because the delta is 0.
     pub silent: Vec<String>,
+    /// What else there is to report.
+    pub notes: Vec<Note>,
 }
 
 /// The limits of a signal.
 ///
 /// # Errors
-/// Signals that the device has not or that have no limits, silence.
-pub fn show(master: &mut Master<'_>, device: &Device, signal: &str) -> Result<Limits, Failure> {
-    let signal = device.signal(Some(signal))?;
+/// No such signal, no limits, no answer.
+pub fn show(master: &mut Master<'_>, node: &Node, signal: &str) -> Result<Limits, Failure> {
+    let signal = find_signal(node, Some(signal))?;
     let wanted: Vec<(Limit, ObjectId)> = Limit::ALL
         .into_iter()
-        .map(|limit| (limit, limit.object(device, signal)))
-        .filter(|&(_, object)| device.may_have(object))
+        .map(|limit| (limit, limit.object(node, signal)))
+        .filter(|&(_, object)| node.may_have(object))
         .collect();
     let objects: Vec<ObjectId> = wanted.iter().map(|&(_, object)| object).collect();
     let values: Vec<(Limit, ObjectId, Quantity)> = wanted
         .into_iter()
-        .zip(device.read_each(master, &objects)?)
-        .filter_map(|((limit, object), value)| Some((limit, object, device.quantity(signal, &value?)?)))
+        .zip(read_each(master, node, &objects)?)
+        .filter_map(|((limit, object), value)| Some((limit, object, quantity(signal, &value?)?)))
         .collect();
     if values.is_empty() {
-        let range = format!("{} to {}", Limit::Delta.object(device, signal), Limit::Hysteresis.object(device, signal));
-        let message = format!("{} has no delta and no limits ({range})", signal.name);
-        return Err(Failure::of_node(Kind::Unexpected, device.node(), message));
+        let objects = [Limit::Delta, Limit::Hysteresis].map(|limit| limit.object(node, signal));
+        return Err(Failure::at(node.id, SettingsFailure::NoLimits { signal: signal.name.clone(), objects }));
     }
-    let silent = silent(device, signal, &values);
-    Ok(Limits { node: device.node(), signal: signal.name.clone(), values, silent })
+    let silent = silent(node, signal, &values);
+    let note = |tpdo: &String| Note::of_node(node.id, SettingsFact::MayNeverSend { tpdo: tpdo.clone() });
+    let notes = silent.iter().map(note).collect();
+    Ok(Limits { node: node.id, signal: signal.name.clone(), values, silent, notes })
 }
 
-/// Sets limits of a signal, in its unit, and reads them back. What was set is put back where a later one is
-/// refused.
+/// A limit to set.
+struct LimitWrite {
+    limit: Limit,
+    object: ObjectId,
+    rises: bool,
+    bytes: Vec<u8>,
+    /// The bytes of the previous number; empty if the object cannot hold it.
+    previous: Vec<u8>,
+}
+
+/// Sets limits of a signal, in its unit, and reads them back. If the device rejects one, the previous limits are set
+/// again.
 ///
 /// # Errors
-/// Numbers that the device cannot hold, a lower limit above the upper one, refusals, silence.
-pub fn set(master: &mut Master<'_>, device: &Device, signal: &str, wanted: &[(Limit, f64)]) -> Result<Limits, Failure> {
-    let before = show(master, device, signal)?;
-    let described = device.signal(Some(signal))?;
-    let usage = |message: String| Failure::of_node(Kind::Usage, device.node(), message);
-    let number = |limit: Limit| {
-        let asked = wanted.iter().find(|(other, _)| *other == limit).map(|&(_, number)| number);
-        let present = before.values.iter().find(|(other, ..)| *other == limit);
-        asked.or(present.map(|(_, _, quantity)| quantity.number.as_f64()))
-    };
-    if let (Some(lower), Some(upper)) = (number(Limit::Lower), number(Limit::Upper))
-        && lower > upper
-        && wanted.iter().any(|(limit, _)| matches!(limit, Limit::Lower | Limit::Upper))
-    {
-        return Err(usage(format!("{signal}: the lower limit {lower} is above the upper one, {upper}")));
-    }
+/// The device cannot hold a number, the lower limit is above the upper limit, the device rejects a limit or does not
+/// answer.
+pub fn set(master: &mut Master<'_>, node: &Node, signal: &str, wanted: &[(Limit, f64)]) -> Result<Limits, Failure> {
+    let before = show(master, node, signal)?;
+    check_order(node, &before, wanted)?;
+    let described = find_signal(node, Some(signal))?;
     let mut writes = Vec::new();
     for &(limit, number) in wanted {
-        let Some(&(_, object, old)) = before.values.iter().find(|(other, ..)| *other == limit) else {
-            return Err(usage(format!("{signal} has no {} ({})", limit.as_str(), limit.object(device, described))));
-        };
-        let digits = described.digits.unwrap_or(0);
-        let encode = |number| encode_quantity(number, device.data_type(object), digits);
-        let bytes = encode(number).map_err(|error| usage(format!("{signal} {}: {error}", limit.as_str())))?;
-        let undo = encode(old.number.as_f64()).unwrap_or_default();
-        writes.push((limit, number > old.number.as_f64(), object, bytes, undo));
+        writes.push(limit_write(node, described, &before, limit, number)?);
     }
-    // A device may refuse a lower limit above the present upper one: what rises rises from the top.
-    let rises = writes.iter().any(|(limit, rises, ..)| *limit == Limit::Upper && *rises);
-    if rises {
+    // A device may reject a lower limit above the present upper limit: rising limits start with the upper one.
+    if writes.iter().any(|write| write.limit == Limit::Upper && write.rises) {
         writes.reverse();
     }
-    for (at, (_, _, object, bytes, _)) in writes.iter().enumerate() {
-        let Err(failure) = device.set(master, *object, bytes) else { continue };
-        if failure.kind() == Kind::NoAnswer || failure.kind() == Kind::Bus || failure.kind() == Kind::Interrupted {
-            return Err(failure.hint(format!("what stands now: cangauge limits {} {signal}", device.node())));
+    for (at, write) in writes.iter().enumerate() {
+        let Err(failure) = set_object(master, node, write.object, &write.bytes) else { continue };
+        let signal = signal.to_owned();
+        if matches!(failure.kind(), Kind::NoAnswer | Kind::Bus | Kind::Interrupted) {
+            return Err(failure.with(node.id, SettingsEffect::LimitsUnknown { signal }));
         }
-        // The one that acknowledged and keeps something else is put back too.
+        // An object that was acknowledged and has another value is set again as well.
         let done = if failure.kind() == Kind::Unexpected { at + 1 } else { at };
-        let mut back = true;
-        for (_, _, object, _, undo) in writes.iter().take(done).rev() {
-            back &= !undo.is_empty() && device.set(master, *object, undo).is_ok();
+        let mut is_restored = true;
+        for write in writes.iter().take(done).rev() {
+            is_restored &=
+                !write.previous.is_empty() && set_object(master, node, write.object, &write.previous).is_ok();
         }
-        let told = if back { "the limits are as before" } else { "not all limits could be put back" };
-        return Err(failure.hint(format!("{told}: cangauge limits {} {signal}", device.node())));
+        return Err(match is_restored {
+            true => failure.with(node.id, SettingsEffect::LimitsRestored { signal }),
+            false => failure.with(node.id, SettingsEffect::LimitsNotRestored { signal }),
+        });
     }
-    show(master, device, signal)
+    let mut now = show(master, node, signal)?;
+    now.notes.push(Note::of_node(node.id, Fact::KeptUntilPowerOff));
+    Ok(now)
 }
 
-/// TPDOs that carry the signal and go out by event alone, while no change is large enough to be one.
-fn silent(device: &Device, signal: &Signal, values: &[(Limit, ObjectId, Quantity)]) -> Vec<String> {
+/// Checks that the lower limit will not be above the upper limit.
+fn check_order(node: &Node, before: &Limits, wanted: &[(Limit, f64)]) -> Result<(), Failure> {
+    let number = |limit: Limit| {
+        let requested = wanted.iter().find(|(other, _)| *other == limit).map(|&(_, number)| number);
+        let present = before.values.iter().find(|(other, ..)| *other == limit);
+        requested.or(present.map(|(_, _, quantity)| quantity.number.as_f64()))
+    };
+    let changes_limit = wanted.iter().any(|(limit, _)| matches!(limit, Limit::Lower | Limit::Upper));
+    match (number(Limit::Lower), number(Limit::Upper)) {
+        (Some(lower), Some(upper)) if lower > upper && changes_limit => {
+            let signal = before.signal.clone();
+            Err(Failure::at(node.id, SettingsFailure::LimitsCrossed { signal, lower, upper }))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn limit_write(
+    node: &Node,
+    signal: &Signal,
+    before: &Limits,
+    limit: Limit,
+    number: f64,
+) -> Result<LimitWrite, Failure> {
+    let name = signal.name.clone();
+    let Some(&(_, object, old)) = before.values.iter().find(|(other, ..)| *other == limit) else {
+        let object = limit.object(node, signal);
+        return Err(Failure::at(node.id, SettingsFailure::NoSuchLimit { signal: name, limit, object }));
+    };
+    let old = old.number.as_f64();
+    let encode = |number| encode_quantity(number, node.data_type(object), signal.digits.unwrap_or(0));
+    let bytes = encode(number)
+        .map_err(|error| Failure::at(node.id, SettingsFailure::LimitValue { signal: name, limit, error }))?;
+    Ok(LimitWrite { limit, object, rises: number > old, bytes, previous: encode(old).unwrap_or_default() })
+}
+
+/// The TPDOs that carry the signal and are sent only on events, while the delta is 0.
+fn silent(node: &Node, signal: &Signal, values: &[(Limit, ObjectId, Quantity)]) -> Vec<String> {
     let delta = values.iter().find(|(limit, ..)| *limit == Limit::Delta);
     if delta.is_none_or(|(_, _, quantity)| quantity.number.as_f64() != 0.0) {
         return Vec::new();
     }
-    let tpdos = device.instrument.tpdos.iter().filter(|tpdo| {
+    let tpdos = node.tpdos.iter().filter(|tpdo| {
         let by_event = matches!(tpdo.transmission, Some(Transmission::Manufacturer | Transmission::Profile));
         let no_timer = tpdo.event_timer_ms.unwrap_or(0) == 0;
         let carries = tpdo.mapping.iter().any(|entry| signal.is_value(entry.object));

@@ -1,12 +1,14 @@
-//! The lowest and highest value that a device has measured, and their reset (MH-4 2020h to 2022h, D-20-9
-//! 2020h and 2021h), by the names that descriptions give them.
+//! The lowest and the highest value that a device has measured, and their reset (MH-4 2020h to 2022h, D-20-9 2020h and
+//! 2021h). The objects are found by their names in the description.
 
-use super::{Device, Quantity};
+use super::{Quantity, SettingsFailure, find_signal, quantity, read_each};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::master::Master;
 use crate::measure::layout::Signal;
+use crate::node::Node;
+use crate::node::write::write;
 use crate::tasks::{Failure, Kind};
 
 /// The lowest and highest value of a signal, and those before a reset.
@@ -25,77 +27,75 @@ pub struct Extremes {
     pub node: NodeId,
     /// `pressure`, `temperature` …
     pub signal: String,
-    /// The lowest value since power on or the last reset.
+    /// The lowest value since the device was switched on or reset; `None` if it cannot be read.
     pub lowest: Option<Quantity>,
-    /// The highest.
+    /// The highest value.
     pub highest: Option<Quantity>,
 }
 
-/// The lowest and highest values of every signal that has them.
+/// The lowest and the highest value of every signal that has them.
 ///
 /// # Errors
-/// Devices that keep none as far as is known, silence.
-pub fn show(master: &mut Master<'_>, device: &Device) -> Result<Vec<MinMax>, Failure> {
-    let all = present(master, device)?;
+/// [`SettingsFailure::NoMinMax`]; no answer.
+pub fn show(master: &mut Master<'_>, node: &Node) -> Result<Vec<MinMax>, Failure> {
+    let all = present(master, node)?;
     Ok(all.into_iter().map(|now| MinMax { now, before: None }).collect())
 }
 
-fn present(master: &mut Master<'_>, device: &Device) -> Result<Vec<Extremes>, Failure> {
+fn present(master: &mut Master<'_>, node: &Node) -> Result<Vec<Extremes>, Failure> {
     let mut all = Vec::new();
-    for signal in &device.instrument.signals {
-        let objects = ["minimum-pv", "maximum-pv"].map(|name| device.of_signal(signal, name));
+    for signal in &node.signals {
+        let objects = ["minimum-pv", "maximum-pv"].map(|name| node.object_of(signal, name));
         let [Some(lowest), Some(highest)] = objects else { continue };
-        all.push(extremes(master, device, signal, [lowest, highest])?);
+        all.push(extremes(master, node, signal, [lowest, highest])?);
     }
     if all.is_empty() {
-        let message = "no object of this device is known to keep minimum and maximum";
-        return Err(Failure::of_node(Kind::Unexpected, device.node(), message));
+        return Err(Failure::at(node.id, SettingsFailure::NoMinMax));
     }
     Ok(all)
 }
 
 fn extremes(
     master: &mut Master<'_>,
-    device: &Device,
+    node: &Node,
     signal: &Signal,
     objects: [ObjectId; 2],
 ) -> Result<Extremes, Failure> {
-    let values = device.read_each(master, &objects)?;
-    let quantity = |value: Option<&Option<Value>>| device.quantity(signal, value?.as_ref()?);
-    let (lowest, highest) = (quantity(values.first()), quantity(values.get(1)));
-    Ok(Extremes { node: device.node(), signal: signal.name.clone(), lowest, highest })
+    let values = read_each(master, node, &objects)?;
+    let present = |value: Option<&Option<Value>>| quantity(signal, value?.as_ref()?);
+    let (lowest, highest) = (present(values.first()), present(values.get(1)));
+    Ok(Extremes { node: node.id, signal: signal.name.clone(), lowest, highest })
 }
 
-/// Resets minimum and maximum of every signal that has them; the values before and after. The signature is
-/// sent once; where no answer comes, what the device then reads decides.
+/// Resets minimum and maximum of every signal that has them; the values before and after. The signature is sent once. If
+/// no answer comes, the values prove whether the device acted on it.
 ///
 /// # Errors
-/// Devices of which no object is known that does it, refusals, silence, values that stay.
-pub fn reset(master: &mut Master<'_>, device: &Device) -> Result<Vec<MinMax>, Failure> {
-    let before = present(master, device)?;
+/// [`SettingsFailure::NoMinMaxReset`], [`SettingsFailure::MinMaxNotReset`]; the device rejects the signature or does not
+/// answer.
+pub fn reset(master: &mut Master<'_>, node: &Node) -> Result<Vec<MinMax>, Failure> {
+    let before = present(master, node)?;
     let mut all = Vec::new();
     for old in before {
-        let signal = device.signal(Some(&old.signal))?;
-        let Some(object) = device.of_signal(signal, "reset-min-max") else {
-            let message = format!("no object of this device is known to reset minimum and maximum of {}", old.signal);
-            return Err(Failure::of_node(Kind::Unexpected, device.node(), message));
+        let signal = find_signal(node, Some(&old.signal))?;
+        let Some(object) = node.object_of(signal, "reset-min-max") else {
+            return Err(Failure::at(node.id, SettingsFailure::NoMinMaxReset { signal: old.signal }));
         };
-        let sent = device.write(master, object, b"zero");
+        let sent = write(master, node, object, b"zero").map_err(Failure::from);
         match sent {
             Err(failure) if failure.kind() != Kind::NoAnswer => return Err(failure),
             _ => {}
         }
-        let objects = ["minimum-pv", "maximum-pv"].map(|name| device.of_signal(signal, name).unwrap_or(object));
-        let now = extremes(master, device, signal, objects)?;
-        match has_begun_anew(&old, &now) {
+        let objects = ["minimum-pv", "maximum-pv"].map(|name| node.object_of(signal, name).unwrap_or(object));
+        let now = extremes(master, node, signal, objects)?;
+        match is_reset(&old, &now) {
             Some(true) => {}
-            // An answer that did not come is the better explanation.
-            None | Some(false) if sent.is_err() => sent?,
+            // The missing answer is the better explanation.
+            None | Some(false) if sent.is_err() => drop(sent?),
             None => {}
             Some(false) => {
-                let message = format!("{object} was acknowledged, and minimum and maximum of {} stay", old.signal);
-                let failure = Failure::of_node(Kind::Unexpected, device.node(), message);
-                return Err(Failure { object: Some(object), ..failure });
+                let cause = SettingsFailure::MinMaxNotReset { signal: old.signal };
+                return Err(Failure::at(node.id, cause).of_object(object));
             }
         }
         all.push(MinMax { now, before: Some(old) });
@@ -103,9 +103,9 @@ pub fn reset(master: &mut Master<'_>, device: &Device) -> Result<Vec<MinMax>, Fa
     Ok(all)
 }
 
-/// Whether a reset shows: without one the lowest value only falls and the highest only rises. `None` where nothing
-/// tells: nothing had moved before, or by now the values have gone beyond both ends.
-fn has_begun_anew(old: &Extremes, now: &Extremes) -> Option<bool> {
+/// Whether the values prove a reset: without it the lowest value only falls and the highest value only rises. `None` if
+/// they prove nothing: the values were equal before, or both ends have been exceeded since.
+fn is_reset(old: &Extremes, now: &Extremes) -> Option<bool> {
     let ends = |extremes: &Extremes| {
         let (lowest, highest) = extremes.lowest.zip(extremes.highest)?;
         Some((lowest.number.as_f64(), highest.number.as_f64()))
@@ -123,7 +123,7 @@ mod tests {
     use crate::measure::sample::Number;
 
     #[test]
-    fn a_reset_shows_in_a_range_that_became_narrower_at_one_end() {
+    fn a_range_that_became_narrower_proves_a_reset() {
         let range = |lowest, highest| Extremes {
             node: NodeId::MIN,
             signal: "pressure".to_owned(),
@@ -131,12 +131,12 @@ mod tests {
             highest: Some(Quantity { number: Number::Real64(highest), unit: None }),
         };
         let old = range(1.0, 2.0);
-        assert_eq!(has_begun_anew(&old, &range(1.5, 1.5)), Some(true));
-        assert_eq!(has_begun_anew(&old, &range(1.5, 2.5)), Some(true));
-        assert_eq!(has_begun_anew(&old, &range(1.0, 2.0)), Some(false));
-        assert_eq!(has_begun_anew(&old, &range(1.0, 2.5)), Some(false));
-        assert_eq!(has_begun_anew(&old, &range(0.5, 2.5)), None, "noise since then is more than there was before");
-        assert_eq!(has_begun_anew(&range(1.0, 1.0), &range(1.0, 1.0)), None, "stood still all the time");
-        assert_eq!(has_begun_anew(&old, &Extremes { lowest: None, ..old.clone() }), Some(false));
+        assert_eq!(is_reset(&old, &range(1.5, 1.5)), Some(true));
+        assert_eq!(is_reset(&old, &range(1.5, 2.5)), Some(true));
+        assert_eq!(is_reset(&old, &range(1.0, 2.0)), Some(false));
+        assert_eq!(is_reset(&old, &range(1.0, 2.5)), Some(false));
+        assert_eq!(is_reset(&old, &range(0.5, 2.5)), None, "the noise since the reset exceeds the old range");
+        assert_eq!(is_reset(&range(1.0, 1.0), &range(1.0, 1.0)), None, "the value never changed");
+        assert_eq!(is_reset(&old, &Extremes { lowest: None, ..old.clone() }), Some(false));
     }
 }

@@ -1,6 +1,6 @@
-//! The physical unit of a signal (6131h), and what a new one rescales.
+//! The physical unit of a signal (6131h), and the objects that a new unit rescales.
 
-use super::{Device, Quantity};
+use super::{Quantity, SettingsFact, SettingsFailure, find_signal, measured, read_each, set_object};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
@@ -8,7 +8,8 @@ use crate::device::unit::Unit;
 use crate::master::Master;
 use crate::measure::layout::Signal;
 use crate::measure::sample::Number;
-use crate::tasks::{Failure, Kind};
+use crate::node::Node;
+use crate::tasks::{Fact, Failure, Note};
 
 /// The unit of a signal.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,29 +18,31 @@ pub struct UnitOf {
     pub node: NodeId,
     /// `pressure`, `ch1` …
     pub signal: String,
-    /// As the device tells it.
+    /// The unit, read from the device.
     pub unit: Unit,
-    /// What the device takes, where its description says.
+    /// The units that the device accepts, from its description; empty if unknown.
     pub takes: Vec<Unit>,
-    /// Whether it cannot be changed.
+    /// Whether the unit cannot be changed.
     pub fixed: bool,
 }
 
-/// A unit that was set.
+/// A change of the unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnitChange {
-    /// The unit before; the same as the new one where nothing had to be done.
+    /// The unit before; equal to the new unit if nothing was written.
     pub before: Unit,
     /// The unit now, read back.
     pub now: UnitOf,
-    /// What is kept in this unit, before and after.
+    /// The objects in this unit, before and after.
     pub rescaled: Vec<Rescaled>,
+    /// What else there is to report.
+    pub notes: Vec<Note>,
 }
 
 /// An object in the unit of a signal, before and after the unit was changed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rescaled {
-    /// Which one.
+    /// The object.
     pub object: ObjectId,
     /// Its name.
     pub name: String,
@@ -47,14 +50,14 @@ pub struct Rescaled {
     pub before: Option<Quantity>,
     /// Its value in the new unit.
     pub after: Option<Quantity>,
-    /// The device left the number as it was, though it means something else now.
+    /// Whether the device kept the number, so that it means something else now.
     pub stale: bool,
 }
 
 /// How a number in the unit of a signal changes with the unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scale {
-    /// The measured value, which moves by itself.
+    /// A measured value, which changes by itself.
     Moving,
     /// A point on the scale.
     Point,
@@ -62,7 +65,7 @@ enum Scale {
     Distance,
 }
 
-/// What CiA 404 keeps in the unit of 6131h, as indices without the first digit.
+/// The objects of CiA 404 in the unit of 6131h, as indices without the first digit.
 const IN_UNIT: [(u16, Scale); 10] = [
     (0x121, Scale::Point),
     (0x123, Scale::Point),
@@ -76,98 +79,96 @@ const IN_UNIT: [(u16, Scale); 10] = [
     (0x136, Scale::Distance),
 ];
 
-/// The units of the signals asked for.
+/// The unit of one signal, or of every signal that has one.
 ///
 /// # Errors
-/// Signals that the device has not, and devices that tell no unit.
-pub fn show(device: &Device, signal: Option<&str>) -> Result<Vec<UnitOf>, Failure> {
+/// No such signal; [`SettingsFailure::NoUnit`].
+pub fn show(node: &Node, signal: Option<&str>) -> Result<Vec<UnitOf>, Failure> {
     let signals: Vec<&Signal> = match signal {
-        Some(name) => vec![device.signal(Some(name))?],
-        None => device.instrument.signals.iter().collect(),
+        Some(name) => vec![find_signal(node, Some(name))?],
+        None => node.signals.iter().collect(),
     };
-    let told: Vec<UnitOf> = signals.iter().filter_map(|signal| unit_of(device, signal)).collect();
-    if told.is_empty() {
-        return Err(Failure::of_node(Kind::Unexpected, device.node(), "it tells no unit (6131h)"));
+    let units: Vec<UnitOf> = signals.iter().filter_map(|signal| unit_of(node, signal)).collect();
+    if units.is_empty() {
+        return Err(Failure::at(node.id, SettingsFailure::NoUnit { signal: None }));
     }
-    Ok(told)
+    Ok(units)
 }
 
-fn unit_of(device: &Device, signal: &Signal) -> Option<UnitOf> {
+fn unit_of(node: &Node, signal: &Signal) -> Option<UnitOf> {
     let object = ObjectId::new(0x6131, signal.channel);
-    let allowed = device.described(object).map_or(&[][..], |entry| &entry.allow);
+    let allowed = node.described(object).map_or(&[][..], |entry| &entry.allow);
     Some(UnitOf {
-        node: device.node(),
+        node: node.id,
         signal: signal.name.clone(),
         unit: signal.unit?,
         takes: allowed.iter().map(|code| Unit(code.low)).collect(),
-        fixed: device.is_fixed(object),
+        fixed: node.is_read_only(object),
     })
 }
 
-/// Sets the unit of a signal, or of the only one that can have it; reads it back, and everything that it
-/// rescales.
+/// Sets the unit of a signal, or of the only signal that can have it. Reads it back with everything that it rescales.
 ///
 /// # Errors
-/// Units that the device does not take by its description, refusals, silence, and a device that keeps
-/// another one.
-pub fn set(
-    master: &mut Master<'_>,
-    device: &mut Device,
-    signal: Option<&str>,
-    unit: Unit,
-) -> Result<UnitChange, Failure> {
-    let signal = choose(device, signal, unit)?.clone();
-    let node = device.node();
+/// The device does not accept the unit (known from its description, or from its answer), does not answer, or keeps
+/// another unit.
+pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit: Unit) -> Result<UnitChange, Failure> {
+    let signal = choose(node, signal, unit)?.clone();
     let object = ObjectId::new(0x6131, signal.channel);
-    let Some(old) = unit_of(device, &signal) else {
-        let message = format!("{} tells no unit (6131h)", signal.name);
-        return Err(Failure::of_node(Kind::Unexpected, node, message));
+    let Some(old) = unit_of(node, &signal) else {
+        return Err(Failure::at(node.id, SettingsFailure::NoUnit { signal: Some(signal.name) }));
     };
     if old.unit == unit {
-        return Ok(UnitChange { before: unit, now: old, rescaled: Vec::new() });
+        let fact = SettingsFact::AlreadyInUnit { signal: signal.name, unit };
+        let notes = vec![Note::of_node(node.id, fact)];
+        return Ok(UnitChange { before: unit, now: old, rescaled: Vec::new(), notes });
     }
-    let refused = |message: String| Failure { object: Some(object), ..Failure::of_node(Kind::Usage, node, message) };
-    if old.fixed {
-        return Err(refused(format!("{} is in {}, and this device cannot change it", signal.name, old.unit)));
-    }
-    if !old.takes.is_empty() && !old.takes.contains(&unit) {
-        let failure = refused(format!("{} takes {}, not {unit}", signal.name, list(&old.takes)));
-        let swapped = Unit(unit.0.swap_bytes());
-        let turned = old.takes.contains(&swapped).then(|| {
-            format!("0x{:08X} is {swapped} in the order of the bytes on the bus: 0x{:08X}", unit.0, swapped.0)
-        });
-        return Err(match turned {
-            Some(hint) => failure.hint(hint),
-            None => failure,
-        });
-    }
-    let objects = in_unit(device, &signal);
+    check_accepted(node, &old, unit).map_err(|failure| failure.of_object(object))?;
+    let objects = in_unit(node, &signal);
     let addresses: Vec<ObjectId> = objects.iter().map(|&(object, _)| object).collect();
-    let before = device.read_each(master, &addresses)?;
-    device.set(master, object, &unit.0.to_le_bytes())?;
-    // The digits may follow the unit.
-    let digits = ObjectId::new(0x6132, signal.channel);
-    let told = if device.may_have(digits) { device.read_each(master, &[digits])?.pop().flatten() } else { None };
-    let mut renewed = Signal { unit: Some(unit), ..signal.clone() };
-    renewed.digits =
-        told.as_ref().and_then(Value::as_u64).and_then(|number| u8::try_from(number).ok()).or(signal.digits);
-    let after = device.read_each(master, &addresses)?;
-    let rescaled = objects
-        .iter()
-        .zip(before.iter().zip(&after))
-        .filter(|(_, (before, after))| before.is_some() || after.is_some())
-        .map(|(&(object, scale), (before, after))| {
-            let before = before.as_ref().and_then(|value| device.measured(&signal, object, value));
-            let after = after.as_ref().and_then(|value| device.measured(&renewed, object, value));
-            let stale = before.zip(after).is_some_and(|(before, after)| is_stale(before, after, scale));
-            let name = device.name(object);
-            Rescaled { object, name, before, after, stale }
-        })
-        .collect();
-    if let Some(kept) = device.instrument.signals.iter_mut().find(|kept| kept.name == signal.name) {
+    let before = read_each(master, node, &addresses)?;
+    set_object(master, node, object, &unit.0.to_le_bytes())?;
+    let renewed = Signal { unit: Some(unit), digits: digits(master, node, &signal)?, ..signal.clone() };
+    let after = read_each(master, node, &addresses)?;
+    let mut rescaled = Vec::new();
+    for (&(object, scale), (before, after)) in objects.iter().zip(before.iter().zip(&after)) {
+        if before.is_none() && after.is_none() {
+            continue;
+        }
+        let before = before.as_ref().and_then(|value| measured(node, &signal, object, value));
+        let after = after.as_ref().and_then(|value| measured(node, &renewed, object, value));
+        let stale = before.zip(after).is_some_and(|(before, after)| is_stale(before, after, scale));
+        rescaled.push(Rescaled { object, name: node.name_of(object), before, after, stale });
+    }
+    let stale = rescaled.iter().filter(|item| item.stale);
+    let facts = stale.map(|item| SettingsFact::NotConverted { name: item.name.clone(), now: item.after });
+    let mut notes: Vec<Note> = facts.map(|fact| Note::of_node(node.id, fact)).collect();
+    notes.push(Note::of_node(node.id, Fact::KeptUntilPowerOff));
+    if let Some(kept) = node.signals.iter_mut().find(|kept| kept.name == signal.name) {
         *kept = renewed;
     }
-    Ok(UnitChange { before: old.unit, now: UnitOf { unit, ..old }, rescaled })
+    Ok(UnitChange { before: old.unit, now: UnitOf { unit, ..old }, rescaled, notes })
+}
+
+/// Checks that the description allows the new unit.
+fn check_accepted(node: &Node, old: &UnitOf, unit: Unit) -> Result<(), Failure> {
+    let signal = old.signal.clone();
+    if old.fixed {
+        return Err(Failure::at(node.id, SettingsFailure::UnitFixed { signal, unit: old.unit }));
+    }
+    if !old.takes.is_empty() && !old.takes.contains(&unit) {
+        let accepted = old.takes.clone();
+        return Err(Failure::at(node.id, SettingsFailure::UnitNotAccepted { signal, unit, accepted }));
+    }
+    Ok(())
+}
+
+/// The decimal digits, read again: they may change with the unit.
+fn digits(master: &mut Master<'_>, node: &Node, signal: &Signal) -> Result<Option<u8>, Failure> {
+    let object = ObjectId::new(0x6132, signal.channel);
+    let value = if node.may_have(object) { read_each(master, node, &[object])?.pop().flatten() } else { None };
+    let digits = value.as_ref().and_then(Value::as_u64).and_then(|number| u8::try_from(number).ok());
+    Ok(digits.or(signal.digits))
 }
 
 /// `bar, psi, MPa`.
@@ -175,23 +176,23 @@ pub fn list(units: &[Unit]) -> String {
     units.iter().map(Unit::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// The signal named, or the only one that is in a unit of the same quantity.
-fn choose<'a>(device: &'a Device, name: Option<&str>, unit: Unit) -> Result<&'a Signal, Failure> {
+/// The signal with this name; without a name the only signal with a unit of the same quantity.
+fn choose<'a>(node: &'a Node, name: Option<&str>, unit: Unit) -> Result<&'a Signal, Failure> {
     if name.is_none() {
         let like = |signal: &&Signal| signal.unit.is_some_and(|present| present.convert(0.0, unit).is_some());
-        let mut alike = device.instrument.signals.iter().filter(like);
+        let mut alike = node.signals.iter().filter(like);
         if let (Some(only), None) = (alike.next(), alike.next()) {
             return Ok(only);
         }
     }
-    device.signal(name)
+    find_signal(node, name)
 }
 
-/// What a device keeps in the unit of a signal.
-fn in_unit(device: &Device, signal: &Signal) -> Vec<(ObjectId, Scale)> {
+/// The objects in the unit of a signal.
+fn in_unit(node: &Node, signal: &Signal) -> Vec<(ObjectId, Scale)> {
     let channel = signal.channel;
-    let has_description = device.model().is_some_and(|model| !model.dictionary.is_empty());
-    // Of a device that nothing describes only the family that it measures in is asked for.
+    let has_description = node.model.as_ref().is_some_and(|model| !model.dictionary.is_empty());
+    // Without a description only the family of the process value is read.
     let own = signal.value.0.index & 0xf000;
     let families = [0x6000, 0x7000, 0x8000, 0x9000].into_iter().filter(|&family| has_description || family == own);
     let standard = IN_UNIT.into_iter().flat_map(move |(low, scale)| {
@@ -199,23 +200,23 @@ fn in_unit(device: &Device, signal: &Signal) -> Vec<(ObjectId, Scale)> {
     });
     let also = signal.also.iter().map(|&object| (object, Scale::Moving));
     let offset = std::iter::once((ObjectId::new(0x6127, channel), Scale::Distance));
-    let described = device.model().map_or(&[][..], |model| &model.description.objects).iter();
+    let described = node.model.as_ref().map_or(&[][..], |model| &model.description.objects).iter();
     let described = described.filter(|entry| entry.follows_unit == Some(channel));
     let described = described.flat_map(|entry| entry.objects());
-    let named = ["minimum-pv", "maximum-pv"].into_iter().filter_map(|name| device.of_signal(signal, name));
+    let named = ["minimum-pv", "maximum-pv"].into_iter().filter_map(|name| node.object_of(signal, name));
     let mut all: Vec<(ObjectId, Scale)> = standard
         .chain(offset)
         .chain(also)
         .chain(named.map(|object| (object, Scale::Moving)))
         .chain(described.map(|object| (object, Scale::Distance)))
-        .filter(|&(object, _)| device.may_have(object))
+        .filter(|&(object, _)| node.may_have(object))
         .collect();
     all.sort_by_key(|&(object, _)| object);
     all.dedup_by_key(|&mut (object, _)| object);
     all
 }
 
-/// Whether a number stayed what it was where the new unit makes another one of it.
+/// Whether a number is unchanged although the new unit requires another number.
 fn is_stale(before: Quantity, after: Quantity, scale: Scale) -> bool {
     let (Some(from), Some(to)) = (before.unit, after.unit) else { return false };
     let (was, is) = (before.number.as_f64(), after.number.as_f64());
@@ -244,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_stayed_is_noticed() {
+    fn an_unconverted_number_is_noticed() {
         let stale = |was, is, scale| is_stale(quantity(was, PSI), quantity(is, BAR), scale);
         assert!(!stale(100.0, 6.894_757, Scale::Point));
         assert!(stale(100.0, 100.0, Scale::Point));
@@ -253,6 +254,6 @@ mod tests {
         let (celsius, kelvin) = (Unit(0x002d_0000), Unit(0x0005_0000));
         let kept = |scale| is_stale(quantity(0.5, celsius), quantity(0.5, kelvin), scale);
         assert!(kept(Scale::Point));
-        assert!(!kept(Scale::Distance), "a difference of 0.5 degC is one of 0.5 K");
+        assert!(!kept(Scale::Distance), "a difference of 0.5 degC is 0.5 K");
     }
 }

@@ -11,8 +11,8 @@ use cangauge::node::Overrides;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::output::{info, info_json, json};
 use cangauge::tasks::scan::scan;
-use cangauge::tasks::settings::Device;
 use cangauge::tasks::settings::info::read;
+use cangauge::tasks::settings::open;
 use cangauge_fuzz::{Bytes, node};
 use libfuzzer_sys::fuzz_target;
 use std::time::Duration;
@@ -94,7 +94,7 @@ fuzz_target!(|data: &[u8]| {
         assert!(found.len() <= 1);
         found.iter().for_each(|found| json::found(&mut text, found).expect("memory"));
     }
-    match Device::open(&mut master, node(), &overrides).and_then(|device| read(&mut master, &device)) {
+    match open(&mut master, node(), &overrides).and_then(|device| read(&mut master, &device)) {
         Ok(page) => {
             info::text(&mut text, &page).expect("memory");
             info_json::object(&mut text, &page).expect("memory");
