@@ -7,9 +7,10 @@ use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::TpdoNumber;
+use crate::output::failure::ErrorMessage;
+use crate::output::notes;
 use crate::output::pdo::ReceivedTpdo;
-use crate::tasks::pdo::{Item, Line, Send, Wish, map, show, watch};
-use crate::tasks::{Failure, Kind};
+use crate::tasks::pdo::{Item, PdoRequest, Trigger, WatchEvent, map, show, watch};
 use clap::{Args, Subcommand};
 use std::ops::ControlFlow;
 use std::str::FromStr;
@@ -61,7 +62,7 @@ struct MapArgs {
     /// Transmission type: acyclic (on SYNC after a change), sync:N (on every N-th SYNC), event (255), timer (event timer),
     /// or a number
     #[arg(long, value_name = "HOW", value_parser = transmission)]
-    transmission: Option<Send>,
+    transmission: Option<Trigger>,
     /// Event timer, in whole milliseconds; 0: off
     #[arg(long, value_name = "DUR", value_parser = event_timer)]
     event_timer: Option<u16>,
@@ -121,16 +122,18 @@ impl FromStr for MapItem {
     }
 }
 
-fn transmission(text: &str) -> Result<Send, String> {
+fn transmission(text: &str) -> Result<Trigger, String> {
     let wrong =
         || format!("\"{text}\" is not a transmission type (acyclic, sync:1 to sync:240, event, timer, 0 to 255)");
     Ok(match text {
-        "acyclic" => Send::Code(0),
-        "event" => Send::Code(255),
-        "timer" => Send::Timer,
+        "acyclic" => Trigger::Code(0),
+        "event" => Trigger::Code(255),
+        "timer" => Trigger::Timer,
         _ => match text.strip_prefix("sync:") {
-            Some(every) => Send::Code(every.parse().ok().filter(|every| (1..=240).contains(every)).ok_or_else(wrong)?),
-            None => Send::Code(text.parse().map_err(|_| wrong())?),
+            Some(every) => {
+                Trigger::Code(every.parse().ok().filter(|every| (1..=240).contains(every)).ok_or_else(wrong)?)
+            }
+            None => Trigger::Code(text.parse().map_err(|_| wrong())?),
         },
     })
 }
@@ -189,47 +192,41 @@ impl ShowArgs {
 }
 
 impl MapArgs {
-    fn wish(&self) -> Result<Wish, Failure> {
-        let wish = Wish {
+    fn request(&self) -> anyhow::Result<PdoRequest> {
+        let request = PdoRequest {
             node: self.node,
             number: self.pdo,
             items: self.signals.iter().map(|item| item.0.clone()).collect(),
-            send: self.transmission,
+            trigger: self.transmission,
             event_timer_ms: self.event_timer,
             inhibit_100us: self.inhibit,
             cob_id: self.cob_id,
         };
-        let parameters = [wish.event_timer_ms, wish.inhibit_100us, wish.cob_id];
-        if wish.items.is_empty() && wish.send.is_none() && parameters.iter().all(Option::is_none) {
+        let parameters = [request.event_timer_ms, request.inhibit_100us, request.cob_id];
+        if request.items.is_empty() && request.trigger.is_none() && parameters.iter().all(Option::is_none) {
             let hint = format!("show its settings: cangauge pdo show {} {}", self.node, self.pdo.get());
-            return Err(Failure::new(
-                Kind::Usage,
-                "nothing to set: name signals, or give --transmission, --event-timer, --inhibit or --cob-id",
+            return Err(ErrorMessage::usage(
+                "nothing to set: name signals, or use --transmission, --event-timer, --inhibit or --cob-id",
             )
-            .hint(hint));
+            .hint(hint)
+            .into());
         }
-        wish.check()?;
-        Ok(wish)
+        request.check()?;
+        Ok(request)
     }
 
     fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let wish = self.wish()?;
+        let request = self.request()?;
         let overrides = open::overrides(global, &[self.node])?;
-        let mapped = global.with_master(|master| Ok(map(master, &wish, self.store, &overrides)?))?;
+        let mapped = global.with_master(|master| Ok(map(master, &request, self.store, &overrides)?))?;
         let console = global.console();
-        mapped.warnings.iter().for_each(|warning| console.warn(warning));
-        let node = self.node;
         match mapped.writes {
-            0 => console.note(&format!("node {node}: {} has these settings already: nothing was written", self.pdo)),
-            1 => console.detail(&format!("node {node}: 1 write, read back")),
-            writes => console.detail(&format!("node {node}: {writes} writes, read back")),
+            0 => {}
+            1 => console.detail(&format!("node {}: 1 write, read back", self.node)),
+            writes => console.detail(&format!("node {}: {writes} writes, read back", self.node)),
         }
-        if let Some(stored) = &mapped.stored {
-            console.note(&format!("node {node}: stored ({}), acknowledged", stored.groups()));
-            stored.notes.iter().for_each(|note| console.note(&format!("node {node}: {note}")));
-        }
-        mapped.remarks.iter().for_each(|remark| console.note(remark));
-        global.print(&[mapped.shown])
+        mapped.notes.iter().for_each(|note| notes::print(&console, note));
+        global.print(&[mapped])
     }
 }
 
@@ -242,22 +239,22 @@ impl WatchArgs {
             let nodes = open::nodes(master, global, &self.nodes)?;
             let overrides = open::overrides(global, &nodes)?;
             let mut claims = Some(std::mem::take(claims));
-            let mut report = |line: &Line<'_>| {
+            let mut report = |event: &WatchEvent<'_>| {
                 // The mappings are read; from now on the command only listens.
                 claims.take();
-                match *line {
-                    Line::Restarted(node) => {
+                match *event {
+                    WatchEvent::Restarted(node) => {
                         console.warn(&format!("node {node} restarted; its mapping is assumed to be unchanged"));
                     }
-                    Line::Nothing => {
+                    WatchEvent::NothingYet => {
                         console.note("no TPDO yet: are the nodes operational, and does a node send SYNC?");
                     }
-                    Line::WrongLength { node, number, length, .. } => {
+                    WatchEvent::WrongLength { node, number, length, .. } => {
                         console.warn(&format!(
                             "node {node}: {number} has {length} bytes, which is not the length of its mapping"
                         ));
                     }
-                    Line::Pdo { at, node, number, samples, sources } => {
+                    WatchEvent::Tpdo { at, node, number, samples, sources } => {
                         let tpdo = ReceivedTpdo::new(at, node, number, samples, sources);
                         if let Err(error) = rows.push(&tpdo) {
                             failed = Some(error);

@@ -4,7 +4,7 @@
 
 use super::console::Console;
 use super::failure::host::up_by_hand;
-use super::failure::{self, autozero, settings};
+use super::failure::{self, autozero, pdo, settings};
 use super::lss;
 use super::report::Cell;
 use crate::canopen::id::NodeId;
@@ -73,6 +73,7 @@ pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> Told {
             .command("start it again", format!("cangauge nmt start {number}")),
         Effect::Autozero(effect) => autozero::effect(&number, effect),
         Effect::Lss(effect) => failure::lss::effect(effect),
+        Effect::Pdo(effect) => pdo::effect(&number, effect),
         Effect::Settings(effect) => settings::effect(&number, effect),
         Effect::Text(text) | Effect::Hint(text) => Told::new("other", text.clone()),
     }
@@ -95,6 +96,7 @@ pub fn note(note: &Note) -> Told {
         ),
         Fact::Autozero(fact) => autozero::fact(note.node, fact),
         Fact::Lss(fact) => lss::fact(fact),
+        Fact::Pdo(fact) => pdo::fact(note.node, fact),
         Fact::Settings(fact) => settings::fact(fact),
         Fact::Text(text) => Told::new("other", text.clone()),
         Fact::StateAsBooted => Told::new(
@@ -109,17 +111,9 @@ pub fn notes(notes: &[Note]) -> Vec<Told> {
     notes.iter().map(note).collect()
 }
 
-/// The notes of a report as a cell: one object each, with code, message and command.
+/// The notes of a report as a cell: one object each.
 pub(super) fn cell(notes: &[Note]) -> Cell {
-    let object = |note: &Note| {
-        let told = self::note(note);
-        Cell::Object(vec![
-            ("code", told.code.into()),
-            ("message", told.message.into()),
-            ("command", told.command.into()),
-        ])
-    };
-    Cell::List(notes.iter().map(object).collect())
+    Cell::List(notes.iter().map(|note| self::note(note).cell()).collect())
 }
 
 /// Prints a note on stderr: as a warning if the user should act on it.

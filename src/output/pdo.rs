@@ -1,17 +1,18 @@
 //! TPDOs: their settings, and the values that they carry.
 
+use super::failure::pdo::entry;
 use super::report::{Cell, Column, Report};
-use super::text;
+use super::{notes, text};
 use crate::bus::Stamp;
 use crate::bus::time::spoken;
 use crate::canopen::id::NodeId;
 use crate::canopen::pdo::TpdoNumber;
 use crate::measure::sample::{Sample, Source, Status};
-use crate::tasks::pdo::{Carried, Shown};
+use crate::tasks::pdo::{MapReport, MappedItem, TpdoReport};
 use std::io::{self, Write};
 use std::time::Duration;
 
-impl Report for Shown {
+impl Report for TpdoReport {
     const COLUMNS: &'static [Column] = &[
         Column::new("node").data_only(),
         Column::new("pdo").right(),
@@ -31,12 +32,9 @@ impl Report for Shown {
         let sent = settings.transmission().to_string();
         let sent_or_off = if is_valid { sent.clone() } else { format!("off ({sent})") };
         let timer = settings.event_timer_ms.map(|timer| Duration::from_millis(timer.into()));
-        let entries = self.carried.iter().map(|carried| {
-            let text = format!("{}/{}", carried.entry.object, carried.entry.bits);
-            Cell::from(text).shown_as(entry_text(carried))
-        });
+        let entries = self.items.iter().map(|item| Cell::from(entry(item.entry)).shown_as(entry_text(item)));
         let mut mapping = Cell::List(entries.collect());
-        if self.carried.is_empty() {
+        if self.items.is_empty() {
             mapping = mapping.shown_as("nothing");
         }
         vec![
@@ -48,9 +46,34 @@ impl Report for Shown {
             Cell::from(sent).shown_as(sent_or_off),
             Cell::from(settings.event_timer_ms).shown_as(time(timer)),
             Cell::from(settings.inhibit_100us.map(|inhibit| 100 * u32::from(inhibit))).shown_as(time(self.inhibit())),
-            Cell::List(self.carried.iter().map(entry_cell).collect()),
+            Cell::List(self.items.iter().map(entry_cell).collect()),
             mapping,
         ]
+    }
+}
+
+/// The columns of [`TpdoReport`], and the change.
+impl Report for MapReport {
+    const COLUMNS: &'static [Column] = &[
+        Column::new("node").data_only(),
+        Column::new("pdo").right(),
+        Column::new("cob_id").heading("COB-ID"),
+        Column::new("valid").data_only(),
+        Column::new("rtr").data_only(),
+        Column::new("transmission").heading("SENT"),
+        Column::new("event_timer_ms").heading("TIMER").right(),
+        Column::new("inhibit_us").heading("INHIBIT").right(),
+        Column::new("mapping").json_only(),
+        Column::new("mapping").not_json(),
+        Column::new("writes").json_only(),
+        Column::new("stored").json_only(),
+        Column::new("notes").json_only(),
+    ];
+
+    fn cells(&self) -> Vec<Cell> {
+        let mut cells = self.shown.cells();
+        cells.extend([self.writes.into(), self.stored.into(), notes::cell(&self.notes)]);
+        cells
     }
 }
 
@@ -62,22 +85,22 @@ fn time(time: Option<Duration>) -> String {
     }
 }
 
-fn entry_cell(carried: &Carried) -> Cell {
+fn entry_cell(item: &MappedItem) -> Cell {
     Cell::Object(vec![
-        ("object", carried.entry.object.into()),
-        ("bits", carried.entry.bits.into()),
-        ("signal", carried.signal.as_ref().into()),
-        ("unit", carried.unit.into()),
+        ("object", item.entry.object.into()),
+        ("bits", item.entry.bits.into()),
+        ("signal", item.signal.as_ref().into()),
+        ("unit", item.unit.into()),
     ])
 }
 
 /// `0x6130:1/32 pressure [bar]`.
-fn entry_text(carried: &Carried) -> String {
-    let mut text = format!("{}/{}", carried.entry.object, carried.entry.bits);
-    if let Some(signal) = &carried.signal {
+fn entry_text(item: &MappedItem) -> String {
+    let mut text = entry(item.entry);
+    if let Some(signal) = &item.signal {
         text += &format!(" {signal}");
     }
-    if let Some(unit) = carried.unit.map(|unit| unit.to_string()).filter(|unit| !unit.is_empty()) {
+    if let Some(unit) = item.unit.map(|unit| unit.to_string()).filter(|unit| !unit.is_empty()) {
         text += &format!(" [{unit}]");
     }
     text
@@ -97,7 +120,7 @@ pub struct ReceivedTpdo {
 }
 
 impl ReceivedTpdo {
-    /// A TPDO with the samples that it carried. `sources` are those of the decoder.
+    /// A TPDO with the samples that it item. `sources` are those of the decoder.
     pub fn new(at: Stamp, node: NodeId, number: TpdoNumber, samples: &[Sample], sources: &[Source]) -> ReceivedTpdo {
         let value = |sample: &Sample| Some((sources.get(sample.source)?.clone(), sample.clone()));
         ReceivedTpdo { at, node, number, values: samples.iter().filter_map(value).collect() }

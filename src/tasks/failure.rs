@@ -153,6 +153,7 @@ impl Cause {
                 _ => None,
             },
             Cause::Autozero(cause) => cause.abort(),
+            Cause::Pdo(cause) => cause.abort(),
             Cause::Text(text) => text.abort,
             _ => None,
         }

@@ -4,6 +4,7 @@
 
 use super::autozero::{AutozeroEffect, AutozeroFact};
 use super::lss::{LssEffect, LssFact};
+use super::pdo::{PdoEffect, PdoFact};
 use super::settings::{SettingsEffect, SettingsFact};
 use crate::canopen::id::NodeId;
 
@@ -27,6 +28,8 @@ pub enum Effect {
     Autozero(AutozeroEffect),
     /// A change of node-ID or bit rate failed.
     Lss(Box<LssEffect>),
+    /// A change of a TPDO failed.
+    Pdo(PdoEffect),
     /// A change of a setting failed.
     Settings(SettingsEffect),
     /// Text of a task that has no typed effects yet.
@@ -57,6 +60,8 @@ pub enum Fact {
     Autozero(AutozeroFact),
     /// An LSS task reports a step or a warning.
     Lss(Box<LssFact>),
+    /// A TPDO was changed.
+    Pdo(PdoFact),
     /// A setting was changed or shown.
     Settings(SettingsFact),
     /// Text of a task that has no typed notes yet.
@@ -70,6 +75,7 @@ impl Fact {
     pub fn is_warning(&self) -> bool {
         match self {
             Fact::Lss(fact) => fact.event.is_warning(),
+            Fact::Pdo(fact) => fact.is_warning(),
             Fact::Settings(fact) => fact.is_warning(),
             Fact::KeptUntilPowerOff
             | Fact::OperationalAgain

@@ -1,5 +1,4 @@
-//! `pdo show`, `pdo map`, `pdo watch`: the frames of the manuals, the checks before anything is written, and what
-//! is said.
+//! `pdo show`, `pdo map`, `pdo watch`: the frames of the manuals, the checks before the first write, and the messages.
 
 use super::{ALL, Bench, Done};
 use serde_json::json;
@@ -38,7 +37,7 @@ fn show() {
     bench.run("pdo show 1 3").fails(
         4,
         "cangauge: node 1: read 0x1802:1: refused by the device (0x06020000, the object does not exist)\n\
-         hint: its TPDOs: 1, 2\n",
+         hint: it has the TPDOs 1, 2\n",
     );
     bench.run("pdo show 9").exit(3);
     bench.run("pdo show 1 0").refuses("\"0\" is not the number of a TPDO (1 to 512)");
@@ -69,7 +68,7 @@ fn the_mh4_is_remapped_as_its_manual_says() {
     assert_eq!(done.stdout, shown);
 }
 
-/// DPS, tables 26 and 22 (there the value stands in the order of the bytes on the bus).
+/// DPS, tables 26 and 22 (there the value is in wire order).
 #[test]
 fn the_dps_is_remapped_as_its_manual_says() {
     let table_26 = |word: &str| {
@@ -106,8 +105,8 @@ fn the_dps_is_sent_as_its_manual_says() {
     one("pdo map 127 1 --event-timer 1s", &["67F#22001805E8030000", "5FF#6000180500000000"]);
 }
 
-/// D-20-9, page 6: no invalidation, in PRE-OPERATIONAL. It is started, guarding tells so, and it is again at the
-/// end; while the mapping is changed its PDO would have no bytes.
+/// D-20-9, page 6: no invalidation, in PRE-OPERATIONAL. The node is operational before (shown by node guarding) and
+/// afterwards; while the mapping is changed, its PDO would have no bytes.
 #[test]
 fn the_d20_is_remapped_as_its_manual_says() {
     let bench = Bench::described("[[device]]\nkind = \"d20\"\nnode = 2\nstart = true\n");
@@ -123,7 +122,11 @@ fn the_d20_is_remapped_as_its_manual_says() {
         "000#0102",
     ];
     assert_eq!((steps(&done, 2), done.stderr.as_str()), (frames.to_vec(), ""));
-    assert_eq!(done.frames_of("702").iter().filter(|data| **data == "R1").count(), 3, "each state by one question");
+    assert_eq!(
+        done.frames_of("702").iter().filter(|data| **data == "R1").count(),
+        3,
+        "each state by one guarding request"
+    );
     // Back to the integer, in PRE-OPERATIONAL already: no NMT command.
     let done = Bench::of("d20@2").run("pdo map 2 1 0x2090/32").exit(0);
     assert_eq!(steps(&done, 2), [""; 0]);
@@ -135,7 +138,7 @@ fn the_d20_is_remapped_as_its_manual_says() {
 }
 
 #[test]
-fn a_timer_is_what_the_device_means_by_it() {
+fn timer_is_the_transmission_type_of_the_device() {
     let done = Bench::of("mc1609@3").run("pdo map 3 2 --transmission timer --event-timer 1s -f json").exit(0);
     assert_eq!(steps(&done, 3), ["603#2B011805E8030000", "583#6001180500000000"]);
     let pdo = &done.json()[0];
@@ -143,14 +146,14 @@ fn a_timer_is_what_the_device_means_by_it() {
     let done = Bench::of("mh4@1").run("pdo map 1 1 --transmission timer").exit(0);
     assert_eq!(steps(&done, 1)[0], "601#2F001802FE000000");
     assert!(
-        done.stderr.contains("the event timer of TPDO1 is 0: it is sent only when a value changes"),
+        done.stderr.contains("the event timer of TPDO1 is 0: it is sent only if a value changes"),
         "{}",
         done.stderr
     );
 }
 
 #[test]
-fn what_is_refused_is_named_and_the_old_mapping_is_back() {
+fn a_rejected_write_is_named_and_the_old_mapping_is_restored() {
     let bench = Bench::of("mh4@1");
     let done = bench.run("pdo map 1 1 pressure 0x6132:1/8 --format json").exit(4);
     let error = &done.error()["error"];
@@ -159,7 +162,7 @@ fn what_is_refused_is_named_and_the_old_mapping_is_back() {
         (&json!("refused"), &json!("0x1A00:2"), &json!("0x06040041"))
     );
     let message = "node 1: write 0x1A00:2 (0x6132:1/8): refused by the device (0x06040041, the object cannot be mapped \
-                   to a PDO): TPDO1 has its old mapping and parameters";
+                   to a PDO); TPDO1 has its old mapping and parameters";
     assert_eq!(error["message"], message);
     assert!(
         error["hint"].as_str().is_some_and(
@@ -175,20 +178,17 @@ fn what_is_refused_is_named_and_the_old_mapping_is_back() {
     // A parameter.
     bench.run("pdo map 1 1 --transmission 250").fails(
         4,
-        "cangauge: node 1: write 0x1800:2 (250): refused by the device (0x06090030, value outside its range): TPDO1 has \
+        "cangauge: node 1: write 0x1800:2 (250): refused by the device (0x06090030, value outside its range); TPDO1 has \
          its old mapping and parameters\n",
     );
 }
 
 #[test]
-fn what_is_wrong_is_known_before_anything_is_written() {
+fn wrong_requests_are_rejected_before_the_first_write() {
     let bench = Bench::of(ALL);
     let refuses = |line: &str, message: &str| bench.run(line).refuses(message);
-    refuses(
-        "pdo map 1 1",
-        "nothing to set: name signals, or give --transmission, --event-timer, --inhibit or --cob-id",
-    );
-    refuses("pdo map 1 1 0x1:1/64 0x2:1/8", "node 1: that makes 9 bytes; a PDO carries 8 bytes at most");
+    refuses("pdo map 1 1", "nothing to set: name signals, or use --transmission, --event-timer, --inhibit or --cob-id");
+    refuses("pdo map 1 1 0x1:1/64 0x2:1/8", "node 1: the mapping has 9 bytes; a PDO has at most 8 bytes");
     refuses("pdo map 1 1 pressure/65", "\"pressure/65\": \"65\" is not a number of bits (1 to 64)");
     refuses(
         "pdo map 1 1 6130:300",
@@ -211,7 +211,7 @@ fn what_is_wrong_is_known_before_anything_is_written() {
     let word = "is not an 11-bit identifier (0x181 to 0x57F, without the flags of the COB-ID)";
     refuses("pdo map 1 1 --cob-id 0x61300120", &format!("\"0x61300120\" {word}"));
     refuses("pdo map 1 1 --cob-id 0x40000181", &format!("\"0x40000181\" {word}"));
-    // What only the device's description tells: nothing is written either.
+    // Known only from the description: nothing is written either.
     let reads_only = |line: &str, code: i32, stderr: &str| {
         let done = bench.run(line).fails(code, stderr);
         assert_eq!(steps(&done, 1), [""; 0], "{line}");
@@ -219,7 +219,7 @@ fn what_is_wrong_is_known_before_anything_is_written() {
     reads_only(
         "pdo map 1 1 pressure temperature pressure.status",
         2,
-        "cangauge: node 1: that makes 9 bytes; a PDO carries 8 bytes at most\n",
+        "cangauge: node 1: the mapping has 9 bytes; a PDO has at most 8 bytes\n",
     );
     reads_only(
         "pdo map 1 1 presure",
@@ -231,7 +231,7 @@ fn what_is_wrong_is_known_before_anything_is_written() {
         4,
         "cangauge: node 1: TPDO1 has no inhibit time (0x1800:3 does not exist)\n",
     );
-    reads_only("pdo map 127 1 pressure.status", 2, "cangauge: node 127: no object tells the status of pressure\n");
+    reads_only("pdo map 127 1 pressure.status", 2, "cangauge: node 127: pressure has no status object\n");
 }
 
 #[test]
@@ -247,28 +247,32 @@ fn an_identifier_is_free_or_refused() {
         ("0x0ff", "EMCY of node 127"),
     ] {
         let done = bench.run(&format!("pdo map 1 1 --cob-id {id}")).exit(1);
-        assert!(done.stderr.contains(&format!("is occupied by {who}: nothing was changed")), "{id}: {}", done.stderr);
+        assert!(done.stderr.contains(&format!("is used by {who}: nothing was changed")), "{id}: {}", done.stderr);
         assert_eq!(steps(&done, 1), [""; 0], "{id}");
     }
     // Bit 30 stays; the PDO is off while it moves.
     let done = bench.run("pdo map 1 1 --cob-id 0x3a5").exit(0);
     let moves = ["601#23001801810100C0", "581#6000180100000000", "601#23001801A5030040", "581#6000180100000000"];
     assert_eq!(steps(&done, 1), moves);
-    // The one that it has is no change, whoever else is there.
+    // The present identifier is no change, even if other nodes are present.
     let done = bench.run("pdo map 1 1 --cob-id 0x181").exit(0);
     assert_eq!(steps(&done, 1), [""; 0]);
 }
 
 #[test]
-fn the_command_that_mends_mends() {
-    // As the device was left: off, without entries.
+fn the_recovery_command_restores_the_settings() {
+    // The device as it was left: off, without entries.
     let half =
         "[[device]]\nkind = \"mh4\"\nnode = 1\nset = { \"1800:1\" = 0xC0000181, \"1A00:0\" = 0, \"1800:5\" = 9 }\n";
-    let mend = "pdo map 1 1 0x6130:1/32 0x6150:1/8 --transmission sync:1 --event-timer 0ms --cob-id 0x181 -f json";
-    let done = Bench::described(half).run(mend).exit(0);
+    let recovery = "pdo map 1 1 0x6130:1/32 0x6150:1/8 --transmission sync:1 --event-timer 0ms --cob-id 0x181 -f json";
+    let done = Bench::described(half).run(recovery).exit(0);
     let of_new = Bench::of("mh4@1").run("pdo show 1 1 -f json").exit(0);
-    assert_eq!(done.stdout, of_new.stdout);
-    // One that was off is mended by plain writes.
+    let (mut mapped, shown) = (done.json(), of_new.json());
+    for field in ["writes", "stored", "notes"] {
+        assert!(mapped[0].as_object_mut().is_some_and(|report| report.remove(field).is_some()), "{field}");
+    }
+    assert_eq!(mapped, shown);
+    // A TPDO that was off is restored with plain writes.
     let writes = "sdo write 1 0x1800:1=0xC0000181 0x1A00:0=0x0 0x1A00:1=0x61300120 0x1A00:2=0x61500108 0x1A00:0=0x2 \
                   0x1800:2=0x1 0x1800:5=0x0";
     let done = Bench::described(half).run(writes).exit(0);
@@ -276,21 +280,21 @@ fn the_command_that_mends_mends() {
 }
 
 #[test]
-fn a_device_stores_what_it_keeps() {
+fn settings_that_the_device_stores_are_stored() {
     // 1010h:1 would put a custom COB-ID back: the communication settings are stored alone.
     let done = Bench::of("mh4@1").run("pdo map 1 1 --cob-id 0x3a5 --store").exit(0);
     assert!(steps(&done, 1).contains(&"601#2310100273617665"), "{:?}", done.frames);
     assert!(done.stderr.contains("node 1: stored (comm), acknowledged"), "{}", done.stderr);
     let done = Bench::of("d20@2").run("pdo map 2 1 pressure --store").exit(0);
     assert!(steps(&done, 2).contains(&"602#2210100173617665"), "{:?}", done.frames);
-    // As it is already, and not stored yet: that is done.
+    // Set already, but not stored yet: only stored.
     let done = Bench::of("mh4@1").run("pdo map 1 1 --transmission sync:1 --store").exit(0);
     assert_eq!(steps(&done, 1), ["601#2310100273617665", "581#6010100200000000"]);
-    // The DPS stores, and its PDO settings are not among it.
+    // The DPS does not store its PDO settings.
     let done = Bench::of("dps@127").run("pdo map 127 1 0x7100:1 --store").fails(
         1,
-        "cangauge: node 127: it does not keep the settings of TPDO1 when it stores: nothing was changed\n\
-         hint: leave --store out, and set it after every power on\n",
+        "cangauge: node 127: it does not store the settings of TPDO1: nothing was changed\n\
+         hint: omit --store, and set the TPDO after every power-on\n",
     );
     assert_eq!(steps(&done, 127), [""; 0]);
 }
@@ -306,7 +310,7 @@ fn watch() {
     assert!(lines.len() == 3 || lines.len() == 4, "{}", done.stdout);
     let rest = |line: &str| line.split_once("Z  ").map(|(_, rest)| rest.to_owned());
     assert!(lines.iter().all(|line| rest(line).as_deref() == Some("127  TPDO1  pressure 50.000 psi")), "{lines:?}");
-    assert_eq!(done.frames_of("000"), [""; 0], "NMT is left alone");
+    assert_eq!(done.frames_of("000"), [""; 0], "no NMT command");
     let pdo = &bench.run("pdo watch 127 --duration 350ms -f json").exit(0).json()[0];
     assert_eq!((&pdo["node"], &pdo["pdo"]), (&json!(127), &json!(1)));
     let value = json!({ "signal": "pressure", "value": 50.0, "unit": "psi", "status": null, "raw": "0x50C30000" });
@@ -315,6 +319,6 @@ fn watch() {
     assert_eq!(csv.lines().next(), Some("time,node,pdo,signal,value,unit,status,raw"));
     assert!(csv.lines().nth(1).is_some_and(|line| line.ends_with(",127,1,pressure,50.000,psi,,0x50C30000")), "{csv}");
     let silent = Bench::of("dps@127").run("pdo watch 127 --duration 8s").exit(3);
-    let said = "no TPDO yet: are the nodes operational, and does a node send SYNC?\ncangauge: not one TPDO came\n";
+    let said = "no TPDO yet: are the nodes operational, and does a node send SYNC?\ncangauge: no TPDO was received\n";
     assert!(silent.stderr.starts_with(said), "{}", silent.stderr);
 }

@@ -20,7 +20,7 @@ use cangauge::node::{Node, WriteOptions};
 use cangauge::tasks::log::{LogEvent, LogOptions, Mode, Observer, log};
 use cangauge::tasks::lss::{self, Descriptions, Job, LssAddress, LssRange, RequestedRate};
 use cangauge::tasks::nmt::Seen;
-use cangauge::tasks::pdo::{self, Item, Line, Send, Settings, Wish};
+use cangauge::tasks::pdo::{self, Item, PdoRequest, Settings, Trigger, WatchEvent};
 use cangauge::tasks::settings::{self, errors, filter, info, limits, minmax, unit};
 use cangauge::tasks::{Failure, autozero, check, detect, nmt, read, restore, scan, sdo, store};
 use std::ops::ControlFlow;
@@ -256,16 +256,16 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             }
         }
         Command::Map { node: id, number, items, code, timer_ms, cob_id, keep } => {
-            let wish = Wish {
+            let request = PdoRequest {
                 node: node(*id),
                 number: TpdoNumber::new(*number).expect("a TPDO"),
                 items: items.iter().map(|item| Item::Name((*item).to_owned(), None)).collect(),
-                send: code.map(Send::Code),
+                trigger: code.map(Trigger::Code),
                 event_timer_ms: *timer_ms,
                 inhibit_100us: None,
                 cob_id: *cob_id,
             };
-            Claim::Mapped(pdo::map(master, &wish, *keep, &none)?.shown.settings)
+            Claim::Mapped(pdo::map(master, &request, *keep, &none)?.shown.settings)
         }
         Command::Autozero { node: id, channel, force, store, dry_run } => {
             let options = autozero::Options {
@@ -334,7 +334,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
         Command::PdoWatch { nodes: ids, for_ms } => {
             let duration = Some(Duration::from_millis(*for_ms));
             pdo::watch(master, &nodes(ids), &none, duration, &mut |line| {
-                if let Line::Pdo { samples, sources, .. } = line {
+                if let WatchEvent::Tpdo { samples, sources, .. } = line {
                     observed.take(samples, sources);
                 }
                 ControlFlow::Continue(())

@@ -11,8 +11,9 @@ use cangauge::device::catalog::by_name;
 use cangauge::device::scalar::Scalar;
 use cangauge::master::{Master, Timing};
 use cangauge::output::failure::ErrorMessage;
+use cangauge::output::notes::note;
 use cangauge::sim::{Device, Setup, State};
-use cangauge::tasks::pdo::{Item, Mapped, Send, Wish, map};
+use cangauge::tasks::pdo::{Item, MapReport, PdoRequest, Trigger, map};
 use cangauge::tasks::{Failure, Kind};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -158,7 +159,7 @@ struct Case {
     /// Set and saved before.
     set: &'static [(&'static str, i64)],
     items: &'static [&'static str],
-    send: Option<Send>,
+    trigger: Option<Trigger>,
     event_timer_ms: Option<u16>,
     cob_id: Option<u16>,
 }
@@ -168,7 +169,7 @@ const CASES: [Case; 6] = [
         device: "mh4",
         set: &[],
         items: &["0x9130:1", "pressure.status", "temperature.status"],
-        send: Some(Send::Timer),
+        trigger: Some(Trigger::Timer),
         event_timer_ms: Some(50),
         cob_id: None,
     },
@@ -176,7 +177,7 @@ const CASES: [Case; 6] = [
         device: "d20",
         set: &[],
         items: &["pressure"],
-        send: Some(Send::Timer),
+        trigger: Some(Trigger::Timer),
         event_timer_ms: Some(200),
         cob_id: None,
     },
@@ -184,7 +185,7 @@ const CASES: [Case; 6] = [
         device: "mc1609",
         set: &[],
         items: &["ch16", "ch1"],
-        send: Some(Send::Code(3)),
+        trigger: Some(Trigger::Code(3)),
         event_timer_ms: Some(250),
         cob_id: None,
     },
@@ -192,34 +193,41 @@ const CASES: [Case; 6] = [
         device: "dps",
         set: &[],
         items: &["0x7100:1", "pressure"],
-        send: Some(Send::Code(0)),
+        trigger: Some(Trigger::Code(0)),
         event_timer_ms: Some(1000),
         cob_id: None,
     },
     // Parameters alone.
-    Case { device: "mh4", set: &[], items: &[], send: Some(Send::Code(0)), event_timer_ms: Some(7), cob_id: None },
+    Case {
+        device: "mh4",
+        set: &[],
+        items: &[],
+        trigger: Some(Trigger::Code(0)),
+        event_timer_ms: Some(7),
+        cob_id: None,
+    },
     // A TPDO that was off.
     Case {
         device: "mh4",
         set: &[("0x1800:1", 0xc000_0185)],
         items: &["temperature"],
-        send: None,
+        trigger: None,
         event_timer_ms: None,
         cob_id: None,
     },
 ];
 
 impl Case {
-    fn wish(&self) -> Wish {
+    fn request(&self) -> PdoRequest {
         let item = |text: &&str| match text.parse() {
             Ok(object) => Item::Object(object, None),
             Err(_) => Item::Name((*text).to_owned(), None),
         };
-        Wish {
+        PdoRequest {
             node: node(),
             number: TpdoNumber::new(1).unwrap(),
             items: self.items.iter().map(item).collect(),
-            send: self.send,
+            trigger: self.trigger,
             event_timer_ms: self.event_timer_ms,
             inhibit_100us: None,
             cob_id: self.cob_id,
@@ -237,7 +245,7 @@ impl Case {
         bus
     }
 
-    /// What becomes of the wish when this happens at the n-th frame.
+    /// What happens to the request if this happens at the n-th frame.
     fn run(&self, start: bool, mishap: Mishap, at: usize) -> Outcome {
         let mut meddler = Meddler {
             bus: self.bus(start),
@@ -250,7 +258,7 @@ impl Case {
             away_until: None,
         };
         let mut master = Master::new(&mut meddler, Timing::default());
-        let result = map(&mut master, &self.wish(), false, &Default::default());
+        let result = map(&mut master, &self.request(), false, &Default::default());
         master.settle();
         let took = meddler.bus.now().mono.since_start();
         // What is on the wire gets there.
@@ -263,8 +271,8 @@ impl Case {
 
 /// How it ended.
 struct Outcome {
-    result: Result<Mapped, Failure>,
-    held: Held,
+    result: Result<MapReport, Failure>,
+    held: Snapshot,
     state: Option<State>,
     sent: Vec<Frame>,
     took: Duration,
@@ -282,9 +290,9 @@ fn is_write(frame: &Frame) -> bool {
 
 /// What the device's own memory holds: COB-ID, transmission type, event timer, mapping.
 #[derive(Debug, PartialEq, Eq)]
-struct Held(u32, u32, u32, Vec<u32>);
+struct Snapshot(u32, u32, u32, Vec<u32>);
 
-fn held(bus: &mut MemoryBus) -> Held {
+fn held(bus: &mut MemoryBus) -> Snapshot {
     let now = bus.now().mono;
     let device: &mut Device = bus.stations_mut().next().unwrap();
     let mut number = |index, sub| {
@@ -293,11 +301,11 @@ fn held(bus: &mut MemoryBus) -> Held {
     };
     let count = u8::try_from(number(0x1a00, 0)).unwrap();
     let mapping = (1..=count).map(|sub| number(0x1a00, sub)).collect();
-    Held(number(0x1800, 1), number(0x1800, 2), number(0x1800, 5), mapping)
+    Snapshot(number(0x1800, 1), number(0x1800, 2), number(0x1800, 5), mapping)
 }
 
 /// That what is said is what the device holds.
-fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Held, well: &Outcome) {
+fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Snapshot, well: &Outcome) {
     let outcome = case.run(start, mishap, at);
     let (sent, took) = (outcome.writes(), outcome.took);
     let Outcome { result, held, state, .. } = outcome;
@@ -307,9 +315,10 @@ fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Held, well: 
         Ok(_) => assert_eq!(&held, new, "{what}"),
         Err(failure) => {
             let message = &ErrorMessage::of(&failure).message;
-            let said_to_be_half = message.contains("left half changed") || message.contains("was changed is not known");
+            let said_to_be_half =
+                message.contains("is only partly changed") || message.contains("it is unknown whether");
             if said_to_be_half {
-                assert!(matches!(mishap, Mishap::Gone | Mishap::Stubborn(_)), "it could have been mended: {what}");
+                assert!(matches!(mishap, Mishap::Gone | Mishap::Stubborn(_)), "it could have been restored: {what}");
                 let hint = ErrorMessage::of(&failure).hint.unwrap_or_default();
                 assert!(hint.starts_with("when it answers again: cangauge "), "{what}");
             } else {
@@ -335,11 +344,11 @@ fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Held, well: 
     let half = matches!(mishap, Mishap::Gone | Mishap::Stubborn(_));
     if !half && !matches!(mishap, Mishap::ResetBefore | Mishap::ResetAfter) {
         let before = if start { State::Operational } else { State::PreOperational };
-        // A state that nothing told is not guessed, and an NMT command that is lost is not repeated: that is said.
-        let words = ["state before is not known", "was operational before and is", "nothing confirms it"];
-        let says = |remark: &String| words.iter().any(|words| remark.contains(words));
+        // An unknown state is not guessed, and a lost NMT command is not repeated: a note says so.
+        let words = ["previous state is unknown", "was operational before and is", "without confirmation"];
+        let says = |message: &String| words.iter().any(|words| message.contains(words));
         let told = match &result {
-            Ok(mapped) => mapped.warnings.iter().any(says),
+            Ok(mapped) => mapped.notes.iter().any(|told| says(&note(told).message)),
             Err(failure) => says(&ErrorMessage::of(&failure).message),
         };
         assert!(told || state == Some(before), "{state:?}: {what}");
@@ -460,8 +469,8 @@ fn the_right_steps_in_the_right_order() {
     // What is set already is not written.
     let bus = |case: &Case| {
         let mut bus = case.bus(false);
-        let first = map(&mut Master::new(&mut bus, Timing::default()), &case.wish(), false, &Default::default());
-        let again = map(&mut Master::new(&mut bus, Timing::default()), &case.wish(), false, &Default::default());
+        let first = map(&mut Master::new(&mut bus, Timing::default()), &case.request(), false, &Default::default());
+        let again = map(&mut Master::new(&mut bus, Timing::default()), &case.request(), false, &Default::default());
         (first.unwrap().writes, again.unwrap().writes)
     };
     for (case, writes) in CASES.iter().zip([9, 5, 8, 8, 2, 4]) {

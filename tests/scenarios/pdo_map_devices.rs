@@ -8,8 +8,9 @@ use cangauge::canopen::pdo::TpdoNumber;
 use cangauge::device::catalog::Model;
 use cangauge::master::{Master, Timing};
 use cangauge::output::failure::ErrorMessage;
+use cangauge::output::notes::note;
 use cangauge::sim::{Device, Setup, State};
-use cangauge::tasks::pdo::{Item, Mapped, Send, Wish, map};
+use cangauge::tasks::pdo::{Item, MapReport, PdoRequest, Trigger, map};
 use cangauge::tasks::{Failure, Kind};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -60,16 +61,16 @@ fn node() -> NodeId {
     NodeId::new(9).unwrap()
 }
 
-fn wish(items: &[&str]) -> Wish {
+fn request(items: &[&str]) -> PdoRequest {
     let item = |text: &&str| match text.parse() {
         Ok(object) => Item::Object(object, None),
         Err(_) => Item::Name((*text).to_owned(), None),
     };
-    Wish {
+    PdoRequest {
         node: node(),
         number: TpdoNumber::new(1).unwrap(),
         items: items.iter().map(item).collect(),
-        send: None,
+        trigger: None,
         event_timer_ms: None,
         inhibit_100us: None,
         cob_id: None,
@@ -91,10 +92,10 @@ impl Bench {
     }
 
     /// Maps, with the description at hand or without.
-    fn map(&mut self, wish: &Wish, described: bool) -> Result<Mapped, Failure> {
+    fn map(&mut self, request: &PdoRequest, described: bool) -> Result<MapReport, Failure> {
         let given = described.then(|| (node(), Arc::clone(&self.model)));
         let overrides: BTreeMap<_, _> = given.into_iter().collect();
-        map(&mut Master::new(&mut self.bus, Timing::default()), wish, false, &overrides)
+        map(&mut Master::new(&mut self.bus, Timing::default()), request, false, &overrides)
     }
 
     fn number(&mut self, object: &str) -> u32 {
@@ -113,18 +114,19 @@ impl Bench {
 fn a_device_that_takes_no_bit_31_is_mapped_without_it() {
     let refuses_31 = parameters("default = \"$NODEID+0x180\", allow = [\"0-0x7FFFFFFF\"]");
     let mut bench = Bench::new(description("pdo = { remap = \"count-only\" }", &refuses_31));
-    let mapped = bench.map(&wish(&["ch1", "ch1.status"]), false).unwrap();
+    let mapped = bench.map(&request(&["ch1", "ch1.status"]), false).unwrap();
     assert_eq!(mapped.writes, 4);
-    let warning = "node 9: write 0x1800:1: refused by the device (0x06090030, value outside its range): TPDO1 is \
-                   changed while it stays on";
-    assert_eq!(mapped.warnings[0], warning);
+    let warning = "write 0x1800:1: refused by the device (0x06090030, value outside its range): TPDO1 was changed while \
+                   it was on";
+    assert_eq!(note(&mapped.notes[0]).message, warning);
     // It has neither heartbeat nor guarding: what nothing told is not guessed.
-    assert!(mapped.warnings[1].contains("state before is not known, so it stays there"), "{:?}", mapped.warnings);
+    let message = note(&mapped.notes[1]).message;
+    assert!(message.contains("previous state is unknown, so it stays there"), "{message}");
     assert_eq!((bench.number("1A00:0"), bench.number("1A00:2")), (2, 0x6150_0108));
     assert_eq!(bench.state(), Some(State::PreOperational));
     // Of a device whose description says that it takes bit 31, a refusal is one.
     let mut bench = Bench::new(description("", &refuses_31));
-    let failure = bench.map(&wish(&["ch1", "ch1.status"]), true).unwrap_err();
+    let failure = bench.map(&request(&["ch1", "ch1.status"]), true).unwrap_err();
     assert_eq!((failure.kind(), bench.number("1A00:0")), (Kind::Refused, 1));
     assert_eq!(bench.state(), Some(State::Operational));
 }
@@ -139,20 +141,20 @@ fn a_fixed_mapping_is_as_wanted_or_cannot_be() {
         .join("\n");
     for described in [true, false] {
         let mut bench = Bench::new(description("", &fixed));
-        assert_eq!(bench.map(&wish(&["0x6130:1"]), described).unwrap().writes, 0);
-        let failure = bench.map(&wish(&["0x6130:1", "0x6150:1"]), described).unwrap_err();
+        assert_eq!(bench.map(&request(&["0x6130:1"]), described).unwrap().writes, 0);
+        let failure = bench.map(&request(&["0x6130:1", "0x6150:1"]), described).unwrap_err();
         assert_eq!(failure.kind(), Kind::Refused);
         if described {
             let message = "node 9: the mapping of TPDO1 is fixed (0x6130:1/32): nothing was changed";
             assert_eq!(ErrorMessage::of(&failure).message, message);
         } else {
             let message = "node 9: write 0x1A00:0 (0 entries): refused by the device (0x06010002, the object is \
-                           read-only): TPDO1 has its old mapping and parameters";
+                           read-only); TPDO1 has its old mapping and parameters";
             assert_eq!(ErrorMessage::of(&failure).message, message);
         }
         assert_eq!(bench.number("1800:1"), 0x4000_0189);
         // What is not fixed can be set all the same.
-        let mapped = bench.map(&Wish { send: Some(Send::Code(1)), ..wish(&[]) }, described).unwrap();
+        let mapped = bench.map(&PdoRequest { trigger: Some(Trigger::Code(1)), ..request(&[]) }, described).unwrap();
         assert_eq!((mapped.writes, bench.number("1800:2")), (1, 1));
     }
 }
@@ -160,7 +162,7 @@ fn a_fixed_mapping_is_as_wanted_or_cannot_be() {
 #[test]
 fn the_inhibit_time_is_written_while_the_pdo_is_off() {
     let mut bench = Bench::new(description("", &parameters("default = \"$NODEID+0x180\"")));
-    let inhibited = Wish { inhibit_100us: Some(25), ..wish(&[]) };
+    let inhibited = PdoRequest { inhibit_100us: Some(25), ..request(&[]) };
     assert_eq!(bench.map(&inhibited, false).unwrap().writes, 3);
     assert_eq!((bench.number("1800:3"), bench.number("1800:1")), (25, 0x189));
     assert_eq!(bench.map(&inhibited, false).unwrap().writes, 0);
@@ -169,35 +171,35 @@ fn the_inhibit_time_is_written_while_the_pdo_is_off() {
 #[test]
 fn a_tpdo_without_an_identifier_is_not_switched_on() {
     let mut bench = Bench::new(description("", &parameters("default = 0x80000000")));
-    let failure = bench.map(&wish(&["ch1.status"]), false).unwrap_err();
+    let failure = bench.map(&request(&["ch1.status"]), false).unwrap_err();
     assert_eq!(
         (failure.kind(), ErrorMessage::of(&failure).message.as_str()),
         (Kind::Usage, "node 9: TPDO1 has no identifier yet (0x000)")
     );
     assert_eq!((bench.number("1A00:1"), bench.number("1800:1")), (0x6130_0120, 0x8000_0000));
     // Parameters alone leave it off; with an identifier of its own it comes on.
-    bench.map(&Wish { event_timer_ms: Some(20), ..wish(&[]) }, false).unwrap();
+    bench.map(&PdoRequest { event_timer_ms: Some(20), ..request(&[]) }, false).unwrap();
     assert_eq!((bench.number("1800:5"), bench.number("1800:1")), (20, 0x8000_0000));
-    let mapped = bench.map(&Wish { cob_id: Some(0x3a5), ..wish(&["ch1.status"]) }, false).unwrap();
+    let mapped = bench.map(&PdoRequest { cob_id: Some(0x3a5), ..request(&["ch1.status"]) }, false).unwrap();
     assert_eq!((mapped.shown.settings.cob_id.0, bench.number("1800:1")), (0x3a5, 0x3a5));
 }
 
 #[test]
 fn the_device_is_asked_for_a_width_that_nothing_tells() {
     let mut bench = Bench::new(description("", &parameters("default = \"$NODEID+0x180\"")));
-    bench.map(&wish(&["0x2000", "ch1"]), false).unwrap();
+    bench.map(&request(&["0x2000", "ch1"]), false).unwrap();
     assert_eq!((bench.number("1A00:1"), bench.number("1A00:2")), (0x2000_0010, 0x6130_0120));
-    let failure = bench.map(&wish(&["0x3000"]), false).unwrap_err();
+    let failure = bench.map(&request(&["0x3000"]), false).unwrap_err();
     assert_eq!(
         ErrorMessage::of(&failure).message,
         "node 9: read 0x3000:0: refused by the device (0x06020000, the object does not exist)"
     );
-    let failure = bench.map(&wish(&["ch1", "0x2000", "0x2000", "ch1.status"]), false).unwrap_err();
+    let failure = bench.map(&request(&["ch1", "0x2000", "0x2000", "ch1.status"]), false).unwrap_err();
     assert_eq!(
         (failure.kind(), ErrorMessage::of(&failure).message.as_str()),
-        (Kind::Usage, "node 9: that makes 9 bytes; a PDO carries 8 bytes at most")
+        (Kind::Usage, "node 9: the mapping has 9 bytes; a PDO has at most 8 bytes")
     );
-    let failure = bench.map(&wish(&["ch2"]), false).unwrap_err();
+    let failure = bench.map(&request(&["ch2"]), false).unwrap_err();
     assert_eq!(
         (failure.kind(), ErrorMessage::of(&failure).message.as_str()),
         (Kind::Usage, "node 9: it has no object or signal \"ch2\"")

@@ -12,7 +12,7 @@ mod log;
 pub(super) mod lss;
 mod nmt;
 mod node;
-mod pdo;
+pub(super) mod pdo;
 mod read;
 mod scan;
 pub(super) mod settings;

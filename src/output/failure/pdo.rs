@@ -1,10 +1,275 @@
-//! Text for causes: a TPDO could not be shown or changed.
+//! Text for causes, effects and notes: a TPDO could not be shown or changed, and what to report about a change.
 
 use super::Words;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::pdo::{MappingEntry, Transmission};
+use crate::output::notes::Told;
 use crate::tasks::Failure;
-use crate::tasks::pdo::PdoFailure;
+use crate::tasks::pdo::{
+    Incomplete, Occupant, Parameter, PdoEffect, PdoFact, PdoFailure, Settings, StateEffect, StepError, StepWrite,
+};
+
+/// The largest number of entries in a list of objects that can be mapped.
+const MAX_LISTED: usize = 16;
 
 /// The message and the hint for a cause.
 pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> Words {
-    match *cause {}
+    match cause {
+        PdoFailure::NoTpdo => Words::new("it has no TPDO"),
+        PdoFailure::Rejected { error, available } => {
+            let numbers: Vec<String> = available.iter().map(|number| number.get().to_string()).collect();
+            Words::new(error.to_string()).hint(format!("it has the TPDOs {}", numbers.join(", ")))
+        }
+        PdoFailure::Restarted => Words::new("it restarted while its TPDO was read"),
+        PdoFailure::Multiplexed { number } => {
+            Words::new(format!("{number} is a multiplexed PDO: its mapping is not a list"))
+        }
+        PdoFailure::NotStored { number } => {
+            Words::new(format!("it does not store the settings of {number}: nothing was changed"))
+                .hint("omit --store, and set the TPDO after every power-on")
+        }
+        PdoFailure::FixedMapping { number, mapping } => {
+            let entries = list(mapping);
+            Words::new(format!("the mapping of {number} is fixed ({entries}): nothing was changed"))
+        }
+        PdoFailure::Occupied { id, by } => {
+            Words::new(format!("identifier 0x{id} is used by {}: nothing was changed", occupant(by)))
+                .hint("choose another identifier: --cob-id")
+        }
+        PdoFailure::Restricted { id } => {
+            Words::new(format!("identifier 0x{id} is not for PDOs (CiA 301 reserves it for other services)"))
+                .hint("PDOs can use 0x181 to 0x57F, if no other node uses the identifier")
+        }
+        PdoFailure::NoIdentifier { number, id } => {
+            Words::new(format!("{number} has no identifier yet (0x{id})")).hint("set one: --cob-id 0x3A5")
+        }
+        PdoFailure::NoParameter { number, parameter } => {
+            let name = match parameter {
+                Parameter::EventTimer => "event timer",
+                Parameter::InhibitTime => "inhibit time",
+            };
+            Words::new(format!("{number} has no {name} ({} does not exist)", parameter.object(*number)))
+        }
+        PdoFailure::TooLong { bits } => {
+            let length = if bits % 8 == 0 { format!("{} bytes", bits / 8) } else { format!("{bits} bits") };
+            Words::new(format!("the mapping has {length}; a PDO has at most 8 bytes"))
+        }
+        PdoFailure::NoStatus { signal } => Words::new(format!("{signal} has no status object")),
+        PdoFailure::UnknownName { name, nearest, signals } => {
+            let words = Words::new(format!("it has no object or signal \"{name}\""));
+            match (nearest.as_slice(), signals.as_slice()) {
+                ([], []) => words,
+                ([], signals) => words.hint(format!("its signals: {}", signals.join(", "))),
+                (nearest, _) => words.hint(format!("nearest: {}", nearest.join(", "))),
+            }
+        }
+        PdoFailure::WidthUnknown { object } => {
+            Words::new(format!("the width of {object} is unknown")).hint(format!("state its bits: {object}/32"))
+        }
+        PdoFailure::Change { error, write, mappable } => {
+            let words = Words::new(step(error, write.as_ref()));
+            match mappable.is_empty() {
+                true => words,
+                false => words.hint(format!("it can map: {}", list_some(mappable))),
+            }
+        }
+        PdoFailure::NothingReceived { nodes } => nothing_received(nodes),
+    }
+}
+
+fn nothing_received(nodes: &[NodeId]) -> Words {
+    let all = nodes.iter().map(NodeId::to_string).collect::<Vec<_>>().join(",");
+    let first = nodes.first().map(NodeId::to_string).unwrap_or_default();
+    Words::new("no TPDO was received").hint(format!(
+        "check that the nodes are operational and that a node sends SYNC: cangauge pdo show {first}; \
+         cangauge nmt start {all}"
+    ))
+}
+
+fn occupant(by: &Occupant) -> String {
+    match by {
+        Occupant::Service(name) => (*name).to_owned(),
+        Occupant::Own(name) => format!("its {name}"),
+        Occupant::Other(node, name) => format!("{name} of node {node}"),
+        Occupant::Traffic => "a node that sends with it".to_owned(),
+    }
+}
+
+/// `0x6130:1/32`.
+pub(in crate::output) fn entry(entry: MappingEntry) -> String {
+    format!("{}/{}", entry.object, entry.bits)
+}
+
+fn list(entries: &[MappingEntry]) -> String {
+    entries.iter().map(|&item| entry(item)).collect::<Vec<_>>().join(" ")
+}
+
+/// A list of entries; only the first ones of a long list.
+fn list_some(entries: &[MappingEntry]) -> String {
+    match entries.get(..MAX_LISTED) {
+        Some(first) if entries.len() > MAX_LISTED => {
+            format!("{} and {} more", list(first), entries.len() - MAX_LISTED)
+        }
+        _ => list(entries),
+    }
+}
+
+/// Why a step failed: `write 0x1A00:2 (0x6132:1/8): refused by the device …`.
+fn step(error: &StepError, write: Option<&StepWrite>) -> String {
+    let at = write.map(|write| format!("{} ({})", write.object, number(write)));
+    match error {
+        StepError::Rejected(error) | StepError::Lost(error) => {
+            let write = write.filter(|write| write.object == error.object);
+            let number = write.map(|write| format!(" ({})", number(write))).unwrap_or_default();
+            format!("{} {}{number}: {}", error.operation, error.object, error.failure)
+        }
+        StepError::Restarted => "it restarted during the change".to_owned(),
+        StepError::Interrupted => at.map_or_else(|| "interrupted".to_owned(), |at| format!("interrupted at {at}")),
+        StepError::Bus(error) => at.map_or_else(|| error.to_string(), |at| format!("{error} at {at}")),
+        StepError::NotKept { object, found, written } => {
+            format!("{object} was acknowledged and reads {found:#X} instead of {written:#X}")
+        }
+    }
+}
+
+/// The number of a write, in the form of its object.
+fn number(write: &StepWrite) -> String {
+    match (write.object.index, write.object.sub) {
+        (0x1a00..=0x1bff, 0) => format!("{} entries", write.value),
+        (0x1a00..=0x1bff, _) => entry(MappingEntry::from_word(write.value)),
+        (_, 1) => format!("0x{:08X}", write.value),
+        _ => write.value.to_string(),
+    }
+}
+
+/// The text for an effect.
+pub(in crate::output) fn effect(node: &str, effect: &PdoEffect) -> Told {
+    match effect {
+        PdoEffect::Restored { number } => Told::new("restored", format!("{number} has its old mapping and parameters")),
+        PdoEffect::Incomplete(incomplete) => incomplete_text(node, incomplete),
+        PdoEffect::State(state) => state_text(node, *state),
+        PdoEffect::SetNotStored { number } => {
+            Told::new("set-not-stored", format!("{number} has the requested settings, but they are lost at power off"))
+        }
+    }
+}
+
+fn incomplete_text(node: &str, incomplete: &Incomplete) -> Told {
+    let Incomplete { last, restore, previous, needs_preop, was_operational } = incomplete;
+    let tpdo = previous.number;
+    let mut message = match last {
+        Some(write) => format!("{tpdo} is only partly changed, after {} ({})", write.object, number(write)),
+        None => format!("it is unknown whether {tpdo} was changed: no step was confirmed"),
+    };
+    if let Some((error, write)) = restore {
+        message += &format!("; restoring it failed: {}", step(error, write.as_ref()));
+    }
+    let start = if *was_operational { format!(" && cangauge nmt start {node}") } else { String::new() };
+    let command = format!("{}{start}", recovery_command(node, previous, *needs_preop));
+    Told::new("incomplete", message).command("when it answers again", command)
+}
+
+fn state_text(node: &str, state: StateEffect) -> Told {
+    match state {
+        StateEffect::Unknown => Told::new(
+            "left-pre-operational",
+            "the node was set to PRE-OPERATIONAL; its previous state is unknown, so it stays there",
+        )
+        .command("start it", format!("cangauge nmt start {node}")),
+        StateEffect::Differs { before, now } => {
+            Told::new("state-differs", format!("the node was {before} before and is {now} now"))
+                .command("show its state", format!("cangauge nmt state {node}"))
+        }
+        StateEffect::Unconfirmed { before } => {
+            Told::new("state-unconfirmed", format!("the node was set to {before} again, without confirmation"))
+        }
+        StateEffect::NotRestored => Told::new("state-not-restored", "the previous NMT state was not restored"),
+    }
+}
+
+/// The text for a note.
+pub(in crate::output) fn fact(node: Option<NodeId>, fact: &PdoFact) -> Told {
+    match fact {
+        PdoFact::AlreadySet { number } => {
+            Told::new("already-set", format!("{number} has these settings already: nothing was written"))
+        }
+        PdoFact::Stored { groups } => {
+            let groups = groups.iter().map(|group| group.as_str()).collect::<Vec<_>>().join("+");
+            Told::new("stored", format!("stored ({groups}), acknowledged"))
+        }
+        PdoFact::MaybeNotMappable { object } => {
+            Told::new("maybe-not-mappable", format!("{object} cannot be mapped according to the description"))
+        }
+        PdoFact::ChangedWhileOn { number, error } => {
+            Told::new("changed-while-on", format!("{error}: {number} was changed while it was on"))
+        }
+        PdoFact::SetDespite { number, error, write } => {
+            let step = step(error, write.as_ref());
+            Told::new("set-despite", format!("{step}; {number} has the requested settings all the same"))
+        }
+        PdoFact::State(state) => state_text(&node.map_or_else(|| "NODE".to_owned(), |node| node.to_string()), *state),
+        PdoFact::Off { number } => {
+            Told::new("off", format!("{number} is off: map signals or set --cob-id to switch it on"))
+        }
+        PdoFact::WaitsForSync { number } => Told::new("waits-for-sync", format!("{number} waits for SYNC")),
+        PdoFact::OnlyOnChange { number } => Told::new(
+            "only-on-change",
+            format!(
+                "the event timer of {number} is 0: it is sent only if a value changes by its delta (x133h) or passes a \
+                 limit"
+            ),
+        ),
+        PdoFact::TimerUnused { transmission } => {
+            Told::new("timer-unused", format!("transmission type {transmission} does not use the event timer"))
+        }
+    }
+}
+
+/// The command that sets a TPDO to `old`. A TPDO that was off or empty is set with plain writes, because `map` switches
+/// it on.
+fn recovery_command(node: &str, old: &Settings, needs_preop: bool) -> String {
+    let number = old.number.get();
+    if !old.cob_id.is_valid() || old.mapping.is_empty() {
+        let preop = if needs_preop { format!("cangauge nmt preop {node} && ") } else { String::new() };
+        return preop + &write_command(node, old);
+    }
+    let mut line = format!("cangauge pdo map {node} {number} {}", list(&old.mapping));
+    let transmission = match old.transmission() {
+        kind @ (Transmission::AcyclicSync | Transmission::Sync(_)) => kind.to_string(),
+        _ => old.transmission.to_string(),
+    };
+    line += &format!(" --transmission {transmission}");
+    if let Some(timer) = old.event_timer_ms {
+        line += &format!(" --event-timer {timer}ms");
+    }
+    if let Some(inhibit) = old.inhibit_100us {
+        line += &format!(" --inhibit {}us", 100 * u32::from(inhibit));
+    }
+    if let CanId::Standard(id) = old.cob_id.can_id() {
+        line += &format!(" --cob-id 0x{id:03X}");
+    }
+    line
+}
+
+fn write_command(node: &str, old: &Settings) -> String {
+    let number = old.number;
+    let mut line = format!("cangauge sdo write {node}");
+    let mut add = |object, value: u32| line += &format!(" {object}=0x{value:X}");
+    add(number.communication(1), old.cob_id.switched_off().0);
+    add(number.mapping(0), 0);
+    for (sub, entry) in (1..=u8::MAX).zip(&old.mapping) {
+        add(number.mapping(sub), entry.word());
+    }
+    add(number.mapping(0), u32::try_from(old.mapping.len()).unwrap_or(0));
+    add(number.communication(2), old.transmission.into());
+    if let Some(timer) = old.event_timer_ms {
+        add(number.communication(5), timer.into());
+    }
+    if let Some(inhibit) = old.inhibit_100us {
+        add(number.communication(3), inhibit.into());
+    }
+    if old.cob_id.is_valid() {
+        add(number.communication(1), old.cob_id.0);
+    }
+    line
 }

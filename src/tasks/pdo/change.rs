@@ -1,90 +1,93 @@
-//! A change under way: from the old settings to the new ones, or back.
+//! A change from the old settings to the requested ones, and back if a step fails.
 
-use super::device::{Device, Trouble, Write};
-use super::nmt::Switched;
+use super::failure::{Incomplete, PdoEffect, PdoFact, PdoFailure, StateEffect, StepError, StepWrite};
 use super::plan;
+use super::session::Session;
 use super::settings::Settings;
+use super::state_switch::StateSwitch;
+use crate::canopen::pdo::MappingEntry;
 use crate::canopen::sdo::AbortCode;
 use crate::device::description::Remap;
-use crate::master::{Error, SdoError, SdoFailure};
-use crate::node::Node;
-use crate::tasks::Failure;
+use crate::master::{SdoError, SdoFailure};
+use crate::tasks::{Failure, Note};
 use std::time::Duration;
 
-/// The longest wait for a device that has restarted.
-const BOOT_TIME: Duration = Duration::from_secs(3);
+/// The longest wait for a device that restarts.
+const BOOT_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// How often Ctrl-C is not listened to while the old settings are put back. Each costs one exchange.
-const DEAF: u32 = 5;
+/// How many times Ctrl-C is ignored while the old settings are restored. Each costs one exchange.
+const MAX_INTERRUPTS: u32 = 5;
 
-/// A change under way.
-pub(super) struct Change<'a, 'm, 'bus> {
-    pub(super) device: Device<'m, 'bus>,
-    pub(super) instrument: &'a Node,
+/// A change in progress.
+pub(super) struct Change<'m, 'bus> {
+    pub(super) session: Session<'m, 'bus>,
     pub(super) old: Settings,
     pub(super) wanted: Settings,
     pub(super) remap: Remap,
-    /// A description lists the device's objects.
-    pub(super) known: bool,
-    /// The device takes no bit 31.
+    /// Whether a description lists the objects of the device.
+    pub(super) is_described: bool,
+    /// Whether the device rejects bit 31 of the COB-ID.
     pub(super) never_off: bool,
-    pub(super) state: Switched,
-    /// The write under way.
-    pub(super) at: Option<Write>,
+    pub(super) state: StateSwitch,
+    /// The current write.
+    pub(super) current: Option<StepWrite>,
     /// The write at which the change failed.
-    pub(super) failed_at: Option<Write>,
+    pub(super) failed_at: Option<StepWrite>,
     /// The last write that was confirmed.
-    pub(super) done: Option<Write>,
-    pub(super) remarks: Vec<String>,
-    pub(super) warnings: Vec<String>,
+    pub(super) confirmed: Option<StepWrite>,
+    pub(super) notes: Vec<Note>,
 }
 
-/// Where an attempt to put things back has led.
-enum Left {
+/// The settings of the TPDO after an attempt to restore them.
+enum Restored {
     Old,
     New,
 }
 
-impl Change<'_, '_, '_> {
-    /// Makes the change, or takes it back.
+impl Change<'_, '_> {
+    /// Makes the change, or restores the old settings.
+    ///
+    /// # Errors
+    /// The step that failed, with the settings and the state that are left.
     pub(super) fn run(&mut self) -> Result<(), Failure> {
-        match self.attempt() {
-            Ok(()) => {}
-            Err(trouble) => self.undo(trouble)?,
+        if let Err(error) = self.attempt() {
+            self.undo(&error)?;
         }
-        let said = self.put_state_back();
-        self.warnings.extend(said);
-        self.advise();
+        if let Some(state) = self.restore_state() {
+            self.note(PdoFact::State(state));
+        }
+        self.note_consequences();
         Ok(())
     }
 
-    fn writes(&self, now: &Settings, wanted: &Settings) -> Vec<Write> {
+    fn note(&mut self, fact: PdoFact) {
+        self.notes.push(Note::of_node(self.session.node.id, fact));
+    }
+
+    fn writes(&self, now: &Settings, wanted: &Settings) -> Vec<StepWrite> {
         plan::writes(now, wanted, self.remap, self.never_off)
     }
 
-    /// From the old settings to those asked for, and reads them back.
-    fn attempt(&mut self) -> Result<(), Trouble> {
+    /// Writes the requested settings and reads them back.
+    fn attempt(&mut self) -> Result<(), StepError> {
         let (old, wanted) = (self.old.clone(), self.wanted.clone());
         if self.writes(&old, &wanted).is_empty() {
             return Ok(());
         }
         if self.remap == Remap::CountOnly && old.mapping != wanted.mapping {
-            self.state.enter(&mut self.device)?;
+            self.state.enter(&mut self.session)?;
         }
         let mut writes = self.writes(&old, &wanted);
         let off = writes.first().filter(|write| **write == self.off()).cloned();
         if let Some(off) = off {
             writes.remove(0);
             match self.step(&off) {
-                Err(Trouble::Refused(error)) if self.goes_without_off(&error) => {
-                    self.warnings.push(format!(
-                        "node {}: {error}: {} is changed while it stays on",
-                        self.device.node, old.number
-                    ));
+                Err(StepError::Rejected(error)) if self.may_stay_on(&error) => {
+                    self.note(PdoFact::ChangedWhileOn { number: old.number, error });
                     self.never_off = true;
                     self.remap = Remap::CountOnly;
                     if old.mapping != wanted.mapping {
-                        self.state.enter(&mut self.device)?;
+                        self.state.enter(&mut self.session)?;
                     }
                     writes = self.writes(&old, &wanted);
                 }
@@ -98,105 +101,159 @@ impl Change<'_, '_, '_> {
     }
 
     /// The write that switches the PDO off.
-    fn off(&self) -> Write {
-        Write::new(self.old.number.communication(1), self.old.cob_id.switched_off().0, 4)
+    fn off(&self) -> StepWrite {
+        StepWrite::new(self.old.number.communication(1), self.old.cob_id.switched_off().0, 4)
     }
 
-    /// Whether a refusal of bit 31 may be passed over: some devices do not know it and change their mapping
-    /// without it. Of a device that is described it is known.
-    fn goes_without_off(&self, error: &SdoError) -> bool {
-        let unknown = matches!(
+    /// Whether the change can go on although the device rejected bit 31. Some devices do not know bit 31 and accept a new
+    /// mapping without it. Not if a description says that the device has bit 31.
+    fn may_stay_on(&self, error: &SdoError) -> bool {
+        let is_unknown_bit = matches!(
             error.failure,
             SdoFailure::Refused(AbortCode::VALUE | AbortCode::READ_ONLY | AbortCode::DEVICE_STATE)
         );
-        unknown && (!self.known || self.remap == Remap::CountOnly)
+        is_unknown_bit && (!self.is_described || self.remap == Remap::CountOnly)
     }
 
-    /// One write. A device that is not in the state for it is put in PRE-OPERATIONAL, once.
-    fn step(&mut self, write: &Write) -> Result<(), Trouble> {
-        self.at = Some(write.clone());
-        match self.device.write(write) {
-            Err(Trouble::Refused(SdoError { failure: SdoFailure::Refused(AbortCode::DEVICE_STATE), .. }))
+    /// Carries out one write. If the device rejects it because of its state, it is set to PRE-OPERATIONAL once.
+    fn step(&mut self, write: &StepWrite) -> Result<(), StepError> {
+        self.current = Some(write.clone());
+        match self.session.write(write) {
+            Err(StepError::Rejected(SdoError { failure: SdoFailure::Refused(AbortCode::DEVICE_STATE), .. }))
                 if !self.state.is_switched() && *write != self.off() =>
             {
-                self.state.enter(&mut self.device)?;
-                self.device.write(write)?;
+                self.state.enter(&mut self.session)?;
+                self.session.write(write)?;
             }
             result => result?,
         }
-        self.done = Some(write.clone());
+        self.confirmed = Some(write.clone());
         Ok(())
     }
 
-    /// That the device holds these settings.
-    fn read_back(&mut self, wanted: &Settings) -> Result<(), Trouble> {
-        let found = Settings::read(&mut self.device, wanted.number, wanted.inhibit_100us.is_some())?;
+    /// Checks that the device has these settings.
+    fn read_back(&mut self, wanted: &Settings) -> Result<(), StepError> {
+        let found = Settings::read(&mut self.session, wanted.number, wanted.inhibit_100us.is_some())?;
         match found.difference(wanted) {
-            Some((object, reads, wrote)) => Err(Trouble::NotKept(object, reads, wrote)),
-            None if self.device.restarted => Err(Trouble::Restarted),
+            Some((object, found, written)) => Err(StepError::NotKept { object, found, written }),
+            None if self.session.has_restarted => Err(StepError::Restarted),
             None => Ok(()),
         }
     }
 
-    /// Something went wrong: the old settings are put back. Success where the device turns out to have the new
-    /// ones, completely.
-    fn undo(&mut self, trouble: Trouble) -> Result<(), Failure> {
-        self.failed_at = self.at.take();
-        let (mut deaf, mut waited) = (DEAF, false);
+    /// Restores the old settings after an error. Succeeds if the device turns out to have all requested settings.
+    fn undo(&mut self, error: &StepError) -> Result<(), Failure> {
+        self.failed_at = self.current.take();
+        let (mut interrupts_left, mut has_waited) = (MAX_INTERRUPTS, false);
         let last = loop {
-            match self.put_back(&trouble) {
-                Ok(Left::New) => {
-                    self.warnings.extend(self.in_spite_of(&trouble));
+            match self.restore(error) {
+                Ok(Restored::New) => {
+                    // A lost answer, and Ctrl-C after the last step, are not worth a note.
+                    if matches!(error, StepError::Rejected(_) | StepError::Restarted | StepError::NotKept { .. }) {
+                        let (error, write) = (error.clone(), self.failed_at.clone());
+                        self.note(PdoFact::SetDespite { number: self.old.number, error, write });
+                    }
                     return Ok(());
                 }
-                Ok(Left::Old) => {
-                    let said = self.put_state_back().map(|said| format!("; {said}")).unwrap_or_default();
-                    let end = format!("{} has its old mapping and parameters{said}", self.old.number);
-                    return Err(self.failure(&trouble, &end));
+                Ok(Restored::Old) => {
+                    let (node, number) = (self.session.node.id, self.old.number);
+                    let state = self.restore_state();
+                    let failure = self.failure(error).with(node, PdoEffect::Restored { number });
+                    return Err(match state {
+                        Some(state) => failure.with(node, PdoEffect::State(state)),
+                        None => failure,
+                    });
                 }
-                Err(Trouble::Stopped(Error::Interrupted)) if deaf > 0 => deaf -= 1,
-                Err(last @ (Trouble::Lost(_) | Trouble::Restarted)) if !waited => {
-                    waited = true;
-                    // Seen or not, it is tried once more: most devices without heartbeat boot for so long.
-                    if !self.device.restarted && self.device.wait_for_life(BOOT_TIME).is_err() {
+                Err(StepError::Interrupted) if interrupts_left > 0 => interrupts_left -= 1,
+                Err(last @ (StepError::Lost(_) | StepError::Restarted)) if !has_waited => {
+                    has_waited = true;
+                    // Tried again even without a sign of life: most devices without heartbeat need this time to boot.
+                    if !self.session.has_restarted && self.session.wait_for_life(BOOT_TIMEOUT).is_err() {
                         break last;
                     }
                 }
                 Err(last) => break last,
             }
         };
-        Err(self.left(&trouble, &last))
+        Err(self.incomplete(error, last))
     }
 
-    fn put_back(&mut self, trouble: &Trouble) -> Result<Left, Trouble> {
-        self.device.restarted = false;
-        self.device.clear_the_air()?;
+    fn restore(&mut self, error: &StepError) -> Result<Restored, StepError> {
+        self.session.has_restarted = false;
+        self.session.discard_late_answers()?;
         let (old, wanted) = (self.old.clone(), self.wanted.clone());
-        let now = Settings::read(&mut self.device, old.number, old.inhibit_100us.is_some())?;
+        let now = Settings::read(&mut self.session, old.number, old.inhibit_100us.is_some())?;
         if now.difference(&wanted).is_none() {
-            return Ok(Left::New);
+            return Ok(Restored::New);
         }
-        let restarted = matches!(trouble, Trouble::Restarted);
-        if restarted && self.remap == Remap::CountOnly && now.mapping != old.mapping {
-            self.state.enter(&mut self.device)?;
+        let has_restarted = matches!(error, StepError::Restarted);
+        if has_restarted && self.remap == Remap::CountOnly && now.mapping != old.mapping {
+            self.state.enter(&mut self.session)?;
         }
         for write in self.writes(&now, &old) {
             self.step(&write)?;
         }
         self.read_back(&old)?;
-        Ok(Left::Old)
+        Ok(Restored::Old)
     }
 
-    /// The NMT state before, where it was known; what is to be said about it.
-    fn put_state_back(&mut self) -> Option<String> {
+    /// Restores the NMT state, if it was known.
+    fn restore_state(&mut self) -> Option<StateEffect> {
         let before = self.state.clone();
-        for _ in 0..=DEAF {
-            match self.state.put_back(&mut self.device) {
-                Err(Trouble::Stopped(Error::Interrupted)) => self.state = before.clone(),
-                Ok(remark) => return remark,
+        for _ in 0..=MAX_INTERRUPTS {
+            match self.state.restore(&mut self.session) {
+                Err(StepError::Interrupted) => self.state = before.clone(),
+                Ok(effect) => return effect,
                 Err(_) => break,
             }
         }
-        Some(format!("the state of node {} was not put back", self.device.node))
+        Some(StateEffect::NotRestored)
+    }
+
+    /// The failure of the change.
+    fn failure(&self, error: &StepError) -> Failure {
+        let mappable = match error.abort() {
+            Some(AbortCode::NOT_MAPPABLE) => self.mappable(),
+            _ => Vec::new(),
+        };
+        let cause = PdoFailure::Change { error: error.clone(), write: self.failed_at.clone(), mappable };
+        Failure { object: error.object(), ..Failure::at(self.session.node.id, cause) }
+    }
+
+    /// The entries that the device can map, from its description.
+    fn mappable(&self) -> Vec<MappingEntry> {
+        let model = self.session.node.model.iter();
+        let entries = model.flat_map(|model| model.dictionary.iter()).filter(|entry| entry.pdo);
+        let entry = |object, width: usize| Some(MappingEntry { object, bits: u8::try_from(8 * width).ok()? });
+        entries.filter_map(|known| entry(known.object, known.data_type.width()?)).collect()
+    }
+
+    /// The failure of a change that could not be undone.
+    fn incomplete(&self, error: &StepError, last: StepError) -> Failure {
+        let is_same_reason = matches!((error, &last), (StepError::Lost(_), StepError::Lost(_)));
+        let incomplete = Incomplete {
+            last: self.confirmed.clone(),
+            restore: (!is_same_reason).then(|| (last, self.current.clone())),
+            previous: self.old.clone(),
+            needs_preop: self.remap == Remap::CountOnly,
+            was_operational: self.state.was_operational(),
+        };
+        self.failure(error).with(self.session.node.id, PdoEffect::Incomplete(Box::new(incomplete)))
+    }
+
+    /// Notes when the TPDO is sent with the new settings, if that may be unexpected.
+    fn note_consequences(&mut self) {
+        let Settings { number, event_timer_ms, .. } = self.wanted;
+        let transmission = self.wanted.transmission();
+        if !self.wanted.cob_id.is_valid() {
+            self.note(PdoFact::Off { number });
+        } else if transmission.needs_sync() {
+            self.note(PdoFact::WaitsForSync { number });
+        } else if event_timer_ms == Some(0) {
+            self.note(PdoFact::OnlyOnChange { number });
+        }
+        if transmission.needs_sync() && event_timer_ms != self.old.event_timer_ms {
+            self.note(PdoFact::TimerUnused { transmission });
+        }
     }
 }

@@ -1,137 +1,135 @@
-//! The mapping of a TPDO as a transaction: the settings asked for, read back, or the old ones.
+//! Sets the mapping and the parameters of a TPDO as a transaction.
 
 use super::change::Change;
-use super::device::Device;
-use super::nmt::Switched;
+use super::failure::{PdoEffect, PdoFact, PdoFailure, not_read};
+use super::identifiers;
+use super::request::PdoRequest;
+use super::session::Session;
 use super::settings::Settings;
-use super::show::{Shown, may_inhibit, unread};
-use super::wish::Wish;
-use super::{identifiers, mend};
+use super::show::{TpdoReport, may_have_inhibit_time, numbers};
+use super::state_switch::StateSwitch;
 use crate::canopen::pdo::TpdoNumber;
 use crate::device::catalog::Model;
 use crate::device::description::Access;
 use crate::master::Master;
-use crate::node::Node;
-use crate::node::Overrides;
-use crate::node::survey::survey_nodes;
-use crate::tasks::store::{self, Done, Group};
-use crate::tasks::{Failure, Kind};
+use crate::node::{Node, Overrides};
+use crate::tasks::settings::open;
+use crate::tasks::store::{self, Group};
+use crate::tasks::{Fact, Failure, Kind, Note};
 
-/// A TPDO that is set as was asked for.
+/// The result of [`map`].
 #[derive(Clone, Debug)]
-pub struct Mapped {
-    /// What it is set to.
-    pub shown: Shown,
-    /// How many writes that took.
+pub struct MapReport {
+    /// The settings of the TPDO now.
+    pub shown: TpdoReport,
+    /// The number of writes.
     pub writes: u32,
-    /// What the device acknowledged to have stored, where that was asked for.
-    pub stored: Option<Done>,
-    /// What is worth knowing.
-    pub remarks: Vec<String>,
-    /// What is not as one would expect.
-    pub warnings: Vec<String>,
+    /// Whether the device acknowledged that it stored the settings.
+    pub stored: bool,
+    /// What else there is to report.
+    pub notes: Vec<Note>,
 }
 
-/// Sets a TPDO as `wish` wants it. With `keep` the device is then told to store it; whether it can, and whether it
-/// keeps such settings, is found out before anything is changed.
+/// Sets a TPDO as requested. With `store` the device then stores the settings. All checks come before the first write.
 ///
 /// # Errors
-/// With the old settings in place again, if any were touched; a device that cannot be reached any more is
-/// reported with the step that it was left at and the command that mends it.
-pub fn map(master: &mut Master<'_>, wish: &Wish, keep: bool, overrides: &Overrides) -> Result<Mapped, Failure> {
-    wish.check()?;
-    let node = wish.node;
-    master.listen_to(&[node])?;
-    let found = survey_nodes(master, &[node], overrides)?.pop();
-    let instrument = found.ok_or_else(|| Failure::of_node(Kind::NoAnswer, node, "it is not there"))?;
-    let model = instrument.model.as_deref();
-    let storing = if keep { Some(storing(master, &instrument, wish.number)?) } else { None };
-    let mut device = Device::new(master, &instrument);
-    let (mapping, remarks) = wish.mapping(&mut device, &instrument)?;
-    let inhibit = wish.inhibit_100us.is_some() || may_inhibit(&instrument, wish.number);
-    let old = Settings::read(&mut device, wish.number, inhibit).map_err(|trouble| unread(&instrument, trouble))?;
+/// If a step failed, the old settings are restored. If that failed as well, the failure contains the last confirmed step
+/// and what is needed to repair the settings.
+pub fn map(
+    master: &mut Master<'_>,
+    request: &PdoRequest,
+    store: bool,
+    overrides: &Overrides,
+) -> Result<MapReport, Failure> {
+    request.check()?;
+    let (number, node) = (request.number, open(master, request.node, overrides)?);
+    let plan = if store { Some(store_plan(master, &node, number)?) } else { None };
+    let mut session = Session::new(master, &node);
+    let (mapping, mut notes) = request.mapping(&mut session)?;
+    let has_inhibit = request.inhibit_100us.is_some() || may_have_inhibit_time(&node, number);
+    let old = Settings::read(&mut session, number, has_inhibit);
+    let old = old.map_err(|error| not_read(node.id, numbers(&node), error))?;
     if old.multiplexed && mapping.is_some() {
-        let message = format!("{} is a multiplexed PDO, whose mapping is no list", old.number);
-        return Err(Failure::of_node(Kind::Unexpected, node, message));
+        return Err(Failure::at(node.id, PdoFailure::Multiplexed { number }));
     }
-    let wanted = wish.settings(&old, mapping, &instrument)?;
-    check(&mut device, &instrument, &old, &wanted)?;
-    let known = model.is_some_and(|model| !model.description.objects.is_empty());
-    let remap = model.map(|model| model.description.pdo.remap).unwrap_or_default();
+    let wanted = request.settings(&old, mapping, &node)?;
+    check(&mut session, &old, &wanted)?;
+    let model = node.model.as_deref();
     let mut change = Change {
-        device,
-        instrument: &instrument,
+        session,
         old,
         wanted,
-        remap,
-        known,
+        remap: model.map(|model| model.description.pdo.remap).unwrap_or_default(),
+        is_described: model.is_some_and(|model| !model.description.objects.is_empty()),
         never_off: false,
-        state: Switched::default(),
-        at: None,
+        state: StateSwitch::default(),
+        current: None,
         failed_at: None,
-        done: None,
-        remarks,
-        warnings: Vec::new(),
+        confirmed: None,
+        notes: Vec::new(),
     };
     change.run()?;
-    let Change { device, wanted, remarks, warnings, .. } = change;
-    let (writes, master) = (device.writes, device.master);
-    let stored = storing.map(|plan| store::carry_out(master, &instrument, plan, false)).transpose();
-    let stored = stored.map_err(|failure| {
-        failure.knowing(node, format!("{} is set as wanted, and keeps it until power off at the least", wish.number))
-    })?;
-    Ok(Mapped { shown: Shown::new(&instrument, wanted), writes, stored, remarks, warnings })
+    let Change { session, wanted, notes: of_change, .. } = change;
+    let Session { writes, master, .. } = session;
+    let note = |fact: PdoFact| Note::of_node(node.id, fact);
+    if writes == 0 {
+        notes.insert(0, note(PdoFact::AlreadySet { number }));
+    }
+    let stored = plan.map(|plan| store::carry_out(master, &node, plan, false)).transpose();
+    let stored = stored.map_err(|failure| failure.with(node.id, PdoEffect::SetNotStored { number }))?;
+    if let Some(done) = &stored {
+        notes.push(note(PdoFact::Stored { groups: done.groups.clone() }));
+        notes.extend(done.notes.iter().map(|text| Note::of_node(node.id, Fact::Text(text.clone()))));
+    }
+    notes.extend(of_change);
+    Ok(MapReport { shown: TpdoReport::new(&node, wanted), writes, stored: stored.is_some(), notes })
 }
 
-/// What has to be stored to keep the settings of a TPDO. The communication settings alone where they are a group
-/// of their own: a store of everything puts custom COB-IDs back on some devices.
-fn storing(master: &mut Master<'_>, instrument: &Node, number: TpdoNumber) -> Result<store::Plan, Failure> {
-    let model = instrument.model.as_deref();
-    if model.is_some_and(|model| !keeps(model, number)) {
-        let message = format!("it does not keep the settings of {number} when it stores: nothing was changed");
-        let failure = Failure::of_node(Kind::CheckFailed, instrument.id, message);
-        return Err(failure.hint("leave --store out, and set it after every power on"));
+/// What to store to keep the settings of a TPDO: only the communication settings, if the device has a group for them.
+/// Some devices set custom COB-IDs back if everything is stored.
+fn store_plan(master: &mut Master<'_>, node: &Node, number: TpdoNumber) -> Result<store::Plan, Failure> {
+    if node.model.as_deref().is_some_and(|model| !is_stored(model, number)) {
+        return Err(Failure::at(node.id, PdoFailure::NotStored { number }));
     }
-    match store::plan(master, instrument, Group::Communication) {
-        Err(failure) if failure.kind() == Kind::Refused => store::plan(master, instrument, Group::All),
+    match store::plan(master, node, Group::Communication) {
+        Err(failure) if failure.kind() == Kind::Refused => store::plan(master, node, Group::All),
         plan => plan,
     }
 }
 
-/// Whether a device stores the settings of a TPDO, as far as its description tells.
-fn keeps(model: &Model, number: TpdoNumber) -> bool {
+/// Whether a device stores the settings of a TPDO. True if its description says nothing about stored objects.
+fn is_stored(model: &Model, number: TpdoNumber) -> bool {
     let objects = &model.description.objects;
-    let tells = objects.iter().any(|entry| entry.stored.is_some());
+    let is_known = objects.iter().any(|entry| entry.stored.is_some());
     let (communication, mapping) = (number.communication(1), number.mapping(1));
     let mut own = objects.iter().filter(|entry| entry.at.contains(communication) || entry.at.contains(mapping));
-    !tells || own.all(|entry| entry.stored.is_some() || !entry.access.is_writable())
+    !is_known || own.all(|entry| entry.stored.is_some() || !entry.access.is_writable())
 }
 
-/// What can be known to be wrong before anything is written.
-fn check(device: &mut Device<'_, '_>, instrument: &Node, old: &Settings, wanted: &Settings) -> Result<(), Failure> {
-    let number = old.number;
-    if old.mapping != wanted.mapping && is_fixed(instrument, number) {
-        let entries: Vec<String> = old.mapping.iter().map(|&entry| mend::entry_text(entry)).collect();
-        let message = format!("the mapping of {number} is fixed ({}): nothing was changed", entries.join(" "));
-        return Err(Failure::of_node(Kind::Refused, instrument.id, message));
+/// Checks what can be known before anything is written.
+fn check(session: &mut Session<'_, '_>, old: &Settings, wanted: &Settings) -> Result<(), Failure> {
+    let (number, node) = (old.number, session.node);
+    if old.mapping != wanted.mapping && has_fixed_mapping(node, number) {
+        return Err(Failure::at(node.id, PdoFailure::FixedMapping { number, mapping: old.mapping.clone() }));
     }
     let (before, after) = (old.cob_id, wanted.cob_id);
     let moves = before.can_id() != after.can_id();
     if after.is_valid() && (moves || !before.is_valid()) {
-        identifiers::free_of_own(instrument, number, after.can_id())?;
+        identifiers::check_own(node, number, after.can_id())?;
     }
     if after.is_valid() && moves {
-        identifiers::free_of_others(device, after.can_id())?;
+        identifiers::check_others(session, after.can_id())?;
     }
     Ok(())
 }
 
-/// Whether the description says that the mapping cannot be written. An EDS file is not believed that much.
-fn is_fixed(instrument: &Node, number: TpdoNumber) -> bool {
-    let described = instrument.model.as_ref().filter(|model| !model.description.objects.is_empty());
+/// Whether the description says that the mapping cannot be written. The access types of EDS files are less reliable and
+/// are not used.
+fn has_fixed_mapping(node: &Node, number: TpdoNumber) -> bool {
+    let described = node.model.as_ref().filter(|model| !model.description.objects.is_empty());
     described.is_some_and(|model| {
         let access = |sub| model.dictionary.get(number.mapping(sub)).map(|entry| entry.access);
-        let fixed = |access: Access| !access.is_writable();
-        access(0).is_some_and(fixed) || access(1).is_some_and(fixed)
+        let is_fixed = |access: Access| !access.is_writable();
+        access(0).is_some_and(is_fixed) || access(1).is_some_and(is_fixed)
     })
 }

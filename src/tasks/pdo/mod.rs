@@ -1,27 +1,25 @@
-//! TPDOs: how they are set up, changing that as a transaction, and watching what they carry.
+//! TPDOs: their settings, a change of the settings as a transaction, and the values that they carry.
 //!
-//! A mapping is changed in the order that CiA 301 prescribes (7.5.2.37, 7.5.2.38): the PDO off, the number of
-//! entries 0, the entries, their number, the other parameters, the PDO on. What was asked for is read back, or
-//! the old settings are put back: nobody is left with half a mapping without being told.
+//! A mapping is changed in the order of CiA 301 (7.5.2.37, 7.5.2.38): switch the PDO off, set the number of entries to 0,
+//! write the entries, their number and the other parameters, switch the PDO on. Then either the new settings are read
+//! back, or the old ones are restored. If neither is possible, the failure says what is left.
 
 mod change;
-mod device;
 mod failure;
 mod identifiers;
 mod map;
-mod mend;
-mod nmt;
 mod plan;
-mod report;
+mod request;
+mod session;
 mod settings;
 mod show;
+mod state_switch;
 mod watch;
-mod wish;
 
-pub use failure::PdoFailure;
+pub use failure::{Incomplete, Occupant, Parameter, PdoEffect, PdoFact, PdoFailure, StateEffect, StepError, StepWrite};
 
-pub use map::{Mapped, map};
+pub use map::{MapReport, map};
+pub use request::{Item, PdoRequest, Trigger};
 pub use settings::Settings;
-pub use show::{Carried, Shown, show};
-pub use watch::{Line, watch};
-pub use wish::{Item, Send, Wish};
+pub use show::{MappedItem, TpdoReport, show};
+pub use watch::{WatchEvent, watch};

@@ -1,16 +1,15 @@
-//! The writes that lead from one setting of a TPDO to another, in the order that the standard prescribes.
+//! The writes that change the settings of a TPDO, in the order of CiA 301.
 
-use super::device::Write;
+use super::failure::StepWrite;
 use super::settings::Settings;
 use crate::device::description::Remap;
 
-/// The writes from `now` to `wanted`; none when nothing differs.
+/// The writes that change the settings from `now` to `wanted`; none if nothing differs.
 ///
-/// The mapping is changed while the PDO is off ([`Remap::Invalidate`]) or while it has no entries
-/// ([`Remap::CountOnly`]); identifier and inhibit time are changed while it is off. Off is bit 31 of the COB-ID
-/// with all other bits as they were read: dropping bit 30 is what some devices refuse. With `never_off` the
-/// device takes no bit 31.
-pub(super) fn writes(now: &Settings, wanted: &Settings, remap: Remap, never_off: bool) -> Vec<Write> {
+/// The mapping is changed while the PDO is off ([`Remap::Invalidate`]) or has no entries ([`Remap::CountOnly`]).
+/// Identifier and inhibit time are changed while it is off. To switch it off, bit 31 of the COB-ID is set and the other
+/// bits are kept: some devices reject a COB-ID without bit 30. With `never_off` bit 31 is never set.
+pub(super) fn writes(now: &Settings, wanted: &Settings, remap: Remap, never_off: bool) -> Vec<StepWrite> {
     let number = now.number;
     let remaps = now.mapping != wanted.mapping;
     let moves = now.cob_id.can_id() != wanted.cob_id.can_id();
@@ -20,30 +19,30 @@ pub(super) fn writes(now: &Settings, wanted: &Settings, remap: Remap, never_off:
     let mut cob_id = now.cob_id;
     if off {
         cob_id = cob_id.switched_off();
-        writes.push(Write::new(number.communication(1), cob_id.0, 4));
+        writes.push(StepWrite::new(number.communication(1), cob_id.0, 4));
     }
     if remaps {
         let count = u32::try_from(wanted.mapping.len()).unwrap_or(u32::MAX);
         if !now.mapping.is_empty() {
-            writes.push(Write::new(number.mapping(0), 0, 1));
+            writes.push(StepWrite::new(number.mapping(0), 0, 1));
         }
         let entries = (1..=u8::MAX).zip(&wanted.mapping);
-        writes.extend(entries.map(|(sub, entry)| Write::new(number.mapping(sub), entry.word(), 4)));
+        writes.extend(entries.map(|(sub, entry)| StepWrite::new(number.mapping(sub), entry.word(), 4)));
         if count > 0 {
-            writes.push(Write::new(number.mapping(0), count, 1));
+            writes.push(StepWrite::new(number.mapping(0), count, 1));
         }
     }
     if now.transmission != wanted.transmission {
-        writes.push(Write::new(number.communication(2), wanted.transmission.into(), 1));
+        writes.push(StepWrite::new(number.communication(2), wanted.transmission.into(), 1));
     }
     if let Some(timer) = wanted.event_timer_ms.filter(|_| now.event_timer_ms != wanted.event_timer_ms) {
-        writes.push(Write::new(number.communication(5), timer.into(), 2));
+        writes.push(StepWrite::new(number.communication(5), timer.into(), 2));
     }
     if let Some(inhibit) = wanted.inhibit_100us.filter(|_| inhibits) {
-        writes.push(Write::new(number.communication(3), inhibit.into(), 2));
+        writes.push(StepWrite::new(number.communication(3), inhibit.into(), 2));
     }
     if cob_id.without_rtr() != wanted.cob_id.without_rtr() {
-        writes.push(Write::new(number.communication(1), wanted.cob_id.0, 4));
+        writes.push(StepWrite::new(number.communication(1), wanted.cob_id.0, 4));
     }
     writes
 }

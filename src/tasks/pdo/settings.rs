@@ -1,48 +1,52 @@
-//! Everything that a TPDO is set to.
+//! The settings of a TPDO.
 
-use super::device::{Device, Trouble};
+use super::failure::StepError;
+use super::session::Session;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
 use crate::canopen::sdo::AbortCode;
 use crate::master::{SdoError, SdoFailure};
 
-/// The most entries of a mapping; FEh and FFh stand for multiplexed PDOs (CiA 301, 7.5.2.38).
-const MOST_ENTRIES: u8 = 64;
+/// The largest number of entries. FEh and FFh mean multiplexed PDOs (CiA 301, 7.5.2.38).
+const MAX_ENTRIES: u8 = 64;
 
-/// What a TPDO is set to.
+/// The settings of a TPDO.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// Which one.
+    /// The TPDO.
     pub number: TpdoNumber,
-    /// 180xh:1.
+    /// The COB-ID (180xh:1).
     pub cob_id: CobId,
-    /// 180xh:2.
+    /// The transmission type (180xh:2).
     pub transmission: u8,
-    /// 180xh:3 in 100 µs; `None` where the device has none.
+    /// The inhibit time (180xh:3) in 100 µs; `None` if the device has none.
     pub inhibit_100us: Option<u16>,
-    /// 180xh:5 in ms; `None` where the device has none.
+    /// The event timer (180xh:5) in ms; `None` if the device has none.
     pub event_timer_ms: Option<u16>,
-    /// What is mapped.
+    /// The mapping (1Axxh), in order.
     pub mapping: Vec<MappingEntry>,
-    /// Whether 1Axxh:0 says that it is a multiplexed PDO, whose mapping is no list.
+    /// Whether it is a multiplexed PDO (1Axxh:0): its mapping is not a list.
     pub multiplexed: bool,
 }
 
 impl Settings {
-    /// Reads all of it. The inhibit time is read where `inhibit` says so.
+    /// Reads all settings; the inhibit time only if `inhibit` is true.
     ///
     /// # Errors
-    /// Anything but a device without event timer or inhibit time: what is not known completely cannot be put
-    /// back.
-    pub(super) fn read(device: &mut Device<'_, '_>, number: TpdoNumber, inhibit: bool) -> Result<Settings, Trouble> {
-        let cob_id = device.read(number.communication(1), 4)?;
-        let transmission = device.read(number.communication(2), 1)?;
-        let inhibit_100us = if inhibit { optional(device.read(number.communication(3), 2))? } else { None };
-        let event_timer_ms = optional(device.read(number.communication(5), 2))?;
-        let count = u8::try_from(device.read(number.mapping(0), 1)?).unwrap_or(u8::MAX);
-        let multiplexed = count > MOST_ENTRIES;
+    /// Any error, except a missing event timer or inhibit time: settings can be restored only if all of them are known.
+    pub(super) fn read(
+        session: &mut Session<'_, '_>,
+        number: TpdoNumber,
+        inhibit: bool,
+    ) -> Result<Settings, StepError> {
+        let cob_id = session.read(number.communication(1), 4)?;
+        let transmission = session.read(number.communication(2), 1)?;
+        let inhibit_100us = if inhibit { optional(session.read(number.communication(3), 2))? } else { None };
+        let event_timer_ms = optional(session.read(number.communication(5), 2))?;
+        let count = u8::try_from(session.read(number.mapping(0), 1)?).unwrap_or(u8::MAX);
+        let multiplexed = count > MAX_ENTRIES;
         let entries = if multiplexed { 0 } else { count };
-        let entry = |sub| device.read(number.mapping(sub), 4).map(MappingEntry::from_word);
+        let entry = |sub| session.read(number.mapping(sub), 4).map(MappingEntry::from_word);
         let mapping = (1..=entries).map(entry).collect::<Result<_, _>>()?;
         Ok(Settings {
             number,
@@ -55,13 +59,13 @@ impl Settings {
         })
     }
 
-    /// When it is sent.
+    /// The transmission type.
     pub fn transmission(&self) -> Transmission {
         Transmission::from_code(self.transmission)
     }
 
-    /// The first object in which these settings differ from others, with the two numbers. Whether remote
-    /// requests are answered (bit 30) is the device's own affair.
+    /// The first object in which these settings differ from others, with both numbers. Bit 30 of the COB-ID (no remote
+    /// requests) is ignored: the device decides.
     pub(super) fn difference(&self, other: &Settings) -> Option<(ObjectId, u64, u64)> {
         let number = self.number;
         let wide = |number: Option<u16>| number.map_or(0, u64::from);
@@ -73,22 +77,21 @@ impl Settings {
             (number.communication(5), wide(self.event_timer_ms), wide(other.event_timer_ms)),
             (number.mapping(0), count(self), count(other)),
         ];
-        let entries = (1..=u8::MAX).zip(self.mapping.iter().zip(&other.mapping)).map(|(sub, (mine, theirs))| {
-            let words = (u64::from(mine.word()), u64::from(theirs.word()));
-            (number.mapping(sub), words.0, words.1)
-        });
-        fixed.into_iter().chain(entries).find(|(_, mine, theirs)| mine != theirs)
+        let entries = (1..=u8::MAX)
+            .zip(self.mapping.iter().zip(&other.mapping))
+            .map(|(sub, (own, others))| (number.mapping(sub), u64::from(own.word()), u64::from(others.word())));
+        fixed.into_iter().chain(entries).find(|(_, own, others)| own != others)
     }
 }
 
 /// `None` for an object that the device does not have.
-fn optional(result: Result<u32, Trouble>) -> Result<Option<u16>, Trouble> {
+fn optional(result: Result<u32, StepError>) -> Result<Option<u16>, StepError> {
     match result {
         Ok(number) => Ok(u16::try_from(number).ok()),
-        Err(Trouble::Refused(SdoError {
+        Err(StepError::Rejected(SdoError {
             failure: SdoFailure::Refused(AbortCode::NO_OBJECT | AbortCode::NO_SUB_INDEX),
             ..
         })) => Ok(None),
-        Err(trouble) => Err(trouble),
+        Err(error) => Err(error),
     }
 }

@@ -1,109 +1,92 @@
-//! How TPDOs are set up, with what they carry by name.
+//! The settings of TPDOs, with the signals that they carry.
 
-use super::device::{Device, Trouble};
-use super::mend::inhibit_time;
+use super::failure::{PdoFailure, not_read};
+use super::session::Session;
 use super::settings::Settings;
 use crate::canopen::id::NodeId;
 use crate::canopen::pdo::{MappingEntry, TpdoNumber};
 use crate::device::unit::Unit;
 use crate::master::Master;
-use crate::node::Node;
-use crate::node::Overrides;
-use crate::node::survey::survey_nodes;
-use crate::tasks::{Failure, Kind};
+use crate::node::{Node, Overrides};
+use crate::tasks::Failure;
+use crate::tasks::settings::open;
 use std::time::Duration;
 
-/// One entry of a mapping, and what it is.
+/// An entry of a mapping, with its signal.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Carried {
+pub struct MappedItem {
     /// The entry.
     pub entry: MappingEntry,
-    /// `pressure`, `pressure.status`; `None` of an object that is no signal.
+    /// `pressure`, `pressure.status`; `None` if the object is not a signal.
     pub signal: Option<String>,
-    /// The unit of a measured value, where the device tells it.
+    /// The unit of a process value, if the device reports it.
     pub unit: Option<Unit>,
 }
 
-/// A TPDO as it is set up.
+/// The settings of a TPDO.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Shown {
-    /// Of which node.
+pub struct TpdoReport {
+    /// The node.
     pub node: NodeId,
-    /// What it is set to.
+    /// The settings.
     pub settings: Settings,
-    /// What it carries, in the order of its bytes.
-    pub carried: Vec<Carried>,
+    /// The mapping, in the order of the bytes.
+    pub items: Vec<MappedItem>,
 }
 
-impl Shown {
-    /// The settings with what is known of the device.
-    pub(super) fn new(instrument: &Node, settings: Settings) -> Shown {
-        let carried = settings.mapping.iter().map(|&entry| carried(instrument, entry)).collect();
-        Shown { node: instrument.id, settings, carried }
+impl TpdoReport {
+    /// The settings with the signals of the node.
+    pub(super) fn new(node: &Node, settings: Settings) -> TpdoReport {
+        let items = settings.mapping.iter().map(|&entry| mapped_item(node, entry)).collect();
+        TpdoReport { node: node.id, settings, items }
     }
 
-    /// The inhibit time; `None` where the device has none.
+    /// The inhibit time; `None` if the device has none.
     pub fn inhibit(&self) -> Option<Duration> {
-        self.settings.inhibit_100us.map(inhibit_time)
+        self.settings.inhibit_100us.map(|inhibit| Duration::from_micros(100) * u32::from(inhibit))
     }
 }
 
-fn carried(instrument: &Node, entry: MappingEntry) -> Carried {
-    if let Some(signal) = instrument.signals.iter().find(|signal| signal.is_value(entry.object)) {
-        return Carried { entry, signal: Some(signal.name.clone()), unit: signal.unit };
+fn mapped_item(node: &Node, entry: MappingEntry) -> MappedItem {
+    if let Some(signal) = node.signals.iter().find(|signal| signal.is_value(entry.object)) {
+        return MappedItem { entry, signal: Some(signal.name.clone()), unit: signal.unit };
     }
-    let status = instrument.signals.iter().find(|signal| signal.status == Some(entry.object));
-    Carried { entry, signal: status.map(|signal| format!("{}.status", signal.name)), unit: None }
+    let signal = node.signals.iter().find(|signal| signal.status == Some(entry.object));
+    MappedItem { entry, signal: signal.map(|signal| format!("{}.status", signal.name)), unit: None }
 }
 
-/// Whether 180xh:3 is worth a question: a description that lists the objects lists all of them.
-pub(super) fn may_inhibit(instrument: &Node, number: TpdoNumber) -> bool {
-    let described = instrument.model.as_ref().filter(|model| !model.description.objects.is_empty());
+/// Whether the TPDO may have an inhibit time (180xh:3): a description that lists objects lists all of them.
+pub(super) fn may_have_inhibit_time(node: &Node, number: TpdoNumber) -> bool {
+    let described = node.model.as_ref().filter(|model| !model.description.objects.is_empty());
     described.is_none_or(|model| model.dictionary.get(number.communication(3)).is_some())
 }
 
-/// The TPDOs of a node, or one of them.
+/// The numbers of the node's TPDOs.
+pub(super) fn numbers(node: &Node) -> Vec<TpdoNumber> {
+    node.tpdos.iter().map(|tpdo| tpdo.number).collect()
+}
+
+/// The settings of all TPDOs of a node, or of one.
 ///
 /// # Errors
-/// A node that does not answer, a TPDO that it does not have, and what stops everything.
+/// No answer; the node does not have the TPDO; bus errors and Ctrl-C.
 pub fn show(
     master: &mut Master<'_>,
     node: NodeId,
     number: Option<TpdoNumber>,
     overrides: &Overrides,
-) -> Result<Vec<Shown>, Failure> {
-    master.listen_to(&[node])?;
-    let found = survey_nodes(master, &[node], overrides)?.pop();
-    let instrument = found.ok_or_else(|| Failure::of_node(Kind::NoAnswer, node, "it is not there"))?;
-    let there: Vec<TpdoNumber> = instrument.tpdos.iter().map(|tpdo| tpdo.number).collect();
-    let wanted = match number {
-        None => there,
-        Some(number) => vec![there.iter().copied().find(|&there| there == number).unwrap_or(number)],
-    };
+) -> Result<Vec<TpdoReport>, Failure> {
+    let node = open(master, node, overrides)?;
+    let available = numbers(&node);
+    let wanted = number.map_or_else(|| available.clone(), |number| vec![number]);
     if wanted.is_empty() {
-        return Err(Failure::of_node(Kind::Unexpected, node, "it has no TPDO"));
+        return Err(Failure::at(node.id, PdoFailure::NoTpdo));
     }
-    let mut device = Device::new(master, &instrument);
+    let mut session = Session::new(master, &node);
     let read = |number| {
-        let settings = Settings::read(&mut device, number, may_inhibit(&instrument, number));
-        settings.map(|settings| Shown::new(&instrument, settings)).map_err(|trouble| unread(&instrument, trouble))
+        let settings = Settings::read(&mut session, number, may_have_inhibit_time(&node, number));
+        let settings = settings.map_err(|error| not_read(node.id, available.clone(), error))?;
+        Ok(TpdoReport::new(&node, settings))
     };
     wanted.into_iter().map(read).collect()
-}
-
-/// Why a TPDO could not be read.
-pub(super) fn unread(instrument: &Node, trouble: Trouble) -> Failure {
-    match trouble {
-        Trouble::Refused(error) => {
-            let numbers: Vec<String> = instrument.tpdos.iter().map(|tpdo| tpdo.number.get().to_string()).collect();
-            Failure::from(error).hint(format!("its TPDOs: {}", numbers.join(", ")))
-        }
-        Trouble::Lost(error) => error.into(),
-        Trouble::Stopped(error) => error.into(),
-        Trouble::Restarted => Failure::of_node(Kind::Unexpected, instrument.id, "it restarted in the middle"),
-        Trouble::NotKept(object, reads, wrote) => {
-            let message = format!("{object} reads {reads} instead of {wrote}");
-            Failure::of_node(Kind::Unexpected, instrument.id, message)
-        }
-    }
 }

@@ -1,6 +1,7 @@
-//! TPDOs as they come, decoded.
+//! Receives and decodes TPDOs.
 
-use crate::bus::{BusError, Filters, Mono, Stamp};
+use super::failure::PdoFailure;
+use crate::bus::{BusError, Filters, Mono, Received, Stamp};
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::Life;
 use crate::canopen::pdo::TpdoNumber;
@@ -9,116 +10,150 @@ use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::sample::{Sample, Source};
 use crate::node::Overrides;
 use crate::node::survey::survey_nodes;
-use crate::tasks::{Failure, Kind};
+use crate::node::wait::{Policy, Until, Waiter, run};
+use crate::tasks::Failure;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// When nothing comes for this long after the start, it is said.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// After this time without a TPDO, that is reported once.
+const FIRST_TPDO_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Something that was seen.
+/// An event while TPDOs are received.
 #[derive(Clone, Copy, Debug)]
-pub enum Line<'a> {
-    /// A TPDO: its samples and what each is of.
-    Pdo {
+pub enum WatchEvent<'a> {
+    /// A TPDO, decoded.
+    Tpdo {
         /// When it was received.
         at: Stamp,
-        /// Who sent it.
+        /// The node that sent it.
         node: NodeId,
-        /// Which one.
+        /// The TPDO.
         number: TpdoNumber,
-        /// What it carried, in the order of its bytes.
+        /// Its values, in the order of its bytes.
         samples: &'a [Sample],
-        /// The sources of samples, by their numbers.
+        /// The sources of the decoder: each sample contains the number of its source.
         sources: &'a [Source],
     },
-    /// A TPDO whose length is not that of its mapping.
+    /// A TPDO with a length different from its mapping.
     WrongLength {
         /// When it was received.
         at: Stamp,
-        /// Who sent it.
+        /// The node that sent it.
         node: NodeId,
-        /// Which one.
+        /// The TPDO.
         number: TpdoNumber,
-        /// How many bytes it had.
+        /// Its length in bytes.
         length: usize,
     },
-    /// A node restarted: its mapping may be another one now.
+    /// A node restarted: its mapping may have changed.
     Restarted(NodeId),
-    /// Nothing has come so far.
-    Nothing,
+    /// No TPDO was received so far.
+    NothingYet,
 }
 
-/// Shows the TPDOs of the nodes until `until`, or until the user or `tell` ends it. NMT is left alone.
+/// Shows the TPDOs of the nodes until the time has passed, or until Ctrl-C or `on_event` ends it. Sends no NMT command.
 ///
 /// # Errors
-/// A node that does not answer, what stops everything, and not one TPDO until the end.
+/// A node that does not answer; [`PdoFailure::NothingReceived`]; bus errors, and Ctrl-C before the first TPDO.
 pub fn watch(
     master: &mut Master<'_>,
     nodes: &[NodeId],
     overrides: &Overrides,
     duration: Option<Duration>,
-    tell: &mut dyn FnMut(&Line<'_>) -> ControlFlow<()>,
+    on_event: &mut dyn FnMut(&WatchEvent<'_>) -> ControlFlow<()>,
 ) -> Result<(), Failure> {
     master.listen_to(nodes)?;
-    let instruments = survey_nodes(master, nodes, overrides)?;
+    let surveyed = survey_nodes(master, nodes, overrides)?;
     let mut decoder = Decoder::default();
     let mut numbers: BTreeMap<CanId, TpdoNumber> = BTreeMap::new();
-    for instrument in &instruments {
-        decoder.add(instrument.layout(), &[]);
-        let valid = instrument.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
+    for node in &surveyed {
+        decoder.add(node.layout(), &[]);
+        let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
         numbers.extend(valid.map(|tpdo| (tpdo.cob_id.can_id(), tpdo.number)));
     }
-    let nothing = || {
-        let are = if nodes.len() == 1 { "is it" } else { "are they" };
-        let all = nodes.iter().map(NodeId::to_string).collect::<Vec<_>>().join(",");
-        let first = nodes.first().map(NodeId::to_string).unwrap_or_default();
-        let hint =
-            format!("{are} started, and does somebody send SYNC? cangauge pdo show {first}; cangauge nmt start {all}");
-        Failure::new(Kind::NoAnswer, "not one TPDO came").hint(hint)
-    };
     let ids = numbers.keys().copied().chain(nodes.iter().map(|&node| CanId::heartbeat(node)));
     master.listen(&Filters::Only(ids.collect()))?;
-    let begun = master.now();
-    let end = duration.map_or(Mono::at(Duration::MAX), |duration| begun + duration);
-    let (mut came, mut samples) = (false, Vec::new());
-    let mut next = end.min(begun + PATIENCE);
-    loop {
-        let flow = match master.next(next)? {
-            Happening::Frame(received) => {
-                let (at, id) = (received.at, received.frame.id());
-                samples.clear();
-                match (decoder.decode(&received, &mut samples), numbers.get(&id)) {
-                    (Decoded::Tpdo(node), Some(&number)) => {
-                        came = true;
-                        tell(&Line::Pdo { at, node, number, samples: &samples, sources: decoder.sources() })
-                    }
-                    (Decoded::WrongLength(node), Some(&number)) => {
-                        came = true;
-                        tell(&Line::WrongLength { at, node, number, length: received.frame.data().len() })
-                    }
-                    _ => match Life::parse(&received.frame) {
-                        Some((node, Life::BootUp)) if nodes.contains(&node) => tell(&Line::Restarted(node)),
-                        _ => ControlFlow::Continue(()),
-                    },
+    let start = master.now();
+    let end = duration.map_or(Mono::at(Duration::MAX), |duration| start + duration);
+    let next = end.min(start + FIRST_TPDO_TIMEOUT);
+    let samples = Vec::new();
+    let mut watcher = Watcher { nodes, decoder, numbers, samples, end, next, has_received: false, on_event };
+    run(master, Policy::Record, &mut watcher)
+}
+
+struct Watcher<'a> {
+    nodes: &'a [NodeId],
+    decoder: Decoder,
+    numbers: BTreeMap<CanId, TpdoNumber>,
+    samples: Vec<Sample>,
+    end: Mono,
+    /// The end, or the time to report that nothing was received.
+    next: Mono,
+    has_received: bool,
+    on_event: &'a mut dyn FnMut(&WatchEvent<'_>) -> ControlFlow<()>,
+}
+
+impl Watcher<'_> {
+    fn on_frame(&mut self, received: &Received) -> ControlFlow<()> {
+        let at = received.at;
+        self.samples.clear();
+        let decoded = self.decoder.decode(received, &mut self.samples);
+        match (decoded, self.numbers.get(&received.frame.id())) {
+            (Decoded::Tpdo(node), Some(&number)) => {
+                self.has_received = true;
+                let (samples, sources) = (&self.samples, self.decoder.sources());
+                (self.on_event)(&WatchEvent::Tpdo { at, node, number, samples, sources })
+            }
+            (Decoded::WrongLength(node), Some(&number)) => {
+                self.has_received = true;
+                let length = received.frame.data().len();
+                (self.on_event)(&WatchEvent::WrongLength { at, node, number, length })
+            }
+            _ => match Life::parse(&received.frame) {
+                Some((node, Life::BootUp)) if self.nodes.contains(&node) => {
+                    (self.on_event)(&WatchEvent::Restarted(node))
+                }
+                _ => ControlFlow::Continue(()),
+            },
+        }
+    }
+
+    /// The result at the end.
+    fn result(&self) -> Result<ControlFlow<()>, Failure> {
+        match self.has_received {
+            true => Ok(ControlFlow::Break(())),
+            false => Err(Failure::general(PdoFailure::NothingReceived { nodes: self.nodes.to_vec() })),
+        }
+    }
+}
+
+impl Waiter for Watcher<'_> {
+    type Output = ();
+    type Error = Failure;
+
+    fn until(&self) -> Until {
+        Until::Deadline(self.next)
+    }
+
+    fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Failure> {
+        Ok(match event {
+            Happening::Frame(received) => self.on_frame(&received),
+            Happening::Ended => return self.result(),
+            Happening::Deadline if self.next == self.end => return self.result(),
+            Happening::Deadline => {
+                self.next = self.end;
+                match self.has_received {
+                    true => ControlFlow::Continue(()),
+                    false => (self.on_event)(&WatchEvent::NothingYet),
                 }
             }
-            Happening::Ended => return if came { Ok(()) } else { Err(nothing()) },
-            Happening::Deadline if next == end => return if came { Ok(()) } else { Err(nothing()) },
-            Happening::Deadline => {
-                next = end;
-                if came { ControlFlow::Continue(()) } else { tell(&Line::Nothing) }
-            }
-            Happening::Interrupted if came => return Ok(()),
+            Happening::Interrupted if self.has_received => ControlFlow::Break(()),
             Happening::Interrupted => return Err(Error::Interrupted.into()),
             Happening::Link(false) => return Err(BusError::Down(master.bus().name().to_owned()).into()),
             Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {
                 ControlFlow::Continue(())
             }
-        };
-        if flow.is_break() {
-            return Ok(());
-        }
+        })
     }
 }
