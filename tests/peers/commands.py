@@ -16,8 +16,8 @@ ABSENT = 77
 def found(node):
     """The expected result of `scan` for one of the PAIR, without the state."""
     product, name = {10: (1, "python-canopen pressure transmitter"), 11: (2, "python-canopen pressure switch")}[node]
-    return {"node": node, "device_type": "0x00020194", "profile": 404, "vendor": 0x1234, "product": product,
-            "revision": 0x20004, "serial": 1000 + node, "name": name, "device": None}
+    return {"node": node, "device_type": "0x00020194", "profile": 404, "vendor": 0x1234, "vendor_name": None,
+            "product": product, "revision": 0x20004, "serial": 1000 + node, "name": name, "device": None}
 
 
 def scan(cangauge, directory):

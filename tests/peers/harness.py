@@ -75,7 +75,8 @@ class Cangauge:
     def simulator(self, bench, directory, bus=None):
         """Simulated devices in a separate process, connected to the interface like any program."""
         with self.running("sim", bench, directory=directory, bus=bus) as simulator:
-            wait_for(lambda: "simulating" in simulator.text("err"), lambda: f"no simulator: {simulator.text('err')}")
+            wait_for(lambda: "simulation is running" in simulator.text("err"),
+                     lambda: f"no simulator: {simulator.text('err')}")
             yield simulator
 
 

@@ -19,7 +19,7 @@ impl Simulation {
             .unwrap();
         let mut line = String::new();
         BufReader::new(child.stderr.take().unwrap()).read_line(&mut line).unwrap();
-        assert!(line.contains("simulating"), "{line}");
+        assert!(line.contains("simulation is running"), "{line}");
         Simulation(child)
     }
 }

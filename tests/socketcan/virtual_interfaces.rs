@@ -15,7 +15,7 @@ fn a_virtual_interface_goes_down_and_up_and_has_no_bit_rate() {
     cangauge(&format!("bus down {name}")).is(0, "", &format!("{name} is down already: nothing was changed\n"));
     let refused = format!(
         "cangauge: {name} is virtual (vcan): it has no bit rate\n\
-         hint: switch it on without one: cangauge bus up {name}\n"
+         hint: bring it up without a bit rate: cangauge bus up {name}\n"
     );
     cangauge(&format!("bus up {name} 250k")).is(5, "", &refused);
     assert_eq!(shown(name)["operstate"], "DOWN", "a rejection changes nothing");
