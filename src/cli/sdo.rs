@@ -14,7 +14,7 @@ use crate::node::write::is_signature;
 use crate::node::{Form, Node, WriteOptions, names};
 use crate::output::failure::ErrorMessage;
 use crate::output::progress::Transfer;
-use crate::output::sdo::ObjectValue;
+use crate::output::sdo::{ObjectValue, ValueForm};
 use crate::output::text;
 use crate::tasks::Failure;
 use crate::tasks::sdo::{encode, find_form, read, write};
@@ -55,9 +55,12 @@ struct ReadArgs {
     /// Decode the bytes as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
     #[arg(long = "type", value_name = "TYPE")]
     data_type: Option<DataType>,
-    /// Print the bytes in wire order
-    #[arg(long)]
+    /// Print a hexadecimal number
+    #[arg(long, conflicts_with = "bytes")]
     hex: bool,
+    /// Print the bytes in wire order: 47 00 00 00
+    #[arg(long)]
+    bytes: bool,
     /// Write the bytes to a file; - for stdout
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -158,6 +161,14 @@ fn resolve(node: &mut Node, master: &mut Master<'_>, object: &ObjectArg) -> Resu
 }
 
 impl ReadArgs {
+    fn form(&self) -> ValueForm {
+        match (self.hex, self.bytes) {
+            (true, _) => ValueForm::Hexadecimal,
+            (_, true) => ValueForm::Bytes,
+            _ => ValueForm::Usual,
+        }
+    }
+
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         if self.output.is_some() && self.objects.len() > 1 {
             return Err(ErrorMessage::usage("--output takes one object").into());
@@ -183,7 +194,7 @@ impl ReadArgs {
                     None if to_stdout => io::stdout().write_all(&read.raw).map_err(stdout)?,
                     None => {
                         let (typed, is_single) = (object.to_string(), self.objects.len() == 1);
-                        values.push(ObjectValue { read, typed, is_single, as_bytes: self.hex });
+                        values.push(ObjectValue { read, typed, is_single, form: self.form() });
                     }
                 }
             }

@@ -2,6 +2,7 @@
 
 use super::report::{Cell, Column, Report};
 use super::text;
+use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::tasks::sdo::ReadValue;
 use std::io::{self, Write};
@@ -15,8 +16,42 @@ pub struct ObjectValue {
     pub typed: String,
     /// Whether it is the only object that the user asked for: people then get the bare value.
     pub is_single: bool,
-    /// Whether people see the bytes in wire order instead of the value.
-    pub as_bytes: bool,
+    /// The form in which people see the value.
+    pub form: ValueForm,
+}
+
+/// The form of a value for people.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ValueForm {
+    /// By its type; COB-IDs, mapping entries and unit codes are hexadecimal numbers, as manuals print them.
+    #[default]
+    Usual,
+    /// A hexadecimal number: it can be written back.
+    Hexadecimal,
+    /// The bytes in wire order: `47 00 00 00`.
+    Bytes,
+}
+
+/// The bytes in wire order with blanks between them.
+fn spaced(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<String>>().join(" ")
+}
+
+/// The bytes of a number as a hexadecimal number with all its digits. `None` for more than eight bytes.
+fn hexadecimal(bytes: &[u8]) -> Option<String> {
+    let digits: String = bytes.iter().rev().map(|byte| format!("{byte:02X}")).collect();
+    (1..=8).contains(&bytes.len()).then(|| format!("0x{digits}"))
+}
+
+/// Whether manuals print the values of an object in hexadecimal: COB-IDs, mapping entries, unit codes.
+fn is_usually_hexadecimal(object: ObjectId) -> bool {
+    match object.index {
+        0x1005 | 0x1012 | 0x1014 => object.sub == 0,
+        0x1200..=0x12ff => matches!(object.sub, 1 | 2),
+        0x1400..=0x15ff | 0x1800..=0x19ff => object.sub == 1,
+        0x1600..=0x17ff | 0x1a00..=0x1bff | 0x6131 => object.sub > 0,
+        _ => false,
+    }
 }
 
 impl ObjectValue {
@@ -27,9 +62,17 @@ impl ObjectValue {
     /// The value for people.
     fn shown(&self) -> String {
         match &self.read.value {
-            _ if self.as_bytes => self.raw(),
+            _ if self.form == ValueForm::Bytes => spaced(&self.read.raw),
+            // Text is no number: its bytes.
+            Value::Text(_) if self.form == ValueForm::Hexadecimal => spaced(&self.read.raw),
+            _ if self.form == ValueForm::Hexadecimal => {
+                hexadecimal(&self.read.raw).unwrap_or_else(|| spaced(&self.read.raw))
+            }
             Value::Text(text) => text::safe(text),
-            Value::Bytes(_) => self.raw(),
+            Value::Bytes(bytes) => spaced(bytes),
+            Value::Unsigned(_) if is_usually_hexadecimal(self.read.object) => {
+                hexadecimal(&self.read.raw).unwrap_or_default()
+            }
             value => value.to_string(),
         }
     }

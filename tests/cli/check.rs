@@ -191,7 +191,7 @@ fn missing_data_is_no_success() {
     let done = check(&bench, &["5,9", "pressure < 1", "|5.pressure - 9.pressure| < 1"]).exit(1);
     let words: Vec<&str> = done.stdout.lines().map(|line| &line[..6]).collect();
     assert_eq!(words, ["FAIL  ", "none  ", "none  "], "{}", done.stdout);
-    let done = check(&bench, &["5", "pressure < 3", "0x5000:1 < 3"]).exit(4);
+    let done = check(&bench, &["5", "pressure < 3", "0x5000:1/u8 < 3"]).exit(4);
     assert!(done.stdout.ends_with("(0x06020000, the object does not exist)\n"), "{}", done.stdout);
     // A TPDO that waits for SYNC.
     let done = check(&bench, &["5", "pressure < 3", "--for", "1s"]).exit(3);

@@ -192,3 +192,16 @@ fn who_has_it_not_is_excused_where_everybody_was_asked() {
     Bench::of("mh4@1,mc1609@3").run("read 1,3 pressure").exit(7);
     Bench::of("mh4@1,mc1609@3").run("read all humidity").exit(2);
 }
+
+#[test]
+fn user_can_state_the_type_of_an_object() {
+    let bench = Bench::of("mh4@1");
+    bench.run("read 1 0x1008/i16").fails(
+        6,
+        "cangauge: node 1: read 0x1008:0: the device delivered 8 bytes, but i16 has 2\nhint: show its bytes: cangauge \
+         sdo read 1 0x1008:0 --type hex\n",
+    );
+    bench.run("read 1 0x7130:1/u16").exit(0);
+    bench.run("read 1 0x6130:1/vs").exit(2);
+    bench.run("check 1 0x1017:0/u16<1").exit(0);
+}

@@ -60,7 +60,9 @@ fn asked(objects: &[(u16, u8, Option<u32>)]) -> String {
 #[test]
 fn each_channel_is_learned_with_its_own_digits_and_none_is_guessed() {
     let bench = Bench::of("mh4@1");
+    // Without the profile the types would be unknown.
     let mut objects = vec![
+        (0x1000, 0, Some(0x0002_0194)),
         (0x1800, 1, Some(0x185)),
         (0x1a00, 0, Some(2)),
         (0x1a00, 1, Some(0x9130_0120)),
@@ -80,7 +82,7 @@ fn each_channel_is_learned_with_its_own_digits_and_none_is_guessed() {
     let rows: Vec<&str> = done.stdout.lines().skip(1).map(|row| row.splitn(4, ',').last().unwrap_or(row)).collect();
     assert_eq!(rows, ["ch1,1.234,bar,,0xD2040000", "ch2,-567.8,degC,,0xD2E9FFFF"]);
     // Who has no such object has no digits.
-    objects[7].2 = None;
+    objects[8].2 = None;
     let done = log(&objects).exit(0);
     assert!(done.stdout.ends_with("ch2,-5678,degC,,0xD2E9FFFF\n"), "{}", done.stdout);
 }

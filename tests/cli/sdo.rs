@@ -44,8 +44,15 @@ fn json() {
 #[test]
 fn the_type_can_be_said() {
     let bench = Bench::of(ALL);
-    bench.run("sdo read 1 0x1018:1 --hex").prints("0x47000000\n");
-    bench.run("sdo read 1 0x1018:1 --type hex").prints("0x47000000\n");
+    bench.run("sdo read 1 0x1018:1 --hex").prints("0x00000047\n");
+    bench.run("sdo read 1 0x1018:1 --bytes").prints("47 00 00 00\n");
+    bench.run("sdo read 1 0x1018:1 --type hex").prints("47 00 00 00\n");
+    bench.run("sdo read 1 0x1008 --hex").prints("4D 48 2D 34 2D 43 41 4E\n");
+    bench.run("sdo read 1 0x1017 --hex").prints("0x0000\n");
+    // COB-IDs, mapping entries and unit codes are hexadecimal as in the manuals.
+    bench.run("sdo read 1 0x1800:1").prints("0x40000181\n");
+    bench.run("sdo read 1 0x1A00:1").prints("0x61300120\n");
+    bench.run("sdo read 1 0x6131:1").prints("0x004E0000\n");
     bench.run("sdo read 1 0x1018:1 --type i32").prints("71\n");
     // A value that is wider than the type, the rest not zero: both widths are named.
     bench.run("sdo read 1 0x1008 --type u8").fails(
