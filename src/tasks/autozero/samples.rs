@@ -58,11 +58,17 @@ impl Samples {
         let mut answers = master.transfer(requests(target), &mut |received| self.watch(node, received))?.into_iter();
         let Some(value) = answers.next() else { return Ok(()) };
         let sample = sample(target, value, answers.next())?;
-        let bad = sample.status.filter(|status| *status != Status::Ok);
+        // Without a status object, an overload comes only from the span: a large zero error shows the same.
+        let from_span = |status| target.status.is_none() && sample.value.is_some() && is_overload(status);
+        let bad = sample.status.filter(|&status| status != Status::Ok && !from_span(status));
         self.bad = self.bad.or(bad).or_else(|| sample.value.is_none().then_some(Status::Invalid));
         self.statistics.add(sample.value.map(|value| value.as_f64()), sample.at.mono.since_start());
         Ok(())
     }
+}
+
+fn is_overload(status: Status) -> bool {
+    matches!(status, Status::OverloadHigh | Status::OverloadLow)
 }
 
 /// Reads a signal `count` times. A pause before each reading makes sure that it is new.
