@@ -413,7 +413,7 @@ _cangauge() {
 
     case "${cmd}" in
         cangauge)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version scan ls read nmt sdo log check lss info status unit filter limits minmax errors bus pdo autozero zero store restore sim completions help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version scan ls read nmt sdo log check lss info status unit filter limits minmax errors bus pdo autozero zero store restore sim completions help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 1 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -475,7 +475,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__autozero)
-            opts="-b -t -f -q -v -h -V --channel --limit --samples --force --store --dry-run --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --channel --limit --samples --force --store --dry-run --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -549,7 +549,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__bus)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version list up down detect help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version list up down detect help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -611,7 +611,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__bus__subcmd__detect)
-            opts="-b -t -f -q -v -h -V --active --for --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --active --for --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -677,7 +677,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__bus__subcmd__down)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -823,7 +823,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__bus__subcmd__list)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -885,7 +885,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__bus__subcmd__up)
-            opts="-b -t -f -q -v -h -V --listen-only --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --listen-only --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -947,7 +947,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__check)
-            opts="-b -t -f -q -v -h -V --for --sync --poll --junit --force --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --for --sync --poll --junit --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1025,7 +1025,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__completions)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version bash elvish fish powershell zsh"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version bash elvish fish powershell zsh"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1087,7 +1087,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__errors)
-            opts="-b -t -f -q -v -h -V --clear --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --clear --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1149,7 +1149,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__filter)
-            opts="-b -t -f -q -v -h -V --type --constant --damping --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --type --constant --damping --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1881,7 +1881,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__info)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1943,7 +1943,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__limits)
-            opts="-b -t -f -q -v -h -V --delta --lower --upper --hysteresis --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --delta --lower --upper --hysteresis --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2021,7 +2021,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__log)
-            opts="-d -n -o -b -t -f -q -v -h -V --duration --count --sync --poll --passive --no-nmt --max-gap --expect --output --force --append --layout --rotate --events --summary --delimiter --decimal --bom --time --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-d -n -o -b -t -f -q -v -h -V --duration --count --sync --poll --passive --no-nmt --max-gap --expect --output --force --append --layout --rotate --events --summary --delimiter --decimal --bom --time --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2151,7 +2151,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version scan inquire set-id set-bitrate set activate store identify help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version scan inquire set-id set-bitrate set activate store identify help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2213,7 +2213,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__activate)
-            opts="-b -t -f -q -v -h -V --force --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2415,7 +2415,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__identify)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2477,7 +2477,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__inquire)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2539,7 +2539,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__scan)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2601,7 +2601,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__set)
-            opts="-b -t -f -q -v -h -V --id --bitrate --table-index --retime --no-store --via --force --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --id --bitrate --table-index --retime --no-store --via --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2679,7 +2679,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__set__subcmd__bitrate)
-            opts="-b -t -f -q -v -h -V --table-index --retime --no-store --via --force --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --table-index --retime --no-store --via --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2749,7 +2749,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__set__subcmd__id)
-            opts="-b -t -f -q -v -h -V --no-store --via --force --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --no-store --via --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2815,7 +2815,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__store)
-            opts="-b -t -f -q -v -h -V --force --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2877,7 +2877,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__minmax)
-            opts="-b -t -f -q -v -h -V --reset --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --reset --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2939,7 +2939,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version start stop preop reset reset-comm state watch startup help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version start stop preop reset reset-comm state watch startup help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3141,7 +3141,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__preop)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3203,7 +3203,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__reset)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3265,7 +3265,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__reset__subcmd__comm)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3327,7 +3327,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__start)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3389,7 +3389,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__startup)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version wait auto"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version wait auto"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3451,7 +3451,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__state)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --probe --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --probe --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3513,7 +3513,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__stop)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3575,7 +3575,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__watch)
-            opts="-b -t -f -q -v -d -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --duration --help --version"
+            opts="-b -t -f -q -v -d -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --duration --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3645,7 +3645,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__pdo)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version show map watch help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version show map watch help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3777,7 +3777,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__pdo__subcmd__map)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --transmission --event-timer --inhibit --cob-id --store --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --transmission --event-timer --inhibit --cob-id --store --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3855,7 +3855,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__pdo__subcmd__show)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3917,7 +3917,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__pdo__subcmd__watch)
-            opts="-b -t -f -q -v -d -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --duration --help --version"
+            opts="-b -t -f -q -v -d -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --duration --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3987,7 +3987,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__read)
-            opts="-b -t -f -q -v -h -V --in --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --in --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4053,7 +4053,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__restore)
-            opts="-b -t -f -q -v -h -V --group --reset --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --group --reset --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4119,7 +4119,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__scan)
-            opts="-b -t -f -q -v -h -V --passive --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --passive --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4181,7 +4181,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version read write help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version read write help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4299,7 +4299,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo__subcmd__read)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --type --hex --output --force --block --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --type --hex --output --force --block --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4373,7 +4373,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo__subcmd__write)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --type --sdo-size --verify --input --block --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --type --sdo-size --verify --input --block --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4451,7 +4451,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sim)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4513,7 +4513,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__store)
-            opts="-b -t -f -q -v -h -V --group --verify --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --group --verify --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4579,7 +4579,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__unit)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0

@@ -1,6 +1,6 @@
 # Print an optspec for argparse to handle cmd's options that are independent of any subcommand.
 function __fish_cangauge_global_optspecs
-    string join \n b/bus= t/timeout= retries= device= eds= f/format= trace= ignore-lock q/quiet v/verbose progress= color= h/help V/version
+    string join \n b/bus= t/timeout= retries= device= eds= accept-mismatch f/format= trace= ignore-lock q/quiet v/verbose progress= color= h/help V/version
 end
 
 function __fish_cangauge_needs_command
@@ -39,6 +39,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_needs_command" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_needs_command" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_needs_command" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_needs_command" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_needs_command" -s v -l verbose -d 'Print more on stderr'
@@ -84,6 +85,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l color -d 'Use
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l passive -d 'Send nothing: list the nodes that send something within 3 s'
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s v -l verbose -d 'Print more on stderr'
@@ -105,6 +107,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l color -d 'Use c
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l passive -d 'Send nothing: list the nodes that send something within 3 s'
+complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s v -l verbose -d 'Print more on stderr'
@@ -126,6 +129,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s v -l verbose -d 'Print more on stderr'
@@ -146,6 +150,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s v -l verbose -d 'Print more on stderr'
@@ -175,6 +180,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s v -l verbose -d 'Print more on stderr'
@@ -197,6 +203,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s v -l verbose -d 'Print more on stderr'
@@ -219,6 +226,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s v -l verbose -d 'Print more on stderr'
@@ -241,6 +249,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s v -l verbose -d 'Print more on stderr'
@@ -263,6 +272,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s v -l verbose -d 'Print more on stderr'
@@ -285,6 +295,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s v -l verbose -d 'Print more on stderr'
@@ -307,6 +318,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s d -l duration -d 'End after this time' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s v -l verbose -d 'Print more on stderr'
@@ -327,6 +339,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s v -l verbose -d 'Print more on stderr'
@@ -356,6 +369,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s v -l verbose -d 'Print more on stderr'
@@ -384,6 +398,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l block -d 'When to use block transfer: auto for long objects if the device supports it' -r -f -a "always\t'For every object'
 never\t'Never'
 auto\t'For long objects'"
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s v -l verbose -d 'Print more on stderr'
@@ -414,6 +429,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l block -d 'When to use block transfer: auto for long objects if the device supports it' -r -f -a "always\t'For every object'
 never\t'Never'
 auto\t'For long objects'"
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s v -l verbose -d 'Print more on stderr'
@@ -460,6 +476,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l no-nmt -d 'Do 
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Overwrite existing files'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l append -d 'Continue existing files with the same columns. A last line that was cut off is removed'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l bom -d 'Start CSV with a byte order mark, which some spreadsheets need'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s v -l verbose -d 'Print more on stderr'
@@ -485,6 +502,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l color -d 'Us
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l force -d 'Overwrite an existing file'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s v -l verbose -d 'Print more on stderr'
@@ -505,6 +523,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s v -l verbose -d 'Print more on stderr'
@@ -534,6 +553,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s v -l verbose -d 'Print more on stderr'
@@ -554,6 +574,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s v -l verbose -d 'Print more on stderr'
@@ -579,6 +600,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l no-store -d 'Do not store: a power cycle restores the old values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l force -d 'Accept more than one device for "only": all of them change'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s v -l verbose -d 'Print more on stderr'
@@ -606,6 +628,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l retime -d 'Switch the host interface as well; store after the device responds at the new bit rate. Requires that the device is the only one on the bus'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l no-store -d 'Do not store: a power cycle restores the old values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l force -d 'Accept more than one device for "only": all of them change'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s v -l verbose -d 'Print more on stderr'
@@ -635,6 +658,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l retime -d 'Switch the host interface as well; store after the device responds at the new bit rate. Requires that the device is the only one on the bus'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l no-store -d 'Do not store: a power cycle restores the old values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l force -d 'Accept more than one device for "only": all of them change'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s v -l verbose -d 'Print more on stderr'
@@ -656,6 +680,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l force -d 'Accept more than one device for "only"'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s v -l verbose -d 'Print more on stderr'
@@ -677,6 +702,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l force -d 'Accept more than one device for "only"'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s v -l verbose -d 'Print more on stderr'
@@ -697,6 +723,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s v -l verbose -d 'Print more on stderr'
@@ -726,6 +753,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s v -l verbose -d 'Print more on stderr'
@@ -746,6 +774,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s v -l verbose -d 'Print more on stderr'
@@ -766,6 +795,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s v -l verbose -d 'Print more on stderr'
@@ -791,6 +821,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s v -l verbose -d 'Print more on stderr'
@@ -815,6 +846,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s v -l verbose -d 'Print more on stderr'
@@ -836,6 +868,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l color -d 'U
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l reset -d 'Reset, and print the previous values'
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s v -l verbose -d 'Print more on stderr'
@@ -857,6 +890,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l color -d 'U
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l clear -d 'Delete the history; a pending error stays in the register'
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s v -l verbose -d 'Print more on stderr'
@@ -877,6 +911,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s v -l verbose -d 'Print more on stderr'
@@ -902,6 +937,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s v -l verbose -d 'Print more on stderr'
@@ -923,6 +959,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l listen-only -d 'Listen only: send no frame, no acknowledge and no error flag'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s v -l verbose -d 'Print more on stderr'
@@ -943,6 +980,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s v -l verbose -d 'Print more on stderr'
@@ -965,6 +1003,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l active -d 'If nothing is received, ask each node-ID for its device type at each bit rate. Only for a bench with one device: at a wrong bit rate this disturbs every frame on the bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s v -l verbose -d 'Print more on stderr'
@@ -990,6 +1029,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s v -l verbose -d 'Print more on stderr'
@@ -1014,6 +1054,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s v -l verbose -d 'Print more on stderr'
@@ -1038,6 +1079,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l event-timer -d 'Event timer, in whole milliseconds; 0: off' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l inhibit -d 'Inhibit time: shortest time between two transmissions, in steps of 100us; 0: none' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l cob-id -d 'CAN identifier, 11 bits: 0x1A5' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s v -l verbose -d 'Print more on stderr'
@@ -1060,6 +1102,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s d -l duration -d 'End after this time' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s v -l verbose -d 'Print more on stderr'
@@ -1090,6 +1133,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l force -d 'Skip the safety checks'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l store -d 'Store the offset, with the other application settings'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l dry-run -d 'Measure and check only; change nothing'
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s v -l verbose -d 'Print more on stderr'
@@ -1116,6 +1160,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l force -d 'Skip the safety checks'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l store -d 'Store the offset, with the other application settings'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l dry-run -d 'Measure and check only; change nothing'
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s v -l verbose -d 'Print more on stderr'
@@ -1140,6 +1185,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l color -d 'Us
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l verify -d 'Reset the node, read the stored settings again, and compare'
+complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s v -l verbose -d 'Print more on stderr'
@@ -1164,6 +1210,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l color -d '
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l reset -d 'Reset the node, and compare with its description'
+complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s v -l verbose -d 'Print more on stderr'
@@ -1184,6 +1231,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s v -l verbose -d 'Print more on stderr'
@@ -1204,6 +1252,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s v -l verbose -d 'Print more on stderr'

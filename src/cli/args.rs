@@ -110,22 +110,25 @@ impl FromStr for SignalArg {
         {
             return Ok(SignalArg(Wanted::Status(name.to_owned())));
         }
-        // `ch1` reads as a name, `6130:1` as an object; hexadecimal words without a digit in front are names.
+        // `6130:1` is an object; a hexadecimal word that starts with a letter, such as `face`, is a name.
         if text.starts_with(|first: char| first.is_ascii_digit()) {
             let (object, stated) = match text.split_once('/') {
-                Some((object, stated)) => {
+                Some((object, stated)) if object.parse::<ObjectId>().is_ok() => {
                     (object, Some(stated.parse::<DataType>().map_err(|error| error.to_string())?))
                 }
-                None => (text, None),
+                _ => (text, None),
             };
             if let Some(stated) = stated.filter(|stated| !stated.is_number()) {
                 return Err(format!("\"{text}\": {stated} is not a type of numbers (i16, u32, r32)"));
             }
-            let object = object.parse::<ObjectId>().map_err(|error| error.to_string())?;
-            return Ok(SignalArg(Wanted::Object(object, stated)));
+            match object.parse::<ObjectId>() {
+                Ok(object) => return Ok(SignalArg(Wanted::Object(object, stated))),
+                Err(error) if stated.is_some() || is_like_address(text) => return Err(error.to_string()),
+                Err(_) => {}
+            }
         }
-        if is_name(text) {
-            return Ok(SignalArg(Wanted::Signal(text.to_owned())));
+        if !text.trim().is_empty() {
+            return Ok(SignalArg(Wanted::Signal(text.trim().to_owned())));
         }
         Err(format!("\"{text}\" is neither a signal (pressure, temperature, ch1) nor an object (0x6130:1)"))
     }
@@ -134,6 +137,12 @@ impl FromStr for SignalArg {
 fn is_name(text: &str) -> bool {
     text.starts_with(|first: char| first.is_ascii_alphabetic())
         && text.chars().all(|character| character.is_ascii_alphanumeric() || character == '-' || character == '_')
+}
+
+/// Whether a text that is not an address was meant as one: `12345`, `6130:300`.
+fn is_like_address(text: &str) -> bool {
+    let is_part = |character: char| character.is_ascii_hexdigit() || "xXhH:.".contains(character);
+    text.starts_with(|first: char| first.is_ascii_digit()) && text.chars().all(is_part)
 }
 
 /// An object by address or by name.
@@ -152,9 +161,8 @@ impl FromStr for ObjectArg {
         if let Ok(object) = text.parse() {
             return Ok(ObjectArg::Address(object));
         }
-        let (name, sub) = text.split_once(':').unwrap_or((text, "0"));
-        if name.contains('-') && is_name(name) && sub.parse::<u8>().is_ok() {
-            return Ok(ObjectArg::Name(text.to_ascii_lowercase()));
+        if !text.trim().is_empty() && !is_like_address(text) {
+            return Ok(ObjectArg::Name(text.trim().to_owned()));
         }
         Err(format!("\"{text}\" is neither an object (0x1018:1) nor a name (vendor-id, ai-input-pv:1)"))
     }
@@ -287,13 +295,19 @@ mod tests {
         assert_eq!(signal("pressure.status"), Ok(Wanted::Status("pressure".into())));
         assert_eq!(signal("ch16"), Ok(Wanted::Signal("ch16".into())));
         assert_eq!(signal("6130:1"), Ok(Wanted::Object(ObjectId::new(0x6130, 1), None)));
-        assert!(signal("6130:300").is_err() && signal("").is_err() && signal("pressure.x").is_err());
+        assert!(signal("6130:300").is_err() && signal("").is_err() && signal("12345").is_err());
 
         let object = |text: &str| text.parse::<ObjectArg>();
         assert_eq!(object("1018:1"), Ok(ObjectArg::Address(ObjectId::new(0x1018, 1))));
-        assert_eq!(object("Vendor-ID"), Ok(ObjectArg::Name("vendor-id".into())));
+        assert_eq!(object("Vendor-ID"), Ok(ObjectArg::Name("Vendor-ID".into())));
         assert_eq!(object("ai-input-pv:1"), Ok(ObjectArg::Name("ai-input-pv:1".into())));
-        assert!(object("vendor id").is_err() && object("ai-input-pv:300").is_err() && object("12345").is_err());
+        for name in
+            ["offset", "Position Value", "4-20-ma-input", "1-transmit-pdo-parameter:2", "\u{fc}berdruck", "4. value"]
+        {
+            assert_eq!(object(name), Ok(ObjectArg::Name(name.into())), "{name}");
+            assert_eq!(signal(name), Ok(Wanted::Signal(name.into())), "{name}");
+        }
+        assert!(object("").is_err() && object("6130:300").is_err() && object("12345").is_err());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::args::{BusSpec, Duration, Nodes};
 use super::file::OutFile;
 use super::recording::{print_event, refuse_to_send, sync_interval};
-use super::{Global, open};
+use super::{Global, descriptions, open};
 use crate::bus::Stamp;
 use crate::bus::claim::{Claim, Claims};
 use crate::canopen::id::NodeId;
@@ -127,7 +127,7 @@ impl Check {
             };
             let mode = if live { self.mode() } else { Mode::Passive };
             let options = CheckOptions {
-                overrides: open::overrides(global, &nodes)?,
+                overrides: descriptions::overrides_on(master, global, &nodes)?,
                 nodes,
                 skip_unsupported: self.nodes == Nodes::All,
                 expressions: self.expressions.clone(),

@@ -3,7 +3,7 @@
 use super::Global;
 use super::args::Nodes;
 use super::exit::several;
-use super::open;
+use super::{descriptions, open};
 use crate::canopen::id::NodeId;
 use crate::master::Master;
 use crate::node::Overrides;
@@ -26,7 +26,7 @@ pub(super) fn each<T>(
 ) -> anyhow::Result<Each<T>> {
     global.with_master(|master| {
         let nodes = open::nodes(master, global, nodes)?;
-        let overrides = open::overrides(global, &nodes)?;
+        let overrides = descriptions::overrides_on(master, global, &nodes)?;
         let mut each = Each { asked: nodes.len(), done: Vec::new(), failures: Vec::new() };
         for &node in &nodes {
             let result = master.listen_to(&[node]).map_err(Failure::from).and_then(|()| work(master, node, &overrides));

@@ -1,6 +1,6 @@
 //! `cangauge errors`.
 
-use super::{Global, open};
+use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::errors::{ErrorReport, clear, read};
@@ -27,7 +27,7 @@ impl Errors {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let overrides = open::overrides(global, &[self.node])?;
+        let overrides = descriptions::overrides(global, &[self.node])?;
         let report = global.with_master(|master| {
             let node = open_node(master, self.node, &overrides)?;
             let (errors, cleared) = if self.clear {

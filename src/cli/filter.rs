@@ -1,7 +1,7 @@
 //! `cangauge filter`.
 
 use super::args::Duration;
-use super::{Global, open};
+use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::notes;
@@ -57,7 +57,7 @@ impl Filter {
             constant: self.constant,
             damping: self.damping.map(|damping| damping.0),
         };
-        let overrides = open::overrides(global, &[self.node])?;
+        let overrides = descriptions::overrides(global, &[self.node])?;
         let signal = self.signal.as_deref();
         if wanted == FilterRequest::default() {
             let filters = global.with_master(|master| {

@@ -1,6 +1,6 @@
 //! `cangauge info`.
 
-use super::{Global, open};
+use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::info::read;
@@ -26,7 +26,7 @@ impl Info {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let overrides = open::overrides(global, &[self.node])?;
+        let overrides = descriptions::overrides(global, &[self.node])?;
         let page = global.with_master(|master| {
             let node = open_node(master, self.node, &overrides)?;
             Ok(read(master, &node)?)

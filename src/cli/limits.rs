@@ -1,6 +1,6 @@
 //! `cangauge limits`.
 
-use super::{Global, open};
+use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::failure::ErrorMessage;
@@ -57,7 +57,7 @@ impl Limits {
                 return Err(ErrorMessage::usage(message).into());
             }
         }
-        let overrides = open::overrides(global, &[self.node])?;
+        let overrides = descriptions::overrides(global, &[self.node])?;
         let report = global.with_master(|master| {
             let node = open_node(master, self.node, &overrides)?;
             Ok(match wanted.is_empty() {

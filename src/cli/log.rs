@@ -6,9 +6,10 @@ mod recorder;
 
 use super::args::{Duration, Nodes, SignalArg};
 use super::recording::{print_verdicts, refuse_to_send, sync_interval};
-use super::{Global, When, open};
+use super::{Global, When, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
+use crate::master::Master;
 use crate::measure::decode::Wanted;
 use crate::measure::expression::Expression;
 use crate::output::console::Console;
@@ -127,7 +128,7 @@ impl Log {
                 (Nodes::All, true) => NodeId::all().collect(),
                 _ => open::nodes(master, global, &self.nodes)?,
             };
-            let options = self.options(global, nodes, is_live)?;
+            let options = self.options(master, global, nodes, is_live)?;
             let waits = master.bus().waits();
             let mut recorder =
                 Recorder::new(files.rows(waits)?, files.rows_name(), files.events(waits)?, progress, console);
@@ -165,9 +166,15 @@ impl Log {
         Ok(finished)
     }
 
-    fn options(&self, global: &Global, nodes: Vec<NodeId>, is_live: bool) -> anyhow::Result<LogOptions> {
+    fn options(
+        &self,
+        master: &mut Master<'_>,
+        global: &Global,
+        nodes: Vec<NodeId>,
+        is_live: bool,
+    ) -> anyhow::Result<LogOptions> {
         Ok(LogOptions {
-            overrides: open::overrides(global, &nodes)?,
+            overrides: descriptions::overrides_on(master, global, &nodes)?,
             nodes,
             wanted: self.signals.iter().map(|signal| signal.0.clone()).collect(),
             mode: self.mode(is_live),

@@ -3,7 +3,7 @@
 mod assign;
 
 use super::args::Duration;
-use super::{Global, open};
+use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::catalog::Model;
@@ -130,7 +130,7 @@ struct NamedDescriptions {
 impl NamedDescriptions {
     fn new(global: &Global) -> anyhow::Result<NamedDescriptions> {
         let all: Vec<NodeId> = NodeId::all().collect();
-        let overrides = open::overrides(global, &all)?;
+        let overrides = descriptions::overrides(global, &all)?;
         let named: Vec<NodeId> = global.device.iter().chain(&global.eds).filter_map(|given| given.node).collect();
         // A description that was named for no node is an override of every node that was not named.
         let given = overrides.iter().find(|(node, _)| !named.contains(node)).map(|(_, model)| Arc::clone(model));

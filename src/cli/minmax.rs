@@ -1,6 +1,6 @@
 //! `cangauge minmax`.
 
-use super::{Global, open};
+use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::minmax::{reset, show};
@@ -25,7 +25,7 @@ impl Minmax {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let overrides = open::overrides(global, &[self.node])?;
+        let overrides = descriptions::overrides(global, &[self.node])?;
         let report = global.with_master(|master| {
             let node = open_node(master, self.node, &overrides)?;
             let report = if self.reset { reset(master, &node) } else { show(master, &node) };

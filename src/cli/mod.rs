@@ -5,6 +5,7 @@ mod autozero;
 mod bus;
 mod check;
 mod completions;
+mod descriptions;
 mod each;
 mod errors;
 pub mod exit;
@@ -28,6 +29,7 @@ mod store;
 mod unit;
 
 use crate::bus::claim::{Claim, Claims};
+use crate::canopen::id::NodeId;
 use crate::master::{Master, Timing};
 use crate::output::console::Console;
 pub(crate) use crate::output::report::Format;
@@ -35,7 +37,9 @@ use crate::output::report::{Report, Stream, render};
 use anstream::ColorChoice;
 use args::{BusSpec, Duration, Override};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use descriptions::Named;
 use exit::IntoFailure;
+use std::cell::RefCell;
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
@@ -99,6 +103,10 @@ pub struct Global {
     #[arg(long, global = true, value_name = "[NODE=]FILE")]
     pub(crate) eds: Vec<Override>,
 
+    /// Use a description or EDS of another device (its vendor or product differs)
+    #[arg(long, global = true)]
+    pub(crate) accept_mismatch: bool,
+
     /// Output format: text, JSON Lines or CSV; for log, text means csv
     #[arg(short, long, global = true, value_name = "FORM", default_value = "text")]
     pub(crate) format: Format,
@@ -130,6 +138,14 @@ pub struct Global {
     /// The nodes that the command keeps other cangauges from using.
     #[arg(skip)]
     pub(crate) claim: Claim,
+
+    /// Whether the command only reads: a description of another device is then a warning.
+    #[arg(skip)]
+    pub(crate) only_reads: bool,
+
+    /// Descriptions that are yet to be compared with the devices of these nodes.
+    #[arg(skip)]
+    pub(crate) pending: RefCell<Option<(Vec<Named>, Vec<NodeId>)>>,
 }
 
 // No doc comments on the variants: clap would spread each over lines of its own in every help text.
@@ -197,6 +213,17 @@ commands! {
     Restore(store::Restore): "restore";
     Sim(sim::Sim): "sim";
     Completions(completions::Completions): "completions";
+}
+
+impl Command {
+    /// Whether the command only reads objects.
+    fn only_reads(&self) -> bool {
+        match self {
+            Command::Scan(_) | Command::Read(_) | Command::Info(_) => true,
+            Command::Sdo(sdo) => sdo.only_reads(),
+            _ => false,
+        }
+    }
 }
 
 /// Adds the arguments of a command.
@@ -269,7 +296,7 @@ impl Global {
         let mut claims = open::claim(self, &spec)?;
         let mut bus = open::open_as(self, &spec, false)?;
         let mut master = Master::new(&mut *bus, self.timing(Timing::default().timeout));
-        let result = work(&mut master, &mut claims);
+        let result = descriptions::check_pending(&mut master, self).and_then(|()| work(&mut master, &mut claims));
         // The last frames of a command are still sent: an abort, an NMT state to restore.
         master.settle();
         let finished = bus.finish().or_fail();
@@ -284,7 +311,7 @@ impl Global {
 /// # Errors
 /// Why the command failed; [`exit::report`] turns it into text and an exit code.
 pub fn run(cli: &Cli) -> anyhow::Result<()> {
-    let global = Global { claim: cli.command.claim(), ..cli.global.clone() };
+    let global = Global { claim: cli.command.claim(), only_reads: cli.command.only_reads(), ..cli.global.clone() };
     cli.command.run(&global)
 }
 

@@ -2,7 +2,7 @@
 
 use super::args::{Duration, Nodes};
 use super::exit::{IntoFailure, several, stdout};
-use super::{Global, open};
+use super::{Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtCommand;
@@ -197,7 +197,7 @@ fn probe_unknown(master: &mut Master<'_>, global: &Global, reports: &mut [StateR
     let is_unknown = |report: &&mut StateReport| report.is_present && report.by == Proof::None;
     let mut unknown: Vec<&mut StateReport> = reports.iter_mut().filter(is_unknown).collect();
     let ids: Vec<NodeId> = unknown.iter().map(|report| report.node).collect();
-    let overrides = open::overrides(global, &ids)?;
+    let overrides = descriptions::overrides(global, &ids)?;
     let nodes = identify_each(master, &ids, &overrides).or_fail()?;
     for (report, node) in unknown.iter_mut().zip(nodes) {
         let node = node.unwrap_or_else(|_| Node::new(report.node));
@@ -237,7 +237,7 @@ impl WatchArgs {
 
 impl StartupArgs {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let overrides = open::overrides(global, &[self.node])?;
+        let overrides = descriptions::overrides(global, &[self.node])?;
         let set = self.set.map(|mode| match mode {
             StartupMode::Wait => Starts::Wait,
             StartupMode::Auto => Starts::Auto,

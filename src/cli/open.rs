@@ -10,18 +10,15 @@ use crate::bus::memory::MemoryBus;
 use crate::bus::replay::{Replay, ReplayNote};
 use crate::bus::trace::Traced;
 use crate::canopen::id::NodeId;
-use crate::device::catalog::{self, Model};
-use crate::device::eds;
 use crate::master::Master;
-use crate::node::{Overrides, targets};
+use crate::node::targets;
 use crate::output;
 use crate::sim::{Bench, BenchError};
 use crate::tasks::scan::ScanFailure;
 use crate::tasks::{Failure, Kind};
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Duration;
 
 /// The longest wait for another program that uses the same nodes.
@@ -150,64 +147,6 @@ fn only_interface() -> Result<BusSpec, Failure> {
         None => "without hardware: --bus sim".to_owned(),
     };
     Err(Failure::new(Kind::Usage, message).hint(hint))
-}
-
-/// The descriptions that the user named, for `nodes`.
-pub(super) fn overrides(global: &Global, nodes: &[NodeId]) -> anyhow::Result<Overrides> {
-    let mut overrides = Overrides::new();
-    let devices = global.device.iter().map(|given| (given, false));
-    for (given, eds) in devices.chain(global.eds.iter().map(|given| (given, true))) {
-        let model = model(&given.what, eds, global)?;
-        match given.node {
-            Some(node) => {
-                overrides.insert(node, model);
-            }
-            None => nodes.iter().for_each(|&node| {
-                overrides.entry(node).or_insert_with(|| Arc::clone(&model));
-            }),
-        }
-    }
-    overrides.retain(|node, _| nodes.contains(node));
-    Ok(overrides)
-}
-
-/// A description larger than this is none; it keeps `--eds /dev/zero` from filling the memory.
-const LARGEST: u64 = 16 << 20;
-
-/// Of a file with many faults the first ones tell enough.
-const WARNINGS: usize = 10;
-
-fn model(what: &str, eds: bool, global: &Global) -> anyhow::Result<Arc<Model>> {
-    if !eds {
-        if let Some(model) = catalog::by_name(what) {
-            return Ok(model);
-        }
-        if !what.contains(['.', '/']) {
-            let names: Vec<&str> = catalog::names().collect();
-            let message = format!("there is no built-in device \"{what}\"");
-            let hint = format!("there are: {}; or name a file", names.join(", "));
-            return Err(Failure::new(Kind::Usage, message).hint(hint).into());
-        }
-    }
-    let mut bytes = Vec::new();
-    File::open(what)
-        .and_then(|file| file.take(LARGEST).read_to_end(&mut bytes))
-        .map_err(|source| FileError { what: format!("read {what}"), source })?;
-    let usage = |error: String| Failure::new(Kind::Usage, format!("{what}: {error}"));
-    let extension = Path::new(what).extension().map(|extension| extension.to_ascii_lowercase());
-    if eds || extension.is_some_and(|extension| extension == "eds" || extension == "dcf") {
-        let eds = eds::read(&bytes).map_err(|error| usage(error.to_string()))?;
-        let console = global.console();
-        for warning in eds.warnings.iter().take(WARNINGS) {
-            console.warn(&format!("{what}:{}: {}", warning.line, warning.text));
-        }
-        if let Some(more) = eds.warnings.len().checked_sub(WARNINGS).filter(|&more| more > 0) {
-            console.warn(&format!("{what}: and {more} more of the kind"));
-        }
-        return Ok(Arc::new(Model::from_eds(&eds)));
-    }
-    let text = String::from_utf8(bytes).map_err(|_| usage("it is no text".to_owned()))?;
-    Ok(Arc::new(Model::from_toml(&text).map_err(|error| Failure::new(Kind::Usage, error.in_file(what)))?))
 }
 
 /// The nodes that the user named, or for `all` those of [`all`].

@@ -2,7 +2,7 @@
 
 use super::args::{Duration, Nodes, ObjectArg};
 use super::exit::stdout;
-use super::{Global, open};
+use super::{Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -185,7 +185,7 @@ impl Pdo {
 
 impl ShowArgs {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let overrides = open::overrides(global, &[self.node])?;
+        let overrides = descriptions::overrides(global, &[self.node])?;
         let shown = global.with_master(|master| Ok(show(master, self.node, self.pdo, &overrides)?))?;
         global.print(&shown)
     }
@@ -217,7 +217,7 @@ impl MapArgs {
 
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let request = self.request()?;
-        let overrides = open::overrides(global, &[self.node])?;
+        let overrides = descriptions::overrides(global, &[self.node])?;
         let mapped = global.with_master(|master| Ok(map(master, &request, self.store, &overrides)?))?;
         let console = global.console();
         match mapped.writes {
@@ -237,7 +237,7 @@ impl WatchArgs {
         let mut rows = global.stream::<ReceivedTpdo>()?;
         global.with_claims(|master, claims| {
             let nodes = open::nodes(master, global, &self.nodes)?;
-            let overrides = open::overrides(global, &nodes)?;
+            let overrides = descriptions::overrides_on(master, global, &nodes)?;
             let mut claims = Some(std::mem::take(claims));
             let mut report = |event: &WatchEvent<'_>| {
                 // The mappings are read; from now on the command only listens.

@@ -2,7 +2,7 @@
 
 use super::args::{Nodes, SignalArg};
 use super::exit::{IntoFailure, several, stdout};
-use super::{Format, Global, open};
+use super::{Format, Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
@@ -59,7 +59,7 @@ impl Read {
         let wanted: Vec<Wanted> = self.signals.iter().map(|signal| signal.0.clone()).collect();
         let (asked, results) = global.with_master(|master| {
             let nodes = open::nodes(master, global, &self.nodes)?;
-            let overrides = open::overrides(global, &nodes)?;
+            let overrides = descriptions::overrides_on(master, global, &nodes)?;
             let results = read(master, &nodes, &wanted, &overrides).or_fail()?;
             Ok((nodes.len(), results))
         })?;

@@ -2,7 +2,7 @@
 
 use super::args::Nodes;
 use super::exit::{IntoFailure, several};
-use super::{Global, open};
+use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::Failure;
@@ -42,13 +42,14 @@ impl Scan {
             Nodes::All => NodeId::all().collect(),
             Nodes::These(nodes) => nodes.clone(),
         };
-        let overrides = open::overrides(global, &nodes)?;
+        let overrides = descriptions::overrides(global, &nodes)?;
         let (found, took) = global.with_master(|master| {
             let begin = master.now();
             let found = if self.passive {
                 // A recording is read to its end.
                 let default = if master.bus().is_live() { LISTEN_TIMEOUT } else { Duration::MAX };
-                listen(master, &nodes, global.timeout.map_or(default, |timeout| timeout.0)).or_fail()?
+                let duration = global.timeout.map_or(default, |timeout| timeout.0);
+                listen(master, &nodes, duration, &overrides).or_fail()?
             } else {
                 let timing = global.timing(SCAN_TIMEOUT);
                 scan(master, &nodes, timing.timeout, 1 + timing.retries, &overrides).or_fail()?
@@ -69,6 +70,9 @@ impl Scan {
     fn note(&self, found: &[Found], took: Duration, global: &Global) {
         let nodes = if found.len() == 1 { "node" } else { "nodes" };
         global.console().note(&format!("{} {nodes} in {:.2} s", found.len(), took.as_secs_f64()));
+        for other in found.iter().filter(|found| found.is_other_device) {
+            global.console().warn(&format!("node {}: the description or EDS is for another device", other.node));
+        }
         let unknown = found.iter().find(|found| found.state.is_none()).filter(|_| !self.passive);
         if let Some(unknown) = unknown {
             global.console().note(&format!(

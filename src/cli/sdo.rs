@@ -3,7 +3,7 @@
 use super::args::ObjectArg;
 use super::exit::{FileError, IntoFailure, stdout};
 use super::file::OutFile;
-use super::{Global, open};
+use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -145,6 +145,11 @@ impl Sdo {
         }
     }
 
+    /// Whether it is `sdo read`.
+    pub(super) fn only_reads(&self) -> bool {
+        matches!(self.action, Action::Read(_))
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         match &self.action {
             Action::Read(args) => args.run(global),
@@ -173,7 +178,7 @@ impl ReadArgs {
         if self.output.is_some() && self.objects.len() > 1 {
             return Err(ErrorMessage::usage("--output takes one object").into());
         }
-        let mut node = Node::with_overrides(self.node, &open::overrides(global, &[self.node])?);
+        let mut node = Node::with_overrides(self.node, &descriptions::overrides(global, &[self.node])?);
         let to_stdout = self.output.as_deref() == Some(Path::new("-"));
         let path = self.output.as_deref().filter(|_| !to_stdout);
         let mut file = path.map(|path| OutFile::create(path, self.force)).transpose()?;
@@ -183,6 +188,7 @@ impl ReadArgs {
             master.listen_to(&[self.node]).or_fail()?;
             for object in &self.objects {
                 let at = resolve(&mut node, master, object)?;
+                descriptions::warn_about(global, node.model.as_ref(), at.index);
                 let mut progress = |moved| bar.moved(moved);
                 let read = read(master, &mut node, at, self.data_type, (self.block.into(), &mut progress))?;
                 bar.finish();
@@ -257,7 +263,7 @@ impl WriteArgs {
 
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let pairs = self.pairs()?;
-        let mut node = Node::with_overrides(self.node, &open::overrides(global, &[self.node])?);
+        let mut node = Node::with_overrides(self.node, &descriptions::overrides(global, &[self.node])?);
         let file = self.input()?;
         if file.is_none() {
             self.check_values(&node, &pairs)?;

@@ -1,7 +1,7 @@
 //! `cangauge unit`.
 
 use super::read::parse_unit;
-use super::{Global, open};
+use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit as Code;
@@ -36,7 +36,7 @@ impl Unit {
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let (signal, unit) = self.words().map_err(ErrorMessage::usage)?;
-        let overrides = open::overrides(global, &[self.node])?;
+        let overrides = descriptions::overrides(global, &[self.node])?;
         match unit {
             None => {
                 let units = global.with_master(|master| {

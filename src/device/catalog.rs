@@ -20,6 +20,42 @@ pub struct Model {
     pub dictionary: Dictionary,
     /// Objects whose type the description leaves open; they are read as bytes.
     pub untyped: BTreeSet<ObjectId>,
+    /// The devices that the files are for: one for each file.
+    pub made_for: Vec<MadeFor>,
+    /// Warnings about objects, with the index of each.
+    pub warnings: Vec<(u16, String)>,
+}
+
+/// The device that a description or an EDS file is for.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MadeFor {
+    /// The file, or the name of a built-in description.
+    pub file: String,
+    /// 1018h:1; 0 or `None` if it is not compared.
+    pub vendor: Option<u32>,
+    /// 1018h:2; 0 or `None` if it is not compared.
+    pub product: Option<u32>,
+    /// 1018h:3; 0 or `None` if it is not compared.
+    pub revision: Option<u32>,
+}
+
+impl MadeFor {
+    /// Whether a device can be this one: vendor and product agree. Unknown numbers are not compared.
+    pub fn fits(&self, vendor: Option<u32>, product: Option<u32>) -> bool {
+        same(self.vendor, vendor) && same(self.product, product)
+    }
+
+    /// Whether the revision of a device agrees. Unknown numbers are not compared.
+    pub fn has_revision(&self, revision: Option<u32>) -> bool {
+        same(self.revision, revision)
+    }
+}
+
+fn same(wanted: Option<u32>, found: Option<u32>) -> bool {
+    match (wanted.filter(|&number| number != 0), found.filter(|&number| number != 0)) {
+        (Some(wanted), Some(found)) => wanted == found,
+        _ => true,
+    }
 }
 
 /// The answers of a device about itself; `None` for an object that it did not answer.
@@ -50,7 +86,13 @@ impl Model {
         })?;
         let mut dictionary = Dictionary::new();
         description.objects.iter().for_each(|object| dictionary.insert_described(object));
-        Ok(Model { description, dictionary, untyped: BTreeSet::new() })
+        let made_for = MadeFor {
+            file: description.name.clone(),
+            vendor: description.identify.vendor_id,
+            product: description.identify.product_code,
+            revision: None,
+        };
+        Ok(Model { description, dictionary, untyped: BTreeSet::new(), made_for: vec![made_for], warnings: Vec::new() })
     }
 
     /// The objects and types of an EDS or DCF file. It has no signals: those follow from the objects of CiA 404.
@@ -61,7 +103,32 @@ impl Model {
             vendor: eds.info.vendor_name.clone().unwrap_or_default(),
             ..Description::default()
         };
-        Model { description, dictionary: eds.configured(), untyped: eds.untyped.clone() }
+        let made_for = MadeFor {
+            file: description.name.clone(),
+            vendor: eds.info.vendor_number,
+            product: eds.info.product_number,
+            revision: eds.info.revision_number,
+        };
+        let warnings = eds.warnings.iter().filter_map(|warning| Some((warning.index?, warning.to_string())));
+        Model {
+            description,
+            dictionary: eds.configured(),
+            untyped: eds.untyped.clone(),
+            made_for: vec![made_for],
+            warnings: warnings.collect(),
+        }
+    }
+
+    /// A description together with an EDS of the same device. If both have an object, the description has priority.
+    #[must_use]
+    pub fn with_eds(&self, eds: &Model) -> Model {
+        let mut merged = self.clone();
+        merged.dictionary = eds.dictionary.clone();
+        self.dictionary.iter().for_each(|entry| merged.dictionary.insert(entry.clone()));
+        merged.untyped.extend(eds.untyped.iter().filter(|object| self.dictionary.get(**object).is_none()));
+        merged.made_for.extend(eds.made_for.iter().cloned());
+        merged.warnings.extend(eds.warnings.iter().cloned());
+        merged
     }
 
     /// Whether the identity agrees with the description, as far as it can be compared without further reading.

@@ -1,6 +1,7 @@
 //! An object dictionary from a description or an EDS file: names, types, access, limits, defaults.
 
 use super::description::{Access, ObjectEntry};
+use super::eds::names::slug;
 use super::scalar::Scalar;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -85,10 +86,15 @@ impl Dictionary {
         self.entries.range(ObjectId::new(index, 0)..=ObjectId::new(index, 255)).next().is_some()
     }
 
-    /// The entry with a name: `vendor-id`, `ai-input-pv:1`. Letter case is ignored.
+    /// The entry with a name: `vendor-id`, `ai-input-pv:1`, or as an EDS spells it, `Position Value`. Letter case is
+    /// ignored.
     pub fn find(&self, name: &str) -> Option<&Entry> {
-        let name = name.to_lowercase();
-        let alias = || self.get(*self.aliases.get(&name)?);
+        let exact = self.find_exact(&name.to_lowercase());
+        exact.or_else(|| spellings(name).into_iter().find_map(|name| self.find_exact(&name)))
+    }
+
+    fn find_exact(&self, name: &str) -> Option<&Entry> {
+        let alias = || self.get(*self.aliases.get(name)?);
         self.iter().find(|entry| entry.full_name() == name).or_else(alias)
     }
 
@@ -108,6 +114,13 @@ impl Dictionary {
             });
         }
     }
+}
+
+/// The names that `Position Value:1`, as an EDS spells it, can have: with sub-index, and as a whole.
+pub fn spellings(name: &str) -> Vec<String> {
+    let with_sub = name.rsplit_once(':').filter(|(_, sub)| sub.parse::<u8>().is_ok());
+    let with_sub = with_sub.map(|(name, sub)| format!("{}:{sub}", slug(name)));
+    with_sub.into_iter().chain([slug(name)]).filter(|name| !name.is_empty()).collect()
 }
 
 #[cfg(test)]
@@ -152,5 +165,7 @@ mod tests {
         assert_eq!(find("Vent"), Some(2));
         assert_eq!(find("ÜBERDRUCK:1"), Some(1));
         assert_eq!(find("gone"), None);
+        assert_eq!(find("\u{dc}berDruck :2"), Some(2));
+        assert_eq!(find("VENT !"), Some(2));
     }
 }

@@ -5,6 +5,7 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::device::catalog::{Model, Traits};
+use crate::device::unit::Unit;
 use crate::measure::layout::{Layout, Signal, Tpdo};
 use std::sync::Arc;
 
@@ -29,6 +30,11 @@ impl Identity {
     /// The number of the device profile, the low word of 1000h.
     pub fn profile(&self) -> Option<u32> {
         self.device_type.map(|device_type| device_type & 0xffff)
+    }
+
+    /// Whether a description or EDS can be for this device: vendor and product agree. Unknown numbers are not compared.
+    pub fn fits(&self, model: &Model) -> bool {
+        model.made_for.iter().all(|device| device.fits(self.vendor, self.product))
     }
 
     /// The facts by which a device description is recognised.
@@ -89,6 +95,11 @@ impl Node {
     pub fn with_overrides(id: NodeId, overrides: &Overrides) -> Node {
         let model = overrides.get(&id).cloned();
         Node { is_identified: model.is_some(), model, ..Node::new(id) }
+    }
+
+    /// The unit that the description states for an object.
+    pub fn fixed_unit(&self, object: ObjectId) -> Option<Unit> {
+        self.model.as_ref()?.description.object(object)?.unit.as_deref().and_then(Unit::from_symbol)
     }
 
     /// The part that decoding needs.

@@ -6,6 +6,7 @@
 //! - [`wait`]: receives frames until a deadline, with one policy for Ctrl-C, link down and the end of a recording;
 //! - [`state`]: NMT states, commands, reset and the restart;
 //! - [`scan`] and [`targets`]: the nodes on the bus, and those that `all` means;
+//! - [`overheard`]: what other masters read and write;
 //! - [`names`]: the objects, types and signals behind names.
 //!
 //! Errors are types ([`Error`]); their texts are in `output`.
@@ -13,6 +14,7 @@
 mod error;
 mod facts;
 pub mod names;
+pub mod overheard;
 pub mod read;
 pub mod scan;
 pub mod state;

@@ -5,10 +5,11 @@ use super::{Node, survey};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};
 use crate::device::description::ObjectEntry;
-use crate::device::dictionary::Entry;
+use crate::device::dictionary::{self, Entry};
 use crate::device::nearest::distance;
 use crate::device::standard;
 use crate::master::{Master, Request, SdoError, SdoFailure};
+use crate::measure::decode::Wanted;
 use crate::measure::layout::{PROCESS_VALUES, Signal};
 
 impl Node {
@@ -21,7 +22,8 @@ impl Node {
     /// The entry with this name, from the description or the standard. Asks the node nothing.
     pub fn entry_by_name(&self, name: &str) -> Option<Entry> {
         let described = self.model.as_ref().and_then(|model| model.dictionary.find(name).cloned());
-        described.or_else(|| standard::find(name))
+        let spelled = || dictionary::spellings(name).iter().find_map(|name| standard::find(name));
+        described.or_else(|| standard::find(name)).or_else(spelled)
     }
 
     /// What the description says about an object beyond its type.
@@ -77,6 +79,21 @@ impl Node {
         let numbered = dictionary.find(&format!("{name}:{}", signal.channel));
         let single = || dictionary.find(name).filter(|_| self.signals.len() == 1);
         numbered.or_else(single).map(|entry| entry.object)
+    }
+
+    /// A requested value as this node has it: a name that no signal has, and that an object has, means the object.
+    pub fn wanted(&self, item: &Wanted) -> Wanted {
+        match item {
+            Wanted::Signal(name) if self.signal(name).is_none() => {
+                self.entry_by_name(name).map_or_else(|| item.clone(), |entry| Wanted::Object(entry.object, None))
+            }
+            item => item.clone(),
+        }
+    }
+
+    /// Every requested value as this node has it: see [`Node::wanted`].
+    pub fn all_wanted(&self, items: &[Wanted]) -> Vec<Wanted> {
+        items.iter().map(|item| self.wanted(item)).collect()
     }
 
     /// The signal with this name.

@@ -1,5 +1,6 @@
 //! Finds the nodes on the bus.
 
+use super::overheard::Overheard;
 use super::wait::{Policy, wait};
 use crate::bus::{Filters, Mono, Received};
 use crate::canopen::emcy::Emergency;
@@ -23,7 +24,7 @@ const REPEAT_INTERVAL: Duration = Duration::from_millis(50);
 const HEARTBEAT_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// The nodes that showed themselves.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Default)]
 pub struct Presence {
     /// Nodes that answered an SDO request.
     pub answered: BTreeSet<NodeId>,
@@ -31,6 +32,8 @@ pub struct Presence {
     pub states: BTreeMap<NodeId, Option<NmtState>>,
     /// Frames with the identifier of a TPDO of the predefined connection set, by the node that it belongs to there.
     pub tpdos: BTreeMap<NodeId, BTreeSet<CanId>>,
+    /// What other masters read and wrote, if only listened.
+    pub overheard: Overheard,
     booted: BTreeSet<NodeId>,
 }
 
@@ -69,6 +72,7 @@ impl Presence {
     fn on_any_frame(&mut self, received: &Received) {
         self.on_frame(received);
         let frame = &received.frame;
+        self.overheard.take(frame);
         let emergency = frame.id().emergency_node().filter(|_| Emergency::parse(frame).is_some());
         if let (Some(node), false) = (emergency.or(tpdo_node(frame.id())), frame.is_remote()) {
             self.states.entry(node).or_insert(None);

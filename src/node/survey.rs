@@ -5,7 +5,7 @@
 
 mod background;
 
-use super::read::{Item, read_known};
+use super::read::{Item, read_known, read_values};
 use super::{Identity, Node};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -68,20 +68,23 @@ fn small<T: TryFrom<u64>>(value: Option<&Value>) -> Option<T> {
     number(value).and_then(|number| T::try_from(number).ok())
 }
 
-/// Reads the identity of nodes that are there.
-pub fn identities<A: Ask>(master: &mut A, nodes: &[NodeId]) -> Result<Vec<Identity>, A::Stop> {
+/// Reads the identity of nodes that are there. The name (1008h) is read only if `has_name` says so.
+fn identities<A: Ask>(
+    master: &mut A,
+    nodes: &[NodeId],
+    has_name: impl Fn(NodeId, &Identity) -> bool,
+) -> Result<Vec<Identity>, A::Stop> {
     let objects = [
         (ObjectId::new(0x1000, 0), U32),
         (ObjectId::new(0x1018, 1), U32),
         (ObjectId::new(0x1018, 2), U32),
         (ObjectId::new(0x1018, 3), U32),
         (ObjectId::new(0x1018, 4), U32),
-        (ObjectId::new(0x1008, 0), DataType::VisibleString),
     ];
     let items: Vec<Item> =
         nodes.iter().flat_map(|&node| objects.map(|(object, data_type)| (node, object, data_type))).collect();
     let values = read_known(master, &items)?;
-    Ok(values
+    let mut identities: Vec<Identity> = values
         .chunks(objects.len())
         .map(|values| Identity {
             device_type: small(values[0].as_ref()),
@@ -89,12 +92,33 @@ pub fn identities<A: Ask>(master: &mut A, nodes: &[NodeId]) -> Result<Vec<Identi
             product: small(values[2].as_ref()),
             revision: small(values[3].as_ref()),
             serial: small(values[4].as_ref()),
-            name: match &values[5] {
-                Some(Value::Text(name)) => Some(name.clone()),
-                _ => None,
-            },
+            name: None,
         })
-        .collect())
+        .collect();
+    let is_named = |(node, identity): &(&NodeId, &Identity)| has_name(**node, identity);
+    let named: Vec<NodeId> = nodes.iter().zip(&identities).filter(is_named).map(|(node, _)| *node).collect();
+    let items: Vec<Item> =
+        named.iter().map(|&node| (node, ObjectId::new(0x1008, 0), DataType::VisibleString)).collect();
+    let mut names: BTreeMap<NodeId, Option<Value>> = named.into_iter().zip(read_known(master, &items)?).collect();
+    for (identity, node) in identities.iter_mut().zip(nodes) {
+        if let Some(Some(Value::Text(name))) = names.remove(node) {
+            identity.name = Some(name);
+        }
+    }
+    Ok(identities)
+}
+
+/// Reads vendor, product and revision (1018h:1 to 3) of nodes. What a node does not answer is `None`.
+///
+/// # Errors
+/// Bus errors and Ctrl-C.
+pub fn revisions(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId, [Option<u32>; 3]>, Error> {
+    let subs = [1, 2, 3];
+    let items: Vec<Item> =
+        nodes.iter().flat_map(|&node| subs.map(|sub| (node, ObjectId::new(0x1018, sub), U32))).collect();
+    let values: Vec<Option<Value>> = read_values(master, &items)?.into_iter().map(Result::ok).collect();
+    let devices = nodes.iter().zip(values.chunks(subs.len()));
+    Ok(devices.map(|(&node, values)| (node, [0, 1, 2].map(|at: usize| small(values[at].as_ref())))).collect())
 }
 
 /// Reads everything of the nodes: identity, signals with unit and digits, TPDOs.
@@ -111,7 +135,8 @@ pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overri
     Ok(instruments)
 }
 
-/// Reads identities and finds the descriptions that they fit.
+/// Reads identities and finds the descriptions that they fit. The name (1008h) only serves for this: it is not read if the
+/// user named the description of this device.
 ///
 /// # Errors
 /// A node that does not answer, and what stops everything.
@@ -120,7 +145,8 @@ pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides)
     for (node, model) in overrides {
         master.set_quirks(*node, &model.description.quirks);
     }
-    let identities = identities(master, nodes)?;
+    let identities =
+        identities(master, nodes, |node, identity| overrides.get(&node).is_none_or(|model| !identity.fits(model)))?;
     let mut traits: Vec<Traits> = identities.iter().map(Identity::traits).collect();
     let questions: Vec<(usize, ObjectId)> = nodes
         .iter()
@@ -141,7 +167,14 @@ pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides)
     let mut instruments: Vec<Node> = nodes.iter().map(|&node| Node::new(node)).collect();
     for ((instrument, identity), traits) in instruments.iter_mut().zip(identities).zip(&traits) {
         let given = overrides.get(&instrument.id).cloned();
-        instrument.model = given.or_else(|| recognise(traits));
+        instrument.model = match given {
+            // Names come from the EDS of another device, types and units from the description of this one.
+            Some(model) if model.description.signals.is_empty() && !identity.fits(&model) => {
+                let own = recognise(traits).map(|own| Arc::new(own.with_eds(&model)));
+                own.or(Some(model))
+            }
+            given => given.or_else(|| recognise(traits)),
+        };
         instrument.identity = identity;
         instrument.is_identified = true;
         if let Some(model) = &instrument.model {
@@ -329,6 +362,13 @@ fn read_units<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A:
             .map(Unit);
         signal.digits =
             values.next().flatten().as_ref().and_then(Value::as_u64).and_then(|digits| u8::try_from(digits).ok());
+    }
+    for node in instruments {
+        for at in 0..node.signals.len() {
+            if node.signals[at].unit.is_none() {
+                node.signals[at].unit = node.fixed_unit(node.signals[at].value.0);
+            }
+        }
     }
     Ok(())
 }

@@ -26,14 +26,19 @@ pub fn cells(identity: [Option<u32>; 4], model: Option<&Model>) -> [Cell; 5] {
     [code(vendor), Cell::from(name).shown_as(shown), code(product), code(revision), serial.into()]
 }
 
-/// The name of a vendor: from the description of the device, otherwise from a built-in description with this vendor-ID.
+/// The name of a vendor: from the description of the device, otherwise from a built-in description with this vendor-ID. If
+/// the description does not state the vendor-ID, the built-in one has priority.
 pub fn vendor_name(vendor: u32, model: Option<&Model>) -> Option<String> {
-    let named = model.map(|model| &model.description.vendor).filter(|name| !name.is_empty());
+    // A description that the user named may be for another device.
+    let is_own = |model: &&Model| model.made_for.iter().all(|device| device.fits(Some(vendor), None));
+    let named = model.filter(is_own).map(|model| &model.description.vendor).filter(|name| !name.is_empty());
+    let states_vendor = model.is_some_and(|model| model.made_for.iter().any(|device| device.vendor == Some(vendor)));
     let built_in = || {
         let mut all = catalog::built_in().iter().map(|model| &model.description);
         all.find(|description| description.identify.vendor_id == Some(vendor)).map(|description| &description.vendor)
     };
-    named.or_else(built_in).cloned()
+    let name = if states_vendor { named.or_else(built_in) } else { built_in().or(named) };
+    name.cloned()
 }
 
 #[cfg(test)]

@@ -229,7 +229,10 @@ pub fn log(
             let poll = Poll::new(&recording.nodes, &options.wanted, &mut recording.decoder, period)?;
             recording.poll = Some(poll);
         }
-        _ => recording.nodes.iter().for_each(|node| recording.decoder.add(node.layout(), &options.wanted)),
+        _ => recording.nodes.iter().for_each(|node| {
+            let wanted = node.all_wanted(&options.wanted);
+            recording.decoder.add(node.layout(), &wanted);
+        }),
     }
     recording.update_sources();
     recording.excuse_nodes_without_signals();
@@ -270,6 +273,7 @@ fn record_passively(
     let mut recording = Recording::new(Vec::new(), options, master.bus());
     let mut listener = SetupListener::new(&options.nodes, &options.overrides, &options.wanted);
     listener.apply_overrides(&mut recording.decoder);
+    recording.watch_emergencies(options.nodes.iter().map(|&node| listener.known_node(node)));
     recording.listener = Some(listener);
     recording.update_sources();
     master.listen(&Filters::All)?;

@@ -49,8 +49,9 @@ pub fn targets(instrument: &Node, wanted: &[Wanted], number: &mut usize) -> Resu
     };
     wanted
         .iter()
+        .map(|item| instrument.wanted(item))
         .map(|item| {
-            Ok(match item {
+            Ok(match &item {
                 Wanted::Signal(name) => {
                     let signal = find(instrument, name)?;
                     let (object, data_type) = signal.value;

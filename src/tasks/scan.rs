@@ -22,6 +22,8 @@ pub struct Found {
     pub state: Option<NmtState>,
     /// Its identity and description, as far as they could be read.
     pub instrument: Node,
+    /// Whether the description or EDS that the user named is for another device.
+    pub is_other_device: bool,
     /// Why its identity could not be read.
     pub failure: Option<Failure>,
 }
@@ -47,24 +49,45 @@ pub fn scan(
     for (node, result) in answering.iter().zip(identify_each(master, &answering, overrides)?) {
         let Some(entry) = found.iter_mut().find(|entry| entry.node == *node) else { continue };
         match result {
-            Ok(node) => entry.instrument = node,
+            Ok(node) => {
+                entry.is_other_device = overrides.get(&node.id).is_some_and(|model| !node.identity.fits(model));
+                entry.instrument = node;
+            }
             Err(error) => entry.failure = Some(error.into()),
         }
     }
     Ok(found)
 }
 
-/// Listens for `duration` without sending anything.
+/// Listens for `duration` without sending anything. Identities come from the SDO answers that other masters received.
 ///
 /// # Errors
 /// Bus errors. Ctrl-C ends it early.
-pub fn listen(master: &mut Master<'_>, nodes: &[NodeId], duration: Duration) -> Result<Vec<Found>, Error> {
+pub fn listen(
+    master: &mut Master<'_>,
+    nodes: &[NodeId],
+    duration: Duration,
+    overrides: &Overrides,
+) -> Result<Vec<Found>, Error> {
     let presence = scan::listen(master, duration)?;
-    Ok(found(&presence, nodes))
+    let mut found = found(&presence, nodes);
+    for entry in &mut found {
+        let identity = presence.overheard.identity(entry.node);
+        let named = overrides.get(&entry.node).filter(|model| identity.fits(model)).cloned();
+        entry.instrument.model = named.or_else(|| presence.overheard.recognise(entry.node));
+        entry.instrument.identity = identity;
+    }
+    Ok(found)
 }
 
 /// The requested nodes that showed themselves, in ascending order.
 fn found(presence: &Presence, nodes: &[NodeId]) -> Vec<Found> {
-    let of_node = |node| Found { node, state: presence.state(node), instrument: Node::new(node), failure: None };
+    let of_node = |node| Found {
+        node,
+        state: presence.state(node),
+        instrument: Node::new(node),
+        is_other_device: false,
+        failure: None,
+    };
     presence.nodes().into_iter().filter(|node| nodes.contains(node)).map(of_node).collect()
 }

@@ -5,6 +5,7 @@ mod args;
 mod autozero;
 mod bus;
 mod check;
+mod descriptions;
 mod examples;
 mod half_dead;
 mod hostile;

@@ -158,7 +158,7 @@ fn the_description_can_be_said() {
     // Taken for a DPS, its REAL32 is an INTEGER32 with 3 digits.
     bench.run("read 5 pressure --device 5=dps").prints("1067450.368\n");
     bench.run("read 5 pressure --device 6=dps").prints("1.25\n");
-    bench.run("read 5 --device mh5").refuses("there is no built-in device \"mh5\"");
+    bench.run("read 5 --device mh5").refuses("no built-in device \"mh5\"");
     bench
         .run("read 5 --device none.toml")
         .fails(8, "cangauge: read none.toml: No such file or directory (os error 2)\n");

@@ -237,3 +237,40 @@ fn scan_and_watch_listen_to_the_whole_of_it() {
     let done = replay(&bench, "t.log", "nmt watch").exit(0);
     assert_eq!(done.stdout.lines().count(), 2, "{}", done.stdout);
 }
+
+#[test]
+fn emergencies_are_recorded() {
+    let bench = Bench::of("mh4@1");
+    let emergency = "(1700000000.250000) can0 085#0110010000000000\n";
+    let moved = "(1700000000.260000) can0 0C5#0110020000000000\n";
+    let setup = "(1700000000.013000) can0 605#4014100000000000\n(1700000000.013100) can0 585#43141000C5000000\n";
+    let plain = recording(log_form);
+    let values = plain.find("(1700000000.300").expect("the third value");
+    let text = |more: &str, setup: &str| {
+        let (before, after) = plain.split_at(values);
+        before.replace("(1700000000.100", &format!("{setup}(1700000000.100")) + more + after
+    };
+    for (text, count) in [(text(emergency, ""), 1), (text(moved, ""), 0), (text(moved, setup), 1)] {
+        fs::write(bench.path("t.log"), text).expect("written");
+        let done = replay(&bench, "t.log", "log 5 --events e.csv --force").exit(0);
+        assert_eq!(bench.text("e.csv").matches(",5,emcy,").count(), count, "{}", done.stderr);
+        assert_eq!(done.stderr.contains("1 emergency message"), count == 1, "{}", done.stderr);
+    }
+}
+
+#[test]
+fn scan_reads_identities_from_the_sdo_traffic() {
+    let bench = Bench::of("mh4@1");
+    bench.run("scan 1").exit(0);
+    keep(&bench);
+    let done = replay(&bench, "t.log", "scan --passive --format json").exit(0);
+    let node = &done.json()[0];
+    assert_eq!((&node["device"], &node["vendor"], &node["name"]), (&"mh4".into(), &71.into(), &"MH-4-CAN".into()));
+    // Refused and unanswered objects are unknown.
+    let text = "(1700000000.0) can0 605#4018100100000000\n(1700000000.1) can0 585#8018100100000206\n\
+                (1700000000.2) can0 605#4000100000000000\n(1700000000.3) can0 585#4300100094010200\n";
+    fs::write(bench.path("t.log"), text).expect("written");
+    let done = replay(&bench, "t.log", "scan --passive --format json").exit(0);
+    let node = &done.json()[0];
+    assert_eq!((&node["device_type"], &node["vendor"]), (&"0x00020194".into(), &serde_json::Value::Null));
+}

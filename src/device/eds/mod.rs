@@ -12,7 +12,7 @@
 mod content;
 mod info;
 mod ini;
-mod names;
+pub(in crate::device) mod names;
 mod objects;
 mod sections;
 mod text;
@@ -101,13 +101,15 @@ pub struct ObjectFlags {
 pub struct Warning {
     /// The line, counted from 1.
     pub line: usize,
+    /// The index of the object in whose section the line is.
+    pub index: Option<u16>,
     /// One sentence; text from the file in it is short and safe for a terminal.
     pub text: String,
 }
 
 impl Warning {
     fn new(line: usize, text: impl Into<String>) -> Warning {
-        Warning { line, text: text.into() }
+        Warning { line, index: None, text: text.into() }
     }
 }
 
@@ -150,6 +152,10 @@ pub fn read(bytes: &[u8]) -> Result<Eds, EdsError> {
         });
     }
     warnings.sort_by_key(|warning| warning.line);
+    for warning in &mut warnings {
+        let section = ini.sections.iter().filter(|section| section.line <= warning.line).max_by_key(|one| one.line);
+        warning.index = section.and_then(|section| section_index(&section.name));
+    }
     Ok(Eds {
         dictionary: names::dictionary(&objects.names, objects.described),
         info,
@@ -159,6 +165,13 @@ pub fn read(bytes: &[u8]) -> Result<Eds, EdsError> {
         untyped: objects.untyped,
         warnings,
     })
+}
+
+/// The index of the object in the name of its section: `1018`, `1018sub1`, `1018Name`.
+fn section_index(name: &str) -> Option<u16> {
+    let digits = name.get(..4)?;
+    let is_object = name.len() == 4 || name[4..].starts_with(['s', 'S', 'n', 'N', 'v', 'V', 'd', 'D']);
+    u16::from_str_radix(digits, 16).ok().filter(|_| is_object)
 }
 
 fn no_section(text: &str) -> EdsError {

@@ -132,7 +132,7 @@ fn nameless(index: u16) -> String {
 }
 
 /// A name of a file in lower case with hyphens.
-pub(super) fn slug(name: &str) -> String {
+pub(in crate::device) fn slug(name: &str) -> String {
     let mut slug = String::new();
     let mut gap = false;
     for character in name.chars().flat_map(char::to_lowercase).take(LONGEST) {

@@ -22,7 +22,7 @@ pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), F
                 let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
                 valid.flat_map(|tpdo| &tpdo.mapping)
             };
-            match item {
+            match &node.wanted(item) {
                 Wanted::Signal(name) => node.mapped_signals().any(|signal| signal.name == *name),
                 Wanted::Object(object, _) => entries().any(|entry| entry.object == *object),
                 Wanted::Status(name) => node
@@ -38,7 +38,9 @@ pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), F
                 signals.filter(|signal| signal.name == name).any(|signal| !with_status || signal.status.is_some())
             };
             let name = match item {
-                Wanted::Signal(name) | Wanted::Status(name) if !has(name, false) => {
+                Wanted::Signal(name) | Wanted::Status(name)
+                    if !has(name, false) && nodes.iter().all(|node| node.wanted(item) == *item) =>
+                {
                     return Err(Failure::general(unknown_signal(name, nodes)));
                 }
                 Wanted::Status(name) if !has(name, true) => {

@@ -6,27 +6,23 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
-use crate::canopen::sdo::{Progress, Upload};
 use crate::canopen::value::DataType;
-use crate::device::catalog::{Model, recognise};
+use crate::device::catalog::Model;
 use crate::device::unit::Unit;
 use crate::measure::decode::{Decoder, Wanted};
 use crate::measure::layout::{MeasuringRange, PROCESS_VALUES, Signal, Tpdo};
 use crate::measure::sample::Number;
-use crate::node::{Identity, Node, Overrides};
-use std::collections::{BTreeMap, BTreeSet};
+use crate::node::overheard::{Overheard, first_four};
+use crate::node::{Node, Overrides};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Collects the objects that other masters read and write.
+/// Reads the setup of nodes from the SDO traffic of other masters.
 pub(super) struct SetupListener {
     nodes: BTreeSet<NodeId>,
     overrides: Overrides,
     wanted: Vec<Wanted>,
-    known: BTreeMap<(NodeId, ObjectId), Vec<u8>>,
-    /// Objects that the nodes refused to read.
-    refused: BTreeSet<(NodeId, ObjectId)>,
-    uploads: BTreeMap<NodeId, (ObjectId, Upload)>,
-    downloads: BTreeMap<NodeId, (ObjectId, Vec<u8>)>,
+    overheard: Overheard,
     /// COB-IDs of the TPDOs that are decoded.
     decoded: BTreeSet<CanId>,
     /// Nodes that sent TPDOs whose mapping is unknown.
@@ -39,10 +35,7 @@ impl SetupListener {
             nodes: nodes.iter().copied().collect(),
             overrides: overrides.clone(),
             wanted: wanted.to_vec(),
-            known: BTreeMap::new(),
-            refused: BTreeSet::new(),
-            uploads: BTreeMap::new(),
-            downloads: BTreeMap::new(),
+            overheard: Overheard::default(),
             decoded: BTreeSet::new(),
             not_understood: BTreeSet::new(),
         }
@@ -54,32 +47,26 @@ impl SetupListener {
         nodes.into_iter().for_each(|node| self.update(node, decoder));
     }
 
-    /// Takes a frame. If it completes the setup of a TPDO, `decoder` decodes that TPDO from now on.
-    pub(super) fn take(&mut self, received: &Received, decoder: &mut Decoder) {
+    /// Takes a frame. If it completes the setup of a TPDO, `decoder` decodes that TPDO from now on. Returns a recorded node
+    /// of which something new is known.
+    pub(super) fn take(&mut self, received: &Received, decoder: &mut Decoder) -> Option<NodeId> {
         let frame = &received.frame;
-        if let Some(node) = frame.id().sdo_request_node() {
-            self.request(node, frame);
-        } else if let Some(node) = frame.id().sdo_response_node() {
-            if self.response(node, frame) {
-                self.update(node, decoder);
-            }
-        } else if let Some(node) = predefined_tpdo(frame)
+        if let Some((node, _)) = self.overheard.take(frame).filter(|(node, _)| self.nodes.contains(node)) {
+            self.update(node, decoder);
+            return Some(node);
+        }
+        if let Some(node) = predefined_tpdo(frame)
             && self.nodes.contains(&node)
             && !self.decoded.contains(&frame.id())
         {
             self.not_understood.insert(node);
         }
+        None
     }
 
     /// A node has restarted: it may have lost its setup. Its identity and the descriptions of the user stay valid.
     pub(super) fn forget(&mut self, node: NodeId, decoder: &mut Decoder) {
-        let stays = |(of, object): &(NodeId, ObjectId)| *of != node || !is_setup(*object);
-        self.known.retain(|key, _| stays(key));
-        self.refused.retain(stays);
-        if self.uploads.get(&node).is_some_and(|(object, _)| is_setup(*object)) {
-            self.uploads.remove(&node);
-        }
-        self.downloads.remove(&node);
+        self.overheard.forget(node, is_setup);
         decoder.remove(node);
         self.decoded = decoder.can_ids().collect();
         if self.overrides.contains_key(&node) && self.nodes.contains(&node) {
@@ -87,71 +74,19 @@ impl SetupListener {
         }
     }
 
-    fn request(&mut self, node: NodeId, frame: &Frame) {
-        let [command, a, b, c, data @ ..] = frame.data() else { return };
-        let object = ObjectId::from_multiplexer([*a, *b, *c]);
-        match command {
-            0x40 => {
-                self.uploads.insert(node, (object, Upload::new(node, object, false)));
-            }
-            0x22 | 0x23 | 0x27 | 0x2b | 0x2f => {
-                let unused = if command & 1 == 0 { 0 } else { usize::from(command >> 2 & 3) };
-                let end = data.len().min(4 - unused);
-                self.downloads.insert(node, (object, data[..end].to_vec()));
-            }
-            0x80 => {
-                self.uploads.remove(&node);
-                self.downloads.remove(&node);
-            }
-            _ => {}
-        }
-    }
-
-    /// Returns whether an object has a new value.
-    fn response(&mut self, node: NodeId, frame: &Frame) -> bool {
-        if let (Some((object, _)), [0x60, a, b, c, ..]) = (self.downloads.get(&node), frame.data())
-            && *object == ObjectId::from_multiplexer([*a, *b, *c])
-            && let Some((object, bytes)) = self.downloads.remove(&node)
-        {
-            return self.learn(node, object, bytes);
-        }
-        // The other master requests the segments. The requests of our state machine are not sent.
-        let Some((object, upload)) = self.uploads.get_mut(&node) else { return false };
-        let object = *object;
-        match upload.on_frame(frame, &mut Vec::new()) {
-            Progress::Done(uploaded) => {
-                self.uploads.remove(&node);
-                self.learn(node, object, uploaded.bytes)
-            }
-            Progress::Failed(_) => {
-                self.uploads.remove(&node);
-                self.nodes.contains(&node) && self.refused.insert((node, object))
-            }
-            Progress::NotOurs | Progress::Continue => false,
-        }
-    }
-
-    fn learn(&mut self, node: NodeId, object: ObjectId, bytes: Vec<u8>) -> bool {
-        self.nodes.contains(&node) && self.known.insert((node, object), bytes.clone()) != Some(bytes)
-    }
-
+    /// An object's number: overheard, else the default of the description that the user named.
     fn number(&self, node: NodeId, object: ObjectId) -> Option<u32> {
-        let learned = self.known.get(&(node, object)).cloned();
-        let model = self.overrides.get(&node);
-        let bytes = learned.or_else(|| model.and_then(|model| model.dictionary.get(object)?.default_bytes(node)))?;
-        let mut wide = [0; 4];
-        let len = bytes.len().min(4);
-        wide[..len].copy_from_slice(&bytes[..len]);
-        Some(u32::from_le_bytes(wide))
+        let default = || first_four(&self.named(node)?.dictionary.get(object)?.default_bytes(node)?).into();
+        self.overheard.number(node, object).or_else(default)
+    }
+
+    /// The description that the user named for a node, unless the node reports another vendor or product.
+    fn named(&self, node: NodeId) -> Option<&Arc<Model>> {
+        self.overrides.get(&node).filter(|model| self.overheard.identity(node).fits(model))
     }
 
     fn byte(&self, node: NodeId, object: ObjectId) -> Option<u8> {
         Some(self.number(node, object)?.to_le_bytes()[0])
-    }
-
-    fn text(&self, node: NodeId, object: ObjectId) -> Option<String> {
-        let bytes = self.known.get(&(node, object))?;
-        DataType::VisibleString.decode(bytes).ok().map(|value| value.to_string())
     }
 
     fn update(&mut self, id: NodeId, decoder: &mut Decoder) {
@@ -163,7 +98,7 @@ impl SetupListener {
                 signal.is_none_or(|signal| {
                     let digits = ObjectId::new(0x6132, signal.channel);
                     let is_integer = matches!(node.mapped_type(entry.object, entry.bits), Some(DataType::Integer(_)));
-                    !is_integer || signal.digits.is_some() || self.refused.contains(&(id, digits))
+                    !is_integer || signal.digits.is_some() || self.overheard.is_refused(id, digits)
                 })
             })
         };
@@ -171,27 +106,20 @@ impl SetupListener {
         tpdos.retain(|tpdo| has_digits(&node, tpdo));
         node.tpdos = tpdos;
         if !node.tpdos.is_empty() {
-            decoder.replace(node.layout(), &self.wanted);
+            decoder.replace(node.layout(), &node.all_wanted(&self.wanted));
             self.decoded = decoder.can_ids().collect();
             self.not_understood.remove(&id);
         }
     }
 
     /// The node as far as it is known, with the TPDOs whose COB-ID and whole mapping are known.
-    fn known_node(&self, id: NodeId) -> Node {
+    pub(super) fn known_node(&self, id: NodeId) -> Node {
         let mut node = Node::new(id);
-        node.identity = Identity {
-            device_type: self.number(id, ObjectId::new(0x1000, 0)),
-            vendor: self.number(id, ObjectId::new(0x1018, 1)),
-            product: self.number(id, ObjectId::new(0x1018, 2)),
-            name: self.text(id, ObjectId::new(0x1008, 0)),
-            ..Identity::default()
-        };
-        let mut traits = node.identity.traits();
-        let answers = self.known.iter().filter(|((of, _), _)| *of == id);
-        traits.answers = answers.map(|(&(_, object), bytes)| (object, bytes.clone())).collect();
-        let model: Option<Arc<Model>> = self.overrides.get(&id).cloned().or_else(|| recognise(&traits));
-        node.model = model;
+        node.identity = self.overheard.identity(id);
+        node.model = self.named(id).cloned().or_else(|| self.overheard.recognise(id));
+        if let Some(word) = self.number(id, ObjectId::new(0x1014, 0)).map(CobId).filter(|word| word.is_valid()) {
+            node.emergency = word.can_id();
+        }
         node.tpdos = (1..=512).filter_map(TpdoNumber::new).filter_map(|number| self.tpdo(id, number)).collect();
         node.signals = self.signals(&node);
         node
@@ -210,7 +138,7 @@ impl SetupListener {
     fn range(&self, node: &Node, channel: u8, digits: Option<u8>) -> MeasuringRange {
         let end_of_range = |index: u16| {
             let object = ObjectId::new(index, channel);
-            let value = node.layout().data_type(object)?.decode(self.known.get(&(node.id, object))?).ok()?;
+            let value = node.layout().data_type(object)?.decode(self.overheard.bytes(node.id, object)?).ok()?;
             Number::from_value(&value, digits.unwrap_or(0)).map(Number::as_f64)
         };
         let ends = end_of_range(0x6148).zip(end_of_range(0x6149));
@@ -227,6 +155,7 @@ impl SetupListener {
         if !described.is_empty() {
             let signal = |entry: &crate::device::description::SignalEntry| {
                 let (unit, digits) = unit_and_digits(entry.channel);
+                let unit = unit.or_else(|| node.fixed_unit(entry.value));
                 Signal {
                     name: entry.name.clone(),
                     channel: entry.channel,

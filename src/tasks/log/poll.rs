@@ -67,11 +67,11 @@ impl Poll {
     pub(super) fn set_node(&mut self, node: &Node, wanted: &[Wanted], decoder: &mut Decoder) -> Result<(), Failure> {
         let mut number = 0;
         // Of several nodes each is polled for the signals it has. At least one has them: that was checked before.
-        let has = |item: &&Wanted| match item {
+        let has = |item: &Wanted| match item {
             Wanted::Signal(name) | Wanted::Status(name) => node.signals.iter().any(|signal| signal.name == *name),
             Wanted::Object(..) => true,
         };
-        let own: Vec<Wanted> = wanted.iter().filter(has).cloned().collect();
+        let own: Vec<Wanted> = wanted.iter().map(|item| node.wanted(item)).filter(has).collect();
         if own.is_empty() && !wanted.is_empty() {
             return Ok(());
         }

@@ -120,6 +120,11 @@ impl<'o> Recording<'o> {
         }
     }
 
+    /// Records the emergencies of nodes that are not surveyed.
+    pub(super) fn watch_emergencies(&mut self, nodes: impl Iterator<Item = Node>) {
+        nodes.for_each(|node| self.emergencies.watch(&node));
+    }
+
     /// Makes room for the statistics of all known sources.
     pub(super) fn update_sources(&mut self) {
         self.tally.set_sources(self.decoder.sources());
@@ -144,7 +149,9 @@ impl<'o> Recording<'o> {
         self.samples.clear();
         self.due.frame(&received.frame);
         if let Some(listener) = &mut self.listener {
-            listener.take(received, &mut self.decoder);
+            if let Some(node) = listener.take(received, &mut self.decoder) {
+                self.emergencies.learn(&listener.known_node(node));
+            }
             self.update_sources();
         }
         match self.decoder.decode(received, &mut self.samples) {

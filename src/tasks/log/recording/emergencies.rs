@@ -50,6 +50,15 @@ impl Emergencies {
         }
     }
 
+    /// Takes what became known of a node, and keeps its last emergency.
+    pub(super) fn learn(&mut self, node: &Node) {
+        let last = self.repeating.get(&node.id).copied();
+        self.watch(node);
+        if let (Some(last), Some(known)) = (last, self.repeating.get_mut(&node.id)) {
+            *known = last;
+        }
+    }
+
     /// The emergency in a frame, and the node that sent it.
     pub(super) fn parse(&self, frame: &Frame) -> Option<(NodeId, Emergency)> {
         let node = *self.nodes.get(&frame.id())?;

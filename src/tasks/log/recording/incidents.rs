@@ -225,7 +225,7 @@ impl Recording<'_> {
             }
             None => {
                 let seen = self.decoder.lengths_seen(id);
-                self.decoder.replace(node.layout(), &self.options.wanted);
+                self.decoder.replace(node.layout(), &node.all_wanted(&self.options.wanted));
                 if changes.is_empty() {
                     for (_, mapped, received) in self.decoder.use_longer(id, &seen) {
                         observer.event(&LogEvent::LongerTpdo(id, mapped, received), at);

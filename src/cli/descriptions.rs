@@ -1,0 +1,214 @@
+//! The descriptions and EDS files that the user names, and whether they are for the devices on the bus.
+
+use super::Global;
+use super::exit::{FileError, IntoFailure};
+use crate::bus::claim::Claim;
+use crate::canopen::id::NodeId;
+use crate::device::catalog::{self, MadeFor, Model};
+use crate::device::eds;
+use crate::master::Master;
+use crate::node::Overrides;
+use crate::node::survey::revisions;
+use crate::output::failure::ErrorMessage;
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
+
+/// The longest file that is read. It keeps `--eds /dev/zero` from filling the memory.
+const MAX_FILE: u64 = 16 << 20;
+
+/// A description or EDS that the user named.
+#[derive(Clone, Debug)]
+pub(crate) struct Named {
+    /// The node that it is for; `None` for every node that it fits.
+    node: Option<NodeId>,
+    is_eds: bool,
+    model: Arc<Model>,
+}
+
+impl Named {
+    fn is_for(&self, node: NodeId) -> bool {
+        self.node.is_none_or(|own| own == node)
+    }
+
+    fn file(&self) -> &str {
+        self.model.made_for.first().map_or("", |device| device.file.as_str())
+    }
+}
+
+/// A file and a node whose device it is not for.
+type Misfits = BTreeSet<(usize, NodeId)>;
+
+/// The descriptions that the user named, for `nodes`. If it is one node, the device is compared with the files when the
+/// bus is opened: see [`check_pending`].
+pub(super) fn overrides(global: &Global, nodes: &[NodeId]) -> anyhow::Result<Overrides> {
+    let named = named(global)?;
+    let overrides = combine(&named, nodes, &Misfits::new());
+    if nodes.len() == 1 && !named.is_empty() {
+        global.pending.replace(Some((named, nodes.to_vec())));
+    }
+    Ok(overrides)
+}
+
+/// The descriptions that the user named, for those of the `nodes` that they fit.
+///
+/// # Errors
+/// A file is for another device than its node; for no node in particular: than all nodes.
+pub(super) fn overrides_on(master: &mut Master<'_>, global: &Global, nodes: &[NodeId]) -> anyhow::Result<Overrides> {
+    let named = named(global)?;
+    let misfits = misfits(master, global, &named, nodes)?;
+    Ok(combine(&named, nodes, &misfits))
+}
+
+/// Compares the device with the files that were read before the bus was opened.
+pub(super) fn check_pending(master: &mut Master<'_>, global: &Global) -> anyhow::Result<()> {
+    match global.pending.take() {
+        Some((named, nodes)) => misfits(master, global, &named, &nodes).map(drop),
+        None => Ok(()),
+    }
+}
+
+/// One description for each node: of its own before the one for all nodes, and the description before the EDS.
+fn combine(named: &[Named], nodes: &[NodeId], misfits: &Misfits) -> Overrides {
+    let mut overrides = Overrides::new();
+    for &node in nodes {
+        let find = |is_eds: bool| {
+            let fitting = named
+                .iter()
+                .enumerate()
+                .filter(|(at, named)| named.is_eds == is_eds && named.is_for(node) && !misfits.contains(&(*at, node)));
+            fitting.max_by_key(|(_, named)| named.node.is_some()).map(|(_, named)| &named.model)
+        };
+        let model = match (find(false), find(true)) {
+            (Some(description), Some(eds)) => Some(Arc::new(description.with_eds(eds))),
+            (description, eds) => description.or(eds).cloned(),
+        };
+        overrides.extend(model.map(|model| (node, model)));
+    }
+    overrides
+}
+
+/// Compares vendor and product of the files with those of the devices (1018h). Returns the files that are not used, each
+/// with the node.
+fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[NodeId]) -> anyhow::Result<Misfits> {
+    let mut misfits = Misfits::new();
+    let is_compared = |device: &MadeFor| device.vendor.or(device.product).is_some();
+    let can_ask = master.bus().is_live() && !matches!(global.claim, Claim::Nothing);
+    if !can_ask || !named.iter().any(|named| named.model.made_for.iter().any(is_compared)) {
+        return Ok(misfits);
+    }
+    master.listen_to(nodes).or_fail()?;
+    for (node, model) in combine(named, nodes, &misfits) {
+        master.set_quirks(node, &model.description.quirks);
+    }
+    let devices = revisions(master, nodes).or_fail()?;
+    for (at, named) in named.iter().enumerate() {
+        let Some(device) = named.model.made_for.first() else { continue };
+        let own: Vec<_> = devices.iter().filter(|(node, _)| named.is_for(**node)).collect();
+        let (fitting, others): (Vec<_>, Vec<_>) =
+            own.into_iter().partition(|(_, [vendor, product, _])| device.fits(*vendor, *product));
+        for (node, [.., revision]) in &fitting {
+            if !device.has_revision(*revision) {
+                let text = format!("node {node}: {} is for another revision of the device", named.file());
+                global.console().note(&text);
+            }
+        }
+        let Some((node, [vendor, product, _])) = others.first() else { continue };
+        if !fitting.is_empty() && named.node.is_none() {
+            misfits.extend(others.iter().map(|(node, _)| (at, **node)));
+            continue;
+        }
+        let message = mismatch(named.file(), **node, device, *vendor, *product);
+        if !global.only_reads {
+            let hint = "name the file of this device, or use this one anyway: --accept-mismatch";
+            return Err(ErrorMessage::usage(message).hint(hint).into());
+        }
+        global.console().warn(&message);
+    }
+    Ok(misfits)
+}
+
+fn mismatch(file: &str, node: NodeId, device: &MadeFor, vendor: Option<u32>, product: Option<u32>) -> String {
+    let code = |number: Option<u32>| number.map_or_else(|| "unknown".to_owned(), |number| format!("0x{number:X}"));
+    format!(
+        "node {node}: {file} is for another device: vendor {}, product {}; the device has vendor {}, product {}",
+        code(device.vendor),
+        code(device.product),
+        code(vendor),
+        code(product)
+    )
+}
+
+/// Reads the files that the options name.
+fn named(global: &Global) -> anyhow::Result<Vec<Named>> {
+    let mut named: Vec<Named> = Vec::new();
+    let devices = global.device.iter().map(|given| (given, false));
+    for (given, is_eds) in devices.chain(global.eds.iter().map(|given| (given, true))) {
+        if named.iter().any(|other| other.node == given.node && other.is_eds == is_eds) {
+            let kind = if is_eds { "EDS files" } else { "device descriptions" };
+            let whom = given.node.map_or_else(|| "the same nodes".to_owned(), |node| format!("node {node}"));
+            let hint = "name one, or one for each node: NODE=FILE";
+            return Err(ErrorMessage::usage(format!("two {kind} for {whom}")).hint(hint).into());
+        }
+        named.push(Named { node: given.node, is_eds, model: model(&given.what, is_eds, global)? });
+    }
+    Ok(named)
+}
+
+fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result<Arc<Model>> {
+    if !is_eds {
+        if let Some(model) = catalog::by_name(what) {
+            if !global.accept_mismatch {
+                return Ok(model);
+            }
+            return Ok(Arc::new(Model { made_for: Vec::new(), ..Model::clone(&model) }));
+        }
+        if !what.contains(['.', '/']) {
+            let names: Vec<&str> = catalog::names().collect();
+            let hint = format!("built-in devices: {}; or name a file", names.join(", "));
+            return Err(ErrorMessage::usage(format!("no built-in device \"{what}\"")).hint(hint).into());
+        }
+    }
+    let mut bytes = Vec::new();
+    File::open(what)
+        .and_then(|file| file.take(MAX_FILE).read_to_end(&mut bytes))
+        .map_err(|source| FileError { what: format!("read {what}"), source })?;
+    let usage = |error: String| ErrorMessage::usage(format!("{what}: {error}"));
+    let extension = Path::new(what).extension().map(|extension| extension.to_ascii_lowercase());
+    let mut model = if is_eds || extension.is_some_and(|extension| extension == "eds" || extension == "dcf") {
+        let eds = eds::read(&bytes).map_err(|error| usage(error.to_string()))?;
+        print_warnings(what, &eds.warnings, global);
+        Model::from_eds(&eds)
+    } else {
+        let text = String::from_utf8(bytes).map_err(|_| usage("not a text file".to_owned()))?;
+        Model::from_toml(&text).map_err(|error| ErrorMessage::usage(error.in_file(what)))?
+    };
+    model.made_for.iter_mut().for_each(|device| what.clone_into(&mut device.file));
+    if global.accept_mismatch {
+        model.made_for.clear();
+    }
+    model.warnings.iter_mut().for_each(|(_, text)| *text = format!("{what}: {text}"));
+    Ok(Arc::new(model))
+}
+
+/// One line for all warnings; with `-v` each one.
+fn print_warnings(file: &str, warnings: &[eds::Warning], global: &Global) {
+    let console = global.console();
+    match warnings {
+        warnings if global.verbose > 0 => {
+            warnings.iter().for_each(|warning| console.warn(&format!("{file}:{}: {}", warning.line, warning.text)));
+        }
+        [] => {}
+        [warning] => console.warn(&format!("{file}:{}: {}", warning.line, warning.text)),
+        warnings => console.warn(&format!("{file}: {} warnings (-v shows them)", warnings.len())),
+    }
+}
+
+/// Prints the warnings of an EDS about one object; with `-v` they were printed before.
+pub(super) fn warn_about(global: &Global, model: Option<&Arc<Model>>, index: u16) {
+    let Some(model) = model.filter(|model| global.verbose == 0 && model.warnings.len() > 1) else { return };
+    let about = model.warnings.iter().filter(|(of, _)| *of == index);
+    about.for_each(|(_, text)| global.console().warn(text));
+}

@@ -1,0 +1,185 @@
+//! The objects of nodes that other masters read and write, from their SDO traffic. Nothing is sent.
+
+use super::Identity;
+use crate::canopen::frame::Frame;
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::sdo::{Progress, Upload};
+use crate::canopen::value::DataType;
+use crate::device::catalog::{Model, recognise};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// What is known of nodes from SDO traffic.
+#[derive(Default)]
+pub struct Overheard {
+    known: BTreeMap<(NodeId, ObjectId), Vec<u8>>,
+    /// Objects that the nodes refused to read.
+    refused: BTreeSet<(NodeId, ObjectId)>,
+    uploads: BTreeMap<NodeId, (ObjectId, Upload)>,
+    downloads: BTreeMap<NodeId, (ObjectId, Vec<u8>)>,
+}
+
+impl Overheard {
+    /// Takes a frame. Returns the node and the object if it has a new value, or if the node refused to read it for the
+    /// first time.
+    pub fn take(&mut self, frame: &Frame) -> Option<(NodeId, ObjectId)> {
+        if let Some(node) = frame.id().sdo_request_node() {
+            self.request(node, frame);
+            return None;
+        }
+        let node = frame.id().sdo_response_node()?;
+        self.response(node, frame).map(|object| (node, object))
+    }
+
+    /// Forgets objects of a node: those for which `is_forgotten` is true.
+    pub fn forget(&mut self, node: NodeId, is_forgotten: impl Fn(ObjectId) -> bool) {
+        let stays = |(of, object): &(NodeId, ObjectId)| *of != node || !is_forgotten(*object);
+        self.known.retain(|key, _| stays(key));
+        self.refused.retain(stays);
+        if self.uploads.get(&node).is_some_and(|(object, _)| is_forgotten(*object)) {
+            self.uploads.remove(&node);
+        }
+        self.downloads.remove(&node);
+    }
+
+    /// The bytes of an object.
+    pub fn bytes(&self, node: NodeId, object: ObjectId) -> Option<&[u8]> {
+        self.known.get(&(node, object)).map(Vec::as_slice)
+    }
+
+    /// The first four bytes of an object as a number.
+    pub fn number(&self, node: NodeId, object: ObjectId) -> Option<u32> {
+        self.bytes(node, object).map(first_four)
+    }
+
+    /// Whether the node refused to read an object.
+    pub fn is_refused(&self, node: NodeId, object: ObjectId) -> bool {
+        self.refused.contains(&(node, object))
+    }
+
+    /// The identity of a node (1000h, 1018h, 1008h), as far as it is known.
+    pub fn identity(&self, node: NodeId) -> Identity {
+        let number = |index, sub| self.number(node, ObjectId::new(index, sub));
+        let name = self.bytes(node, ObjectId::new(0x1008, 0));
+        Identity {
+            device_type: number(0x1000, 0),
+            vendor: number(0x1018, 1),
+            product: number(0x1018, 2),
+            revision: number(0x1018, 3),
+            serial: number(0x1018, 4),
+            name: name.and_then(|bytes| DataType::VisibleString.decode(bytes).ok()).map(|name| name.to_string()),
+        }
+    }
+
+    /// The built-in description that fits what is known of a node.
+    pub fn recognise(&self, node: NodeId) -> Option<Arc<Model>> {
+        let mut traits = self.identity(node).traits();
+        let answers = self.known.iter().filter(|((of, _), _)| *of == node);
+        traits.answers = answers.map(|(&(_, object), bytes)| (object, bytes.clone())).collect();
+        recognise(&traits)
+    }
+
+    fn request(&mut self, node: NodeId, frame: &Frame) {
+        let [command, a, b, c, data @ ..] = frame.data() else { return };
+        let object = ObjectId::from_multiplexer([*a, *b, *c]);
+        match command {
+            0x40 => {
+                self.uploads.insert(node, (object, Upload::new(node, object, false)));
+            }
+            0x22 | 0x23 | 0x27 | 0x2b | 0x2f => {
+                let unused = if command & 1 == 0 { 0 } else { usize::from(command >> 2 & 3) };
+                let end = data.len().min(4 - unused);
+                self.downloads.insert(node, (object, data[..end].to_vec()));
+            }
+            0x80 => {
+                self.uploads.remove(&node);
+                self.downloads.remove(&node);
+            }
+            _ => {}
+        }
+    }
+
+    fn response(&mut self, node: NodeId, frame: &Frame) -> Option<ObjectId> {
+        if let (Some((object, _)), [0x60, a, b, c, ..]) = (self.downloads.get(&node), frame.data())
+            && *object == ObjectId::from_multiplexer([*a, *b, *c])
+            && let Some((object, bytes)) = self.downloads.remove(&node)
+        {
+            return self.learn(node, object, bytes);
+        }
+        // The other master requests the segments. The requests of our state machine are not sent.
+        let (object, upload) = self.uploads.get_mut(&node)?;
+        let object = *object;
+        match upload.on_frame(frame, &mut Vec::new()) {
+            Progress::Done(uploaded) => {
+                self.uploads.remove(&node);
+                self.learn(node, object, uploaded.bytes)
+            }
+            Progress::Failed(_) => {
+                self.uploads.remove(&node);
+                self.refused.insert((node, object)).then_some(object)
+            }
+            Progress::NotOurs | Progress::Continue => None,
+        }
+    }
+
+    fn learn(&mut self, node: NodeId, object: ObjectId, bytes: Vec<u8>) -> Option<ObjectId> {
+        (self.known.insert((node, object), bytes.clone()) != Some(bytes)).then_some(object)
+    }
+}
+
+/// The first four bytes as a number; missing ones are 0.
+pub fn first_four(bytes: &[u8]) -> u32 {
+    let mut wide = [0; 4];
+    let len = bytes.len().min(4);
+    wide[..len].copy_from_slice(&bytes[..len]);
+    u32::from_le_bytes(wide)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn heard(frames: &[&str]) -> (Overheard, Vec<ObjectId>) {
+        let mut heard = Overheard::default();
+        let mut learned = Vec::new();
+        for frame in frames {
+            learned.extend(heard.take(&frame.parse().expect("a frame")).map(|(_, object)| object));
+        }
+        (heard, learned)
+    }
+
+    #[test]
+    fn identity_from_expedited_and_segmented_answers() {
+        let node = NodeId::new(5).expect("a node-ID");
+        let (heard, learned) = heard(&[
+            "605#4000100000000000",
+            "585#4300100094010200",
+            "605#4018100100000000",
+            "585#4318100147000000",
+            "605#4008100000000000",
+            "585#4108100008000000",
+            "605#6000000000000000",
+            "585#004D482D342D4341",
+            "605#7000000000000000",
+            "585#1D4E000000000000",
+        ]);
+        let identity = heard.identity(node);
+        assert_eq!((identity.device_type, identity.vendor), (Some(0x0002_0194), Some(71)));
+        assert_eq!((identity.name.as_deref(), identity.product), (Some("MH-4-CAN"), None));
+        assert_eq!(learned.len(), 3);
+    }
+
+    #[test]
+    fn writes_count_after_the_acknowledge_and_refusals_are_known() {
+        let (node, timer) = (NodeId::new(5).expect("a node-ID"), ObjectId::new(0x1800, 5));
+        let write = "605#2B00180564000000";
+        assert_eq!(heard(&[write]).0.number(node, timer), None);
+        assert_eq!(heard(&[write, "585#8000180511000906"]).0.number(node, timer), None);
+        let (mut acknowledged, _) = heard(&[write, "585#6000180500000000"]);
+        assert_eq!(acknowledged.number(node, timer), Some(100));
+        acknowledged.forget(node, |object| object.index == 0x1800);
+        assert_eq!(acknowledged.number(node, timer), None);
+        assert!(heard(&["605#4000180500000000", "585#8000180511000906"]).0.is_refused(node, timer));
+    }
+}

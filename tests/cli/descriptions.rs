@@ -1,0 +1,173 @@
+//! Descriptions and EDS files that the user names: of this device, of another one, together, with warnings.
+
+use super::Bench;
+use std::fs;
+
+/// An EDS for this vendor and product, with these objects: index, name, data type.
+fn eds(vendor: u32, product: u32, objects: &[(u16, &str, u8)]) -> String {
+    let mut text = format!("[DeviceInfo]\nVendorName=Maker\nVendorNumber={vendor:#x}\nProductNumber={product:#x}\n");
+    text += &format!("[ManufacturerObjects]\nSupportedObjects={}\n", objects.len());
+    for (at, (index, ..)) in (1..).zip(objects) {
+        text += &format!("{at}={index:#06x}\n");
+    }
+    for (index, name, data_type) in objects {
+        text += &format!("[{index:04X}]\nParameterName={name}\nObjectType=7\nDataType={data_type}\nAccessType=rw\n");
+    }
+    text
+}
+
+const NAMES: [(u16, &str, u8); 4] =
+    [(0x1017, "Heartbeat", 6), (0x2200, "Offset", 8), (0x2201, "4-20 mA Input", 8), (0x2202, "Position Value", 4)];
+
+fn bench_with(devices: &str, files: &[(&str, String)]) -> Bench {
+    let bench = Bench::of(devices);
+    files.iter().for_each(|(name, text)| fs::write(bench.path(name), text).expect("written"));
+    bench
+}
+
+#[test]
+fn an_eds_of_another_device_is_a_warning_or_an_error() {
+    let bench = bench_with("mh4@1", &[("vendor.eds", eds(0x56, 1, &NAMES)), ("product.eds", eds(0x47, 2, &NAMES))]);
+    for file in ["vendor.eds", "product.eds"] {
+        let run = |line: &str| bench.run(&format!("--eds {file} {line}"));
+        for line in ["read 1 pressure", "sdo read 1 0x1018:1", "info 1"] {
+            let done = run(line).exit(0);
+            assert!(done.stderr.contains(&format!("node 1: {file} is for another device")), "{line}: {}", done.stderr);
+        }
+        for line in [
+            "log 1 --sync 100ms --count 2",
+            "check 1 'pressure<5'",
+            "sdo write 1 0x1017 100",
+            "unit 1 pressure mbar",
+            "store 1",
+            "pdo map 1 1 --transmission sync:2",
+        ] {
+            let line = line.replace('\'', "");
+            let done = run(&line).exit(2);
+            assert!(done.stderr.contains("or use this one anyway: --accept-mismatch"), "{line}: {}", done.stderr);
+            assert!(done.frames_of("601").iter().all(|data| data.starts_with("40")), "{line}: {:?}", done.frames);
+        }
+        let done = run("sdo write 1 0x1017 100 --accept-mismatch").exit(0);
+        assert_eq!(done.stderr, "");
+    }
+}
+
+#[test]
+fn numbers_that_are_0_or_missing_are_not_compared() {
+    let text = eds(0, 0, &NAMES).replace("ProductNumber=0x0\n", "RevisionNumber=0x999\n");
+    let bench = bench_with("mh4@1", &[("x.eds", text)]);
+    let done = bench.run("--eds x.eds sdo write 1 0x1017 100").exit(0);
+    assert_eq!(done.stderr, "node 1: x.eds is for another revision of the device\n");
+}
+
+#[test]
+fn an_eds_for_all_nodes_applies_to_those_that_it_fits() {
+    let bench = bench_with("mh4@1,dps@127", &[("mh4.eds", eds(0x47, 1, &NAMES))]);
+    let done = bench.run("--eds mh4.eds log 1,127 --poll 100ms --count 4").exit(0);
+    assert!(done.stdout.contains(",127,pressure,"), "{}", done.stdout);
+    let done = bench.run("--eds 127=mh4.eds log 1,127 --poll 100ms --count 4").exit(2);
+    assert!(done.stderr.contains("node 127: mh4.eds is for another device"), "{}", done.stderr);
+}
+
+#[test]
+fn values_and_vendor_are_those_of_the_device() {
+    let other = eds(0x56, 0x41, &[(0x6130, "Value", 4), (0x2200, "Offset", 8)]).replace("[6130]", "[6130sub1]");
+    let bench = bench_with("mh4@1", &[("other.eds", other)]);
+    let plain = bench.run("scan 1 --format json").exit(0).json();
+    let scanned = bench.run("--eds other.eds scan 1 --format json").exit(0);
+    assert_eq!(scanned.json()[0]["vendor_name"], plain[0]["vendor_name"]);
+    assert!(scanned.stderr.contains("node 1: the description or EDS is for another device"), "{}", scanned.stderr);
+    assert_eq!(
+        bench.run("--eds other.eds read 1 pressure").exit(0).stdout,
+        bench.run("read 1 pressure").exit(0).stdout
+    );
+}
+
+#[test]
+fn a_description_and_an_eds_are_used_together() {
+    let own = eds(0x47, 1, &[(0x2200, "Offset", 8), (0x1017, "Other name", 6)]);
+    let bench = bench_with("mh4@1", &[("x.eds", own)]);
+    let run = |line: &str| bench.run(&format!("--device mh4 --eds x.eds {line}"));
+    run("sdo read 1 producer-heartbeat-time").exit(0);
+    let done = run("sdo read 1 offset").exit(4);
+    assert!(done.stderr.contains("read 0x2200:0"), "{}", done.stderr);
+    bench.run("--eds x.eds --eds x.eds read 1").refuses("two EDS files for the same nodes");
+    bench.run("--device 1=mh4 --device 1=dps read 1").refuses("two device descriptions for node 1");
+    run("--eds 1=x.eds read 1").exit(0);
+}
+
+#[test]
+fn warnings_of_an_eds_are_one_line_and_those_of_the_object() {
+    let text = eds(0x47, 1, &NAMES).replace("4=0x2202\n", "").replace("3=0x2201\n", "");
+    let bench = bench_with("mh4@1", &[("x.eds", text)]);
+    let done = bench.run("--eds x.eds sdo read 1 0x1018:1").exit(0);
+    assert_eq!(done.stderr.lines().filter(|line| line.contains("x.eds")).count(), 1, "{}", done.stderr);
+    assert!(done.stderr.contains("warnings (-v shows them)"), "{}", done.stderr);
+    let done = bench.run("--eds x.eds sdo read 1 0x2202").exit(4);
+    assert!(done.stderr.contains("object 2202h is described, but not listed"), "{}", done.stderr);
+    assert!(!done.stderr.contains("object 2201h"), "{}", done.stderr);
+    let done = bench.run("-v --eds x.eds sdo read 1 0x1018:1").exit(0);
+    assert!(done.stderr.contains("2201h") && done.stderr.contains("2202h"), "{}", done.stderr);
+}
+
+#[test]
+fn what_is_no_address_is_a_name() {
+    let bench = bench_with("mh4@1", &[("x.eds", eds(0x47, 1, &NAMES))]);
+    for (name, object) in [
+        ("offset", "0x2200:0"),
+        ("OFFSET", "0x2200:0"),
+        ("4-20-ma-input", "0x2201:0"),
+        ("4-20 mA Input", "0x2201:0"),
+        ("Position Value", "0x2202:0"),
+    ] {
+        for command in [&["sdo", "read"][..], &["read"]] {
+            let words: Vec<&str> = ["--eds", "x.eds"].iter().chain(command).copied().chain(["1", name]).collect();
+            let done = bench.run_words(&words).exit(4);
+            assert!(done.stderr.contains(&format!("read {object}")), "{words:?}: {}", done.stderr);
+        }
+    }
+    let done = bench.run("--eds x.eds sdo read 1 ofset").exit(2);
+    assert!(done.stderr.contains("nearest: offset"), "{}", done.stderr);
+    let done = bench.run("--eds x.eds log 1 heartbeat --poll 100ms --count 2").exit(0);
+    assert!(done.stdout.contains(",1,0x1017:0,0,"), "{}", done.stdout);
+}
+
+/// A description without objects: one signal, and a fixed unit if there is one.
+fn description(unit: Option<&str>) -> String {
+    let head = "name = \"mine\"\ntitle = \"Mine\"\nvendor = \"Maker\"\n[identify]\n";
+    let signal = "[[signal]]\nname = \"level\"\nchannel = 1\nvalue = \"0x6130:1\"\nstatus = \"0x6150:1\"\n";
+    let object = |unit| {
+        format!(
+            "[[object]]\nat = \"0x6130:1\"\nname = \"level\"\ntype = \"r32\"\naccess = \"ro\"\npdo = true\nunit = \"{unit}\"\n"
+        )
+    };
+    let status = "[[object]]\nat = \"0x6150:1\"\nname = \"state\"\ntype = \"u8\"\naccess = \"ro\"\n";
+    format!("{head}{signal}{}", unit.map(|unit| object(unit) + status).unwrap_or_default())
+}
+
+#[test]
+fn tpdos_that_a_description_leaves_open_are_read_from_the_device() {
+    let files = [("mine.toml", description(None)), ("x.eds", eds(0x47, 1, &NAMES))];
+    let bench = bench_with("mh4@1", &files);
+    for line in ["--device mine.toml", "--eds x.eds", "--device mine.toml --eds x.eds"] {
+        let done = bench.run(&format!("{line} log 1 --sync 100ms --count 2")).exit(0);
+        assert_eq!(done.stdout.lines().count(), 3, "{}", done.stdout);
+        let done = bench.run(&format!("{line} pdo show 1")).exit(0);
+        assert!(done.stdout.contains("0x181"), "{}", done.stdout);
+    }
+    // 1008h is not read if the user named the description.
+    let named = bench.run("--device mine.toml read 1");
+    assert!(!named.frames.iter().any(|frame| frame.starts_with("601#40081000")), "{:?}", named.frames);
+}
+
+#[test]
+fn a_unit_in_a_description_is_the_unit_of_the_signal() {
+    let head = "name = \"mine\"\ntitle = \"Mine\"\nvendor = \"Maker\"\n[identify]\n";
+    let signal = "[[signal]]\nname = \"flow\"\nchannel = 9\nvalue = \"0x1017:0\"\n";
+    let object = "[[object]]\nat = \"0x1017:0\"\nname = \"flow\"\ntype = \"u16\"\naccess = \"ro\"\nunit = \"l/min\"\n";
+    let bench = bench_with("mh4@1", &[("mine.toml", format!("{head}{signal}{object}"))]);
+    let done = bench.run("--device mine.toml read 1 --format csv").exit(0);
+    assert!(done.stdout.contains(",flow,0,l/min,"), "{}", done.stdout);
+    let done = bench.run("--device mine.toml log 1 --poll 100ms --count 1").exit(0);
+    assert!(done.stdout.contains(",1,flow,0,l/min,,"), "{}", done.stdout);
+}
