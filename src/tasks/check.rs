@@ -64,6 +64,13 @@ impl CheckReport {
         }
     }
 
+    /// Whether a node satisfies an expression, and other nodes failed.
+    pub fn is_partial(&self) -> bool {
+        let has_failed = |node: NodeId| self.failures.iter().any(|failure| failure.node == Some(node));
+        let mut satisfied = self.verdicts.iter().filter(|verdict| verdict.outcome == Outcome::Ok);
+        !self.failures.is_empty() && satisfied.any(|verdict| verdict.node.is_some_and(|node| !has_failed(node)))
+    }
+
     /// The number of verdicts with this outcome.
     pub fn count(&self, outcome: Outcome) -> usize {
         self.verdicts.iter().filter(|verdict| verdict.outcome == outcome).count()
@@ -210,7 +217,7 @@ fn check_recording(
     }
     let started = checker.started;
     let verdicts = checker.verdicts(&outcome)?;
-    let failures = outcome.nothing.into_iter().collect();
+    let failures = outcome.failed.into_iter().chain(outcome.nothing).collect();
     Ok(CheckReport { verdicts, started, length: outcome.length, failures, remarks: outcome.remarks })
 }
 
@@ -219,6 +226,8 @@ pub struct Checker<'a> {
     evaluator: Evaluator,
     nodes: Vec<NodeId>,
     skip_unsupported: bool,
+    /// The nodes whose setup could not be read, in the order of [`RecordingReport::failed`].
+    failed: Vec<NodeId>,
     /// The devices were known before the recording.
     is_bound: bool,
     /// The sources with at least one sample, if the devices were not known before: the units of other sources may
@@ -241,6 +250,7 @@ impl<'a> Checker<'a> {
             evaluator: Evaluator::new(expressions),
             nodes: nodes.to_vec(),
             skip_unsupported,
+            failed: Vec::new(),
             is_bound: false,
             received: BTreeSet::new(),
             started: None,
@@ -274,6 +284,12 @@ impl<'a> Checker<'a> {
         ControlFlow::Continue(())
     }
 
+    /// The nodes whose setup could not be read, with the places of their failures in [`RecordingReport::failed`].
+    fn missing_nodes(&self) -> Vec<MissingData> {
+        let missing = |(at, &node)| MissingData { node, signal: None, reason: Reason::Failed(at) };
+        self.failed.iter().enumerate().map(missing).collect()
+    }
+
     /// Returns the verdicts at the end of a recording.
     ///
     /// # Errors
@@ -282,23 +298,32 @@ impl<'a> Checker<'a> {
         if let Some(failure) = self.failure {
             return Err(failure);
         }
+        let mut all_missing = self.missing_nodes();
         let missing = |&node: &NodeId| {
-            let reason = if report.nothing.is_some() { Reason::Failed(0) } else { Reason::NodeStopped(node) };
+            let reason = match report.nothing {
+                Some(_) => Reason::Failed(report.failed.len()),
+                None => Reason::NodeStopped(node),
+            };
             MissingData { node, signal: None, reason }
         };
-        let missing: Vec<MissingData> = report.lost.iter().map(missing).collect();
+        all_missing.extend(report.lost.iter().map(missing));
         if !self.is_bound && !self.skip_unsupported {
             self.evaluator.add_missing_nodes(&self.nodes);
         }
         let end = self.started.map(|started| started.mono + report.length);
-        Ok(self.evaluator.verdicts(end, &missing))
+        Ok(self.evaluator.verdicts(end, &all_missing))
     }
 }
 
 impl Observer for Checker<'_> {
+    fn failed(&mut self, failures: &[Failure]) -> Result<(), Failure> {
+        self.failed = failures.iter().filter_map(|failure| failure.node).collect();
+        self.observer.failed(failures)
+    }
+
     fn begin(&mut self, nodes: &[Node]) -> Result<(), Failure> {
         let available = AvailableSignals::from_layouts(nodes.iter().map(Node::layout));
-        self.evaluator.bind(&self.nodes, &available, self.skip_unsupported, &[])?;
+        self.evaluator.bind(&self.nodes, &available, self.skip_unsupported, &self.missing_nodes())?;
         self.is_bound = true;
         wanted_targets(nodes, &self.evaluator)?;
         self.observer.begin(nodes)

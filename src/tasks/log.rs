@@ -31,7 +31,7 @@ use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
 use crate::node::Node;
 use crate::node::Overrides;
-use crate::node::survey::survey_nodes;
+use crate::node::survey::survey_each;
 use crate::tasks::Failure;
 pub use changes::{Change, TpdoChange};
 use checks::{check_wanted, refuse_second_sync, sync_share};
@@ -126,6 +126,14 @@ pub enum LogEvent {
 
 /// Takes samples and events. `Break` ends the recording.
 pub trait Observer {
+    /// Nodes whose setup could not be read, before [`Observer::begin`]. A passive recording does not call it.
+    ///
+    /// # Errors
+    /// The recording must not start. By default it does not start without each of the nodes.
+    fn failed(&mut self, failures: &[Failure]) -> Result<(), Failure> {
+        failures.first().map_or(Ok(()), |failure| Err(failure.clone()))
+    }
+
     /// The nodes to be recorded, before anything is changed. A passive recording does not call it.
     ///
     /// # Errors
@@ -175,6 +183,8 @@ pub struct RecordingReport {
     pub length: Duration,
     /// The statistics of each source.
     pub statistics: Vec<(Source, Statistics)>,
+    /// Nodes whose setup could not be read. They were not recorded.
+    pub failed: Vec<Failure>,
     /// Nodes that sent no samples, or stopped before the end.
     pub lost: Vec<NodeId>,
     /// Why there is not one value.
@@ -220,7 +230,7 @@ pub fn log(
         return record_passively(master, options, observer);
     }
     master.listen_to(&options.nodes)?;
-    let nodes = survey_nodes(master, &options.nodes, &options.overrides)?;
+    let (nodes, failed) = survey(master, options, observer)?;
     observer.begin(&nodes)?;
     check_wanted(&nodes, options)?;
     let mut recording = Recording::new(nodes, options, master.bus());
@@ -262,7 +272,28 @@ pub fn log(
     if let Err(error) = restored {
         recording.remarks.push(Remark::StatesNotRestored(Box::new(error.into())));
     }
-    finish(recording, result)
+    Ok(RecordingReport { failed, ..finish(recording, result)? })
+}
+
+/// Reads the setup of the nodes. Returns the nodes, and the failures of the others if the observer accepts them.
+fn survey(
+    master: &mut Master<'_>,
+    options: &LogOptions,
+    observer: &mut dyn Observer,
+) -> Result<(Vec<Node>, Vec<Failure>), Failure> {
+    let (mut nodes, mut failed) = (Vec::new(), Vec::new());
+    for result in survey_each(master, &options.nodes, &options.overrides)? {
+        match result {
+            Ok(node) => nodes.push(node),
+            Err(error) => failed.push(Failure::from(error)),
+        }
+    }
+    match failed.first() {
+        Some(first) if nodes.is_empty() => return Err(first.clone()),
+        Some(_) => observer.failed(&failed)?,
+        None => {}
+    }
+    Ok((nodes, failed))
 }
 
 fn record_passively(

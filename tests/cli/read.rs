@@ -205,3 +205,14 @@ fn user_can_state_the_type_of_an_object() {
     bench.run("read 1 0x6130:1/vs").exit(2);
     bench.run("check 1 0x1017:0/u16<1").exit(0);
 }
+
+#[test]
+fn each_json_error_of_several_nodes_keeps_its_own_kind() {
+    let done = still().run("read 5,9 -f json").exit(7);
+    assert_eq!(done.stdout.lines().count(), 2, "{}", done.stdout);
+    let errors: Vec<serde_json::Value> = done.stderr.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let [error] = &errors[..] else { panic!("one error: {}", done.stderr) };
+    assert_eq!(error["error"]["kind"], "no-answer");
+    assert_eq!(error["error"]["exit"], 3);
+    assert_eq!(error["error"]["node"], 9);
+}

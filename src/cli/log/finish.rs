@@ -94,7 +94,7 @@ impl Finished {
         }
     }
 
-    /// Success, or the failures; the first one gives the exit code.
+    /// Success, or the failures; the first one gives the exit code, and `partial` if only some nodes could not be recorded.
     pub(super) fn result(&self, files: &OpenFiles) -> anyhow::Result<()> {
         let unmet = all_satisfied(&self.verdicts, &[]).err();
         let (failed, without_data) = match unmet {
@@ -102,9 +102,12 @@ impl Finished {
             unmet => (None, unmet),
         };
         let own = [self.ended_early(), self.too_slow(files), self.lost_nodes()];
-        let own = own.into_iter().flatten().map(Failure::general);
-        let failures: Vec<Failure> = failed.into_iter().chain(own).chain(without_data).collect();
-        match failures.first().map(Failure::kind) {
+        let mut failures: Vec<Failure> = failed.into_iter().collect();
+        failures.extend(own.into_iter().flatten().map(Failure::general));
+        let nodes = self.report.failed.clone();
+        let partial = (failures.is_empty() && !nodes.is_empty()).then_some(Kind::Partial);
+        failures.extend(nodes.into_iter().chain(without_data));
+        match partial.or(failures.first().map(Failure::kind)) {
             None => Ok(()),
             Some(kind) => Err(Several { kind, failures }.into()),
         }

@@ -35,6 +35,8 @@ pub(super) struct Recorder {
     file: String,
     /// The nodes that no other cangauge may use until the recording runs.
     pub(super) claims: Option<Claims>,
+    /// The user typed `all`: a node that fails does not stop the recording of the others.
+    pub(super) is_all: bool,
     start: Option<Mono>,
     checked: Option<Mono>,
     lost: u64,
@@ -57,6 +59,7 @@ impl Recorder {
             console,
             error: None,
             claims: None,
+            is_all: false,
             file,
             start: None,
             checked: None,
@@ -127,6 +130,10 @@ impl Recorder {
 }
 
 impl Observer for Recorder {
+    fn failed(&mut self, failures: &[Failure]) -> Result<(), Failure> {
+        failures.first().filter(|_| !self.is_all).map_or(Ok(()), |failure| Err(failure.clone()))
+    }
+
     fn sources(&mut self, sources: &[Source]) -> Result<(), Failure> {
         self.rows.set_sources(sources).map_err(|mismatch| {
             Failure::general(LogFailure::OtherColumns {

@@ -13,7 +13,7 @@ use super::poll::Poll;
 use super::rereads::Rereads;
 use super::silence::Evidence;
 use super::states::NmtStates;
-use super::{LogEvent, LogOptions, Mode, Observer, Remark};
+use super::{LogEvent, LogOptions, Observer, Remark};
 use crate::bus::{Bus, Filters, ReceiveBuffer, Received, TimestampSource};
 use crate::canopen::id::{CanId, NodeId};
 use crate::master::{Answer, Error, Master, SdoError, Ticket};
@@ -59,8 +59,8 @@ pub(super) struct Recording<'o> {
 
 impl<'o> Recording<'o> {
     pub(super) fn new(nodes: Vec<Node>, options: &'o LogOptions, bus: &dyn Bus) -> Recording<'o> {
-        // A passive recording expects no node in particular.
-        let expected = options.nodes.iter().copied().filter(|_| options.mode != Mode::Passive);
+        // A passive recording has no nodes here, and expects none in particular.
+        let expected: Vec<NodeId> = nodes.iter().map(|node| node.id).collect();
         let mut emergencies = Emergencies::default();
         nodes.iter().for_each(|node| emergencies.watch(node));
         Recording {
@@ -71,7 +71,7 @@ impl<'o> Recording<'o> {
             states: NmtStates::default(),
             listener: None,
             tally: Tally::new(),
-            liveness: Liveness::new(expected),
+            liveness: Liveness::new(expected.into_iter()),
             emergencies,
             due: DueTpdos::default(),
             rereads: Rereads::new(&options.overrides),

@@ -11,6 +11,7 @@ impl Recording<'_> {
         self.remark_at_end();
         let nothing = (self.tally.rows == 0).then(|| why_nothing(&self, self.options));
         RecordingReport {
+            failed: Vec::new(),
             rows: self.tally.rows,
             length: self.tally.length(),
             lost,
