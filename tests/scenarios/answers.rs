@@ -1,4 +1,4 @@
-//! Late answers, and the answers that another client's requests bring: none may become ours.
+//! Late answers, and answers to another client's requests: the program accepts neither as its own.
 
 use cangauge::bus::Bus;
 use cangauge::bus::faults::{FaultPlan, Faulty};
@@ -15,7 +15,7 @@ use std::time::Duration;
 
 const TIMEOUT: Duration = Duration::from_millis(100);
 
-/// A server that answers every read with a number that counts up, the n-th after its own delay.
+/// A server that answers each read with the next number. Each answer has its own delay.
 pub(super) struct Slow {
     delays: VecDeque<u64>,
     due: VecDeque<(Mono, Frame)>,
@@ -35,7 +35,7 @@ impl Station for Slow {
         let [0x40, a, b, c, ..] = *frame.data() else { return };
         self.answered += 1;
         let answer = format!("585#43{a:02X}{b:02X}{c:02X}{:02X}000000", self.answered);
-        // A server answers in order: no answer before an earlier one.
+        // A server answers in order.
         let earliest = self.due.back().map_or(now, |(due, _)| *due);
         let due = earliest.max(now + Duration::from_millis(self.delays.pop_front().unwrap_or(1)));
         self.due.push_back((due, answer.parse().expect("a frame")));
@@ -58,12 +58,12 @@ fn node() -> NodeId {
     NodeId::new(5).expect("a node-ID")
 }
 
-/// What reads of the objects give, one after the other, with answers that come after `delays` ms each.
+/// Reads the objects in order; the answers arrive after `delays` (ms). Returns the values.
 fn reads(objects: &[u16], retries: u32, delays: &[u64]) -> Vec<Option<u64>> {
     reads_without(objects, retries, delays, &[])
 }
 
-/// The same where some of the frames that are sent, counted from 0, get lost.
+/// Like `reads`; the sent frames with the numbers in `lost` (from 0) are lost.
 fn reads_without(objects: &[u16], retries: u32, delays: &[u64], lost: &[u64]) -> Vec<Option<u64>> {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
     bus.attach(Slow::new(delays));
@@ -79,29 +79,29 @@ fn reads_without(objects: &[u16], retries: u32, delays: &[u64], lost: &[u64]) ->
 }
 
 #[test]
-fn a_late_answer_is_not_the_next_reading_of_another_object() {
+fn late_answer_is_not_used_for_another_object() {
     assert_eq!(reads(&[0x2000, 0x2001], 0, &[150, 1]), [None, Some(2)]);
 }
 
 #[test]
-fn a_late_answer_is_not_the_next_reading_of_the_same_object() {
-    // The second reading waits behind a read of 1000h (answer 2), which proves that the first one's answer
-    // can come no more; its own is the third.
+fn late_answer_is_not_used_for_the_next_read_of_the_same_object() {
+    // Before the second read the client reads 1000h (answer 2). After that answer, the late one cannot arrive.
+    // The second read gets answer 3.
     assert_eq!(reads(&[0x2000, 0x2000, 0x2000], 0, &[150, 1, 1, 1]), [None, Some(3), Some(4)]);
-    // After a repeat two answers are under way for one reading.
+    // After a repeated request there are two answers to one read.
     assert_eq!(reads(&[0x2000, 0x2000], 1, &[150, 1, 1, 1]), [Some(1), Some(4)]);
-    // An answer that came in the meantime, to nobody, needs no such care.
+    // If the late answer has arrived already, no read of 1000h is needed.
     assert_eq!(reads(&[0x2000, 0x2001, 0x2000], 0, &[120, 50, 1, 1]), [None, Some(2), Some(3)]);
 }
 
 #[test]
-fn what_makes_sure_of_that_is_itself_no_object_that_an_old_answer_may_come_of() {
-    // 1000h is answered late, and so is 2000h: to read 1000h once more would prove nothing.
+fn object_with_a_stale_request_is_not_used_for_the_barrier_read() {
+    // The answers to 1000h and 2000h are both late: reading 1000h again proves nothing.
     assert_eq!(reads(&[0x1000, 0x2000, 0x2000], 0, &[250, 1, 1, 1]), [None, None, Some(4)]);
 }
 
 #[test]
-fn a_write_that_waits_behind_it_is_not_said_to_have_been_sent() {
+fn write_behind_a_failed_barrier_read_is_not_reported_as_sent() {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
     bus.attach(Slow::new(&[250]));
     let mut bus = Faulty::new(bus, FaultPlan { lose_sent: [1].into(), ..FaultPlan::default() });
@@ -114,40 +114,40 @@ fn a_write_that_waits_behind_it_is_not_said_to_have_been_sent() {
 }
 
 #[test]
-fn a_write_that_asked_for_blocks_in_vain_is_what_got_no_answer() {
+fn unanswered_block_request_is_reported_as_the_write() {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
     let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 0 });
     let object = ObjectId::new(0x2000, 0);
     let write = Request::write(node(), object, vec![0; 50], DownloadSize::Indicated);
     let write = write.blocks(Blocks::First { threshold: 0 });
-    let error = master.transfer_one(write).expect("the bus works").expect_err("nobody is there");
+    let error = master.transfer_one(write).expect("the bus works").expect_err("no device is there");
     assert_eq!((error.operation, error.object), (Operation::Write, object));
 }
 
 #[test]
-fn what_makes_sure_of_that_is_repeated_as_the_reading_itself() {
+fn barrier_read_is_repeated_like_any_read() {
     assert_eq!(reads_without(&[0x2000, 0x2000], 1, &[150], &[2]), [Some(1), Some(4)]);
-    // An answer to its repetition is none to a reading of the same object.
+    // The answer to the repeated barrier read is not used for a later read of 1000h.
     assert_eq!(reads(&[0x2000, 0x2000, 0x1000], 1, &[150, 1, 101, 1]), [Some(1), Some(5), Some(6)]);
 }
 
 #[test]
-fn a_server_that_stays_silent_is_no_answer_however_often_it_is_asked() {
+fn silent_server_is_no_answer_after_every_read() {
     assert_eq!(reads(&[0x2000, 0x2000], 1, &[10_000]), [None, None]);
 }
 
-/// A server for writes that acknowledges the other client's write and refuses ours.
-struct Torn {
+/// A server that acknowledges the other client's write and rejects ours.
+struct TwoClientServer {
     ours: bool,
 }
 
-impl Station for Torn {
+impl Station for TwoClientServer {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
         if frame.data().first() == Some(&0x2f) && !self.ours {
             self.ours = true;
-            // The other client's request was on the wire just before, and its acknowledge comes first.
+            // The other client's request was sent first, so its acknowledgement comes first.
             for text in ["605#2F00200007000000", "585#6000200000000000", "585#8000200030000906"] {
                 out.send(text.parse().expect("a frame"));
             }
@@ -164,26 +164,26 @@ impl Station for Torn {
 }
 
 #[test]
-fn the_acknowledge_of_another_clients_write_is_no_success_of_ours() {
+fn acknowledgement_for_another_client_is_no_success() {
     let mut bus = MemoryBus::new(Clock::Virtual);
-    bus.attach(Torn { ours: false });
+    bus.attach(TwoClientServer { ours: false });
     let mut master = Master::new(&mut bus, Timing::default());
     let request = Request::write(node(), ObjectId::new(0x2000, 0), vec![5], DownloadSize::Indicated);
     let error = master.transfer_one(request).expect("the bus works").expect_err("no success");
     assert_eq!(error.failure, SdoFailure::Ambiguous);
 }
 
-/// A server that begins a transfer in segments and falls silent, and what it hears.
+/// A server that starts a segmented transfer and then does not answer. It keeps the received frames.
 #[derive(Default)]
-struct Begun {
-    heard: Vec<String>,
+struct StalledServer {
+    received: Vec<String>,
 }
 
-impl Station for Begun {
+impl Station for StalledServer {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
-        self.heard.push(frame.to_string());
+        self.received.push(frame.to_string());
         if frame.data().first() == Some(&0x40) {
             out.send("585#4100200064000000".parse().expect("a frame"));
         }
@@ -198,10 +198,10 @@ impl Station for Begun {
     fn sent(&mut self, _: Mono, _: &Frame) {}
 }
 
-/// What a server that has begun hears last, of a read that ends at this time at the latest.
-fn last_heard(interrupt: Option<Duration>) -> String {
+/// The last frame that the stalled server receives, for a read that ends at `interrupt` at the latest.
+fn last_received(interrupt: Option<Duration>) -> String {
     let mut bus = MemoryBus::new(Clock::Virtual);
-    bus.attach(Begun::default());
+    bus.attach(StalledServer::default());
     if let Some(moment) = interrupt {
         bus.interrupt_at(Mono::START + moment);
     }
@@ -209,23 +209,23 @@ fn last_heard(interrupt: Option<Duration>) -> String {
     let ended = master.transfer_one(Request::read(node(), ObjectId::new(0x2000, 0)));
     assert_eq!(ended.is_err(), interrupt.is_some());
     master.settle();
-    // What has just been sent takes its time on the wire.
+    // Frames sent just now need time on the bus.
     let _ = bus.receive(bus.now().mono + Duration::from_millis(10)).expect("the bus works");
-    let server = bus.stations::<Begun>().next().expect("it is there");
-    server.heard.last().expect("a request").clone()
+    let server = bus.stations::<StalledServer>().next().expect("it is there");
+    server.received.last().expect("a request").clone()
 }
 
 #[test]
-fn a_server_that_has_begun_is_told_of_the_end() {
+fn started_transfer_is_aborted_on_timeout_and_interrupt() {
     for interrupt in [None, Some(TIMEOUT / 2)] {
-        assert_eq!(last_heard(interrupt), "605#8000200000000405", "{interrupt:?}");
+        assert_eq!(last_received(interrupt), "605#8000200000000405", "{interrupt:?}");
     }
 }
 
-/// Somebody who sends one frame every 10 ms for two seconds.
-struct Chatter(Frame, Mono);
+/// A station that sends one frame every 10 ms for two seconds.
+struct PeriodicSender(Frame, Mono);
 
-impl Station for Chatter {
+impl Station for PeriodicSender {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
@@ -245,11 +245,11 @@ impl Station for Chatter {
 }
 
 #[test]
-fn no_other_frame_extends_the_wait() {
+fn other_frames_do_not_extend_the_timeout() {
     // TPDOs, heartbeats, requests of another client, and the answers to them.
     for text in ["185#0000803F00", "705#05", "605#4001200000000000", "585#4301200001000000", "585#60012000"] {
         let mut bus = MemoryBus::new(Clock::Virtual);
-        bus.attach(Chatter(text.parse().expect("a frame"), Mono::START + Duration::from_millis(1)));
+        bus.attach(PeriodicSender(text.parse().expect("a frame"), Mono::START + Duration::from_millis(1)));
         let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 0 });
         let error = master.transfer_one(Request::read(node(), ObjectId::new(0x2000, 0))).expect("the bus works");
         let failure = error.expect_err("nobody answers").failure;

@@ -1,5 +1,5 @@
-//! Node-ID and bit rate. Whatever fails: no other device is changed, a success is the real state of the device, and no
-//! device stays in configuration state.
+//! Node-ID and bit rate. After any fault no other device is changed, a reported success is the real state of the
+//! device, and no device stays in configuration state.
 
 mod faults;
 mod interrupted;
@@ -26,16 +26,16 @@ fn node(id: u8) -> NodeId {
 }
 
 /// Node-ID and bit rate of a device, now and after a power cycle.
-type Held = (Option<u8>, Option<u32>, Option<u8>, Option<u32>);
+type Snapshot = (Option<u8>, Option<u32>, Option<u8>, Option<u32>);
 
-fn held(device: &Device) -> Held {
+fn snapshot(device: &Device) -> Snapshot {
     let number = |node: Option<NodeId>| node.map(NodeId::get);
     let (stored, rate) = device.stored();
     (number(device.node()), device.bit_rate(), number(stored), rate)
 }
 
-fn all_held(bus: &MemoryBus) -> Vec<Held> {
-    bus.stations::<Device>().map(held).collect()
+fn all_snapshots(bus: &MemoryBus) -> Vec<Snapshot> {
+    bus.stations::<Device>().map(snapshot).collect()
 }
 
 /// The result of a job, and its notes.

@@ -1,4 +1,4 @@
-//! Frames of every function code and every length while a recording runs: no row changes, nothing ends.
+//! Frames of every function code and length during a recording: they change no row and do not end it.
 
 use super::Kept;
 use cangauge::bus::memory::{Outbox, Station};
@@ -21,9 +21,9 @@ const BENCH: &str = "clock = \"virtual\"\nbit_rate = 1000000\nseed = 3\nrecord =
 const TPDOS: [(u16, usize); 8] =
     [(0x181, 5), (0x281, 5), (0x182, 4), (0x183, 8), (0x283, 8), (0x383, 8), (0x483, 8), (0x1ff, 4)];
 
-/// Another participant that sends what makes no sense, and keeps away from what does: NMT commands, SYNC,
-/// boot-ups and requests to the devices change what the devices do.
-struct Babbler {
+/// Another station that sends meaningless frames. It sends no NMT command, SYNC, boot-up or SDO request:
+/// these change what the devices do.
+struct GarbageSender {
     frames: std::iter::Cycle<std::vec::IntoIter<Frame>>,
     next: Mono,
     sent: usize,
@@ -34,8 +34,8 @@ fn frame(id: u16, data: &[u8]) -> Frame {
     format!("{id:03X}#{bytes}").parse().expect("a frame")
 }
 
-impl Babbler {
-    fn new() -> Babbler {
+impl GarbageSender {
+    fn new() -> GarbageSender {
         let mut frames = Vec::new();
         for function in 0..16u16 {
             for low in (0..=16).chain([0x40, 0x7e, 0x7f]) {
@@ -59,11 +59,11 @@ impl Babbler {
                 frames.push(format!("{:08X}#0102030405", u32::from(id)).parse().expect("an extended frame"));
             }
         }
-        Babbler { frames: frames.into_iter().cycle(), next: Mono::START, sent: 0 }
+        GarbageSender { frames: frames.into_iter().cycle(), next: Mono::START, sent: 0 }
     }
 }
 
-impl Station for Babbler {
+impl Station for GarbageSender {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
@@ -89,7 +89,7 @@ fn garbage_changes_no_row_and_ends_no_recording() {
     for mode in [Mode::Sync(Duration::from_millis(10)), Mode::AsSent] {
         let folder = tempfile::tempdir().expect("a folder");
         let mut bus = Bench::from_toml(BENCH, folder.path()).expect("a bench").open().expect("a bus");
-        bus.attach(Babbler::new());
+        bus.attach(GarbageSender::new());
         let plan = LogOptions {
             nodes: NODES.iter().map(|&id| NodeId::new(id).expect("a node-ID")).collect(),
             wanted: Vec::new(),
@@ -102,8 +102,8 @@ fn garbage_changes_no_row_and_ends_no_recording() {
         };
         let mut kept = Kept::default();
         let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
-        let babbled = bus.stations::<Babbler>().next().expect("the babbler").sent;
-        assert!(babbled > 10_000, "{babbled} frames in 4 s, every one of them at least three times");
+        let garbage_frames = bus.stations::<GarbageSender>().next().expect("the sender").sent;
+        assert!(garbage_frames > 10_000, "{garbage_frames} frames in 4 s, each at least three times");
         drop(bus);
         let truth = std::fs::read_to_string(folder.path().join("truth.csv")).expect("the record");
         let at = |line: &str| line.split(',').next().and_then(|time| time.parse::<u64>().ok()).expect("a time");
@@ -111,7 +111,7 @@ fn garbage_changes_no_row_and_ends_no_recording() {
         let sent: Vec<&str> = truth.lines().skip(1).filter(|line| (first..=last).contains(&at(line))).collect();
         assert_eq!(kept.rows, sent);
         assert!(kept.rows.len() > 600, "{}", kept.rows.len());
-        assert!(last - first > 3_800_000, "it went on to its end");
+        assert!(last - first > 3_800_000, "it ran to its end");
         assert_eq!(outcome.rows, kept.rows.len() as u64);
     }
 }

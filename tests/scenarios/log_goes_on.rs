@@ -1,5 +1,5 @@
-//! A recording continues by itself after changes of nodes, mapping and interface. No row is decoded with a mapping, unit or
-//! digits that the device did not have when it sent the frame.
+//! A recording continues by itself after changes of nodes, mapping and interface. Each row is decoded with the mapping,
+//! unit and decimal digits that the device had when it sent the frame.
 
 use super::Kept;
 use cangauge::bus::memory::{MemoryBus, Outbox, Station};
@@ -60,7 +60,7 @@ impl Station for Other {
     fn sent(&mut self, _: Mono, _: &Frame) {}
 }
 
-/// A recording, and what the simulator reports to have sent.
+/// A recording, and the simulator's record of the sent values.
 struct Run {
     kept: Kept,
     outcome: RecordingReport,
@@ -76,7 +76,7 @@ impl Run {
     fn missing(&self) -> usize {
         let mut sent = self.sent.iter();
         for row in &self.kept.rows {
-            assert!(sent.any(|line| line == row), "{row} was never sent so");
+            assert!(sent.any(|line| line == row), "{row} was not sent");
         }
         self.sent.len() - self.kept.rows.len()
     }
@@ -104,17 +104,17 @@ impl Run {
 
 const SECONDS: u64 = 5;
 
-/// Records a bench for five seconds beside somebody else. `before` is done to the devices first.
+/// Records a bench with another station for five seconds. `before` runs first.
 fn record(devices: &str, mode: Mode, others: &[(u64, &str)], before: &dyn Fn(&mut Master<'_>)) -> Run {
     let folder = tempfile::tempdir().expect("a folder");
     let text = format!("clock = \"virtual\"\nrecord = \"truth.csv\"\n{devices}");
     let mut bus = Bench::from_toml(&text, folder.path()).expect("a bench").open().expect("a bus");
     bus.attach(Other::new(others));
-    bus.attach(Ear::default());
+    bus.attach(NmtRecorder::default());
     before(&mut Master::new(&mut bus, Timing::default()));
     let mut kept = Kept::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(mode), &mut kept).expect("a recording");
-    let commands = bus.stations::<Ear>().flat_map(|ear| ear.commands.clone()).collect();
+    let commands = bus.stations::<NmtRecorder>().flat_map(|ear| ear.commands.clone()).collect();
     drop(bus);
     let truth = std::fs::read_to_string(folder.path().join("truth.csv")).expect("the record");
     let time = |line: &str| line.split(',').next().and_then(|time| time.parse::<u64>().ok()).expect("a time");
@@ -136,13 +136,13 @@ fn plan(mode: Mode) -> LogOptions {
     }
 }
 
-/// Hears NMT commands.
+/// Records the NMT commands on the bus.
 #[derive(Default)]
-struct Ear {
+struct NmtRecorder {
     commands: Vec<String>,
 }
 
-impl Station for Ear {
+impl Station for NmtRecorder {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, _: Mono, frame: &Frame, _: &mut Outbox) {
@@ -169,7 +169,7 @@ fn write(master: &mut Master<'_>, object: ObjectId, bytes: &[u8]) {
 const DPS: &str = "[[device]]\nkind = \"dps\"\nnode = 5\n";
 const MH4: &str = "[[device]]\nkind = \"mh4\"\nnode = 5\n";
 const SYNC: Mode = Mode::Sync(Duration::from_millis(10));
-/// 6131h:1, and bar and psi as it holds them.
+/// 6131h:1, and its value for bar.
 const UNIT: ObjectId = ObjectId::new(0x6131, 1);
 const BAR: [u8; 4] = [0x00, 0x00, 0x4e, 0x00];
 
@@ -189,7 +189,7 @@ fn restarted_node_is_started_again() {
 
 #[test]
 fn unit_that_was_not_stored_is_not_used_after_a_restart() {
-    // In bar; by its factory settings it comes back in psi.
+    // Set to bar without storing: after a restart the unit is psi.
     let before = |master: &mut Master<'_>| write(master, UNIT, &BAR);
     for mode in [Mode::AsSent, Mode::Poll(Duration::from_millis(20))] {
         let run = record(DPS, mode, &[(2000, "000#8105")], &before);
@@ -197,7 +197,7 @@ fn unit_that_was_not_stored_is_not_used_after_a_restart() {
         if mode == Mode::AsSent {
             assert_eq!(run.missing(), 0);
         }
-        // 25 bar are 362.6 psi: a number that was read before the restart does not get the unit of after it.
+        // 25 bar are 362.6 psi: a value from before the restart must not get the new unit.
         for row in &run.kept.rows {
             let value: f64 = row.split(',').nth(3).and_then(|value| value.parse().ok()).expect(row);
             let first: f64 = run.kept.rows[0].split(',').nth(3).and_then(|value| value.parse().ok()).expect("a value");
@@ -218,12 +218,12 @@ fn node_that_starts_by_itself_is_read_before_it_is_recorded() {
     let devices = format!("{MH4}start = true\n");
     let run = record(&devices, SYNC, &[(2000, "000#8105"), (2030, "000#0105")], &nothing);
     assert!(run.missing() > 0 && run.outcome.events.not_recorded > 0, "{:?}", run.outcome.events);
-    assert_eq!(run.missing() as u64, run.outcome.events.not_recorded, "what is missing is counted");
+    assert_eq!(run.missing() as u64, run.outcome.events.not_recorded, "missing rows are counted");
 }
 
 #[test]
 fn mapping_changed_by_another_master() {
-    // Switched off, emptied, status first, two entries, switched on: as CiA 301 has it.
+    // The sequence of CiA 301: disable, clear, map status and pressure, set two entries, enable.
     let writes = [
         (2000, "605#23001801850100C0"),
         (2020, "605#2F001A0000000000"),
@@ -242,8 +242,8 @@ fn mapping_changed_by_another_master() {
     let last = run.kept.rows.last().expect("rows");
     assert!(last.contains(",pressure,") && last.contains(",ok,"), "{last}");
     let time: u64 = last.split(',').next().and_then(|time| time.parse().ok()).expect("a time");
-    assert!(time > 4_500_000, "it goes on to its end");
-    assert_eq!(run.commands, ["000#0105"], "nobody is started who was not away");
+    assert!(time > 4_500_000, "it runs to its end");
+    assert_eq!(run.commands, ["000#0105"], "only a restarted node is started");
 }
 
 #[test]
@@ -256,7 +256,7 @@ fn unit_changed_by_another_master() {
 
 #[test]
 fn wrong_length_makes_the_node_read_again() {
-    // A frame of the node that is shorter than its mapping: it is read again, once, and nothing has changed.
+    // The frame is shorter than the mapping. The node is read again once; nothing has changed.
     let others = [(2000, "185#01"), (2200, "185#01"), (2400, "185#01")];
     let run = record(MH4, SYNC, &others, &nothing);
     assert_eq!(run.changes(), [[] as [Change; 0]], "read once");
@@ -269,7 +269,7 @@ fn passive_recording_uses_no_old_mapping() {
     let folder = tempfile::tempdir().expect("a folder");
     let text = format!("clock = \"virtual\"\nrecord = \"truth.csv\"\n{DPS}");
     let mut bus = Bench::from_toml(&text, folder.path()).expect("a bench").open().expect("a bus");
-    // Started, set to bar, restarted and started again: it is in psi then.
+    // The node is started, set to bar, restarted and started again. Then its unit is psi.
     let unit = "605#2331610100004E00";
     bus.attach(Other::new(&[(100, "000#0105"), (1000, unit), (2000, "000#8105"), (2500, "000#0105")]));
     let dps = catalog::by_name("dps").expect("a description");
@@ -293,7 +293,7 @@ fn lost_heartbeat_and_changed_state_are_reported() {
     assert_eq!((run.missing(), run.outcome.events.heartbeat_losses), (0, 0));
     let text = format!("clock = \"virtual\"\n{devices}");
     let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
-    let mut bus = Shaky { no_heartbeat: at(2000)..at(3000), ..Shaky::new(inner, &[]) };
+    let mut bus = UnstableBus { no_heartbeat: at(2000)..at(3000), ..UnstableBus::new(inner, &[]) };
     let mut kept = Kept::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(SYNC), &mut kept).expect("a recording");
     let lost = kept
@@ -305,28 +305,28 @@ fn lost_heartbeat_and_changed_state_are_reported() {
     assert!(kept.notes.contains(&LogEvent::ReadAgain(node(5), Vec::new())), "a boot-up may have been missed");
 }
 
-/// A bus whose interface reports given events at given times.
-struct Shaky {
+/// A bus whose interface reports the given events at the given times.
+struct UnstableBus {
     inner: MemoryBus,
-    /// Events at their times; while the link is down nothing goes through.
+    /// Events with their times. While the link is down no frame passes.
     events: VecDeque<(Mono, Event)>,
     up: bool,
-    /// When heartbeats are not heard.
+    /// The time in which heartbeats are lost.
     no_heartbeat: Range<Mono>,
 }
 
-impl Shaky {
-    fn new(inner: MemoryBus, events: &[(u64, Event)]) -> Shaky {
+impl UnstableBus {
+    fn new(inner: MemoryBus, events: &[(u64, Event)]) -> UnstableBus {
         let events = events.iter().map(|(time, event)| (at(*time), *event)).collect();
-        Shaky { inner, events, up: true, no_heartbeat: Mono::START..Mono::START }
+        UnstableBus { inner, events, up: true, no_heartbeat: Mono::START..Mono::START }
     }
 }
 
-impl cangauge::bus::BitRateControl for Shaky {
+impl cangauge::bus::BitRateControl for UnstableBus {
     cangauge::bus::delegate_bus!(self, self.inner => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
 }
 
-impl Bus for Shaky {
+impl Bus for UnstableBus {
     cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive_buffer finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
@@ -363,13 +363,13 @@ impl Bus for Shaky {
     }
 }
 
-/// Records with something that happens to the interface, and a restart of the node at 2.2 s whose boot-up nobody hears.
-fn shaken(events: &[(u64, Event)]) -> (Kept, RecordingReport) {
+/// Records with interface events. The node restarts at 2.2 s, and its boot-up is lost.
+fn record_with_events(events: &[(u64, Event)]) -> (Kept, RecordingReport) {
     let text = format!("clock = \"virtual\"\n{DPS}");
     let mut inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
     inner.attach(Other::new(&[(2200, "000#8105")]));
     write(&mut Master::new(&mut inner, Timing::default()), UNIT, &BAR);
-    let mut bus = Shaky { no_heartbeat: at(2100)..at(2400), ..Shaky::new(inner, events) };
+    let mut bus = UnstableBus { no_heartbeat: at(2100)..at(2400), ..UnstableBus::new(inner, events) };
     let mut kept = Kept::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(Mode::AsSent), &mut kept);
     (kept, outcome.expect("a recording"))
@@ -377,19 +377,22 @@ fn shaken(events: &[(u64, Event)]) -> (Kept, RecordingReport) {
 
 #[test]
 fn interface_goes_down_and_comes_back() {
-    let (kept, outcome) = shaken(&[(2000, Event::Link(false)), (3000, Event::Link(true))]);
+    let (kept, outcome) = record_with_events(&[(2000, Event::Link(false)), (3000, Event::Link(true))]);
     assert_eq!((outcome.events.link_losses, outcome.events.changes, outcome.gaps), (1, 1, 1));
-    assert!(outcome.lost.is_empty() && outcome.events.silences == 0, "nobody is blamed for the interface");
+    assert!(
+        outcome.lost.is_empty() && outcome.events.silences == 0,
+        "an interface failure is not reported as a lost node"
+    );
     let rows = |unit: &str| kept.rows.iter().filter(|row| row.contains(unit)).count();
-    assert!(rows(",bar,") > 15 && rows(",psi,") > 15, "restarted unheard, started again, and read by what it is now");
+    assert!(rows(",bar,") > 15 && rows(",psi,") > 15, "after the restart the node is started and read again");
     let links: Vec<_> = kept.notes.iter().filter(|note| matches!(note, LogEvent::Link(_))).collect();
     assert_eq!(links, [&LogEvent::Link(false), &LogEvent::Link(true)]);
-    assert_eq!(outcome.dropped, 7, "what was lost last is asked for at the end");
+    assert_eq!(outcome.dropped, 7, "the last losses are counted at the end");
 }
 
 #[test]
 fn dropped_frames_are_counted() {
-    let (kept, outcome) = shaken(&[(1500, Event::Dropped(5)), (2500, Event::Dropped(30))]);
+    let (kept, outcome) = record_with_events(&[(1500, Event::Dropped(5)), (2500, Event::Dropped(30))]);
     assert_eq!(outcome.dropped, 5 + 30 + 7);
     let told: Vec<_> = kept.notes.iter().filter(|note| matches!(note, LogEvent::Dropped(_))).collect();
     assert_eq!(told, [&LogEvent::Dropped(5), &LogEvent::Dropped(30), &LogEvent::Dropped(7)]);
@@ -398,7 +401,7 @@ fn dropped_frames_are_counted() {
 #[test]
 fn bus_off_controller_is_restarted() {
     let fault = |fault, time| (time, Event::Fault(fault, Stamp { mono: at(time), ..Stamp::default() }));
-    let (kept, outcome) = shaken(&[fault(Fault::BusOff, 2000), fault(Fault::Restarted, 2500)]);
+    let (kept, outcome) = record_with_events(&[fault(Fault::BusOff, 2000), fault(Fault::Restarted, 2500)]);
     assert_eq!((outcome.events.bus_offs, outcome.events.changes), (1, 1));
     let rows = |unit: &str| kept.rows.iter().filter(|row| row.contains(unit)).count();
     assert!(rows(",bar,") > 15 && rows(",psi,") > 15, "{:?}", kept.notes);
@@ -428,10 +431,10 @@ fn sync_delays_are_measured() {
     assert_eq!((syncs.sent, syncs.left_out, syncs.delays.count()), (SECONDS * 100, 0, SECONDS * 100));
     assert!(syncs.delays.longest() < Some(Duration::from_millis(1)), "{:?}", syncs.delays.longest());
     assert_eq!(run.outcome.rows, SECONDS * 100);
-    // While the interface is down none is sent, and none is counted as sent.
+    // While the interface is down no SYNC is sent or counted as sent.
     let text = format!("clock = \"virtual\"\n{MH4}");
     let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
-    let mut bus = Shaky::new(inner, &[(2000, Event::Link(false)), (3000, Event::Link(true))]);
+    let mut bus = UnstableBus::new(inner, &[(2000, Event::Link(false)), (3000, Event::Link(true))]);
     let mut kept = Kept::default();
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan(SYNC), &mut kept).expect("a recording");
     assert_eq!(outcome.syncs.sent + outcome.syncs.left_out, SECONDS * 100);
@@ -443,7 +446,7 @@ fn max_gap_decides_what_is_a_gap() {
     for (longest, gaps) in [(99, 1), (200, 0)] {
         let text = format!("clock = \"virtual\"\n{MH4}");
         let inner = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
-        let mut bus = Shaky::new(inner, &[(2000, Event::Link(false)), (2120, Event::Link(true))]);
+        let mut bus = UnstableBus::new(inner, &[(2000, Event::Link(false)), (2120, Event::Link(true))]);
         let plan = LogOptions { max_gap: Some(Duration::from_millis(longest)), ..plan(SYNC) };
         let mut kept = Kept::default();
         let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
@@ -455,11 +458,11 @@ fn max_gap_decides_what_is_a_gap() {
 #[test]
 fn restart_among_lost_frames_is_detected() {
     let dropped = [(2400, Event::Dropped(30)), (2500, Event::Dropped(3)), (3500, Event::Dropped(1))];
-    let (kept, outcome) = shaken(&dropped);
+    let (kept, outcome) = record_with_events(&dropped);
     assert_eq!((outcome.dropped, outcome.events.changes, outcome.events.silences), (34 + 7, 1, 0));
     let units: Vec<&str> = kept.rows.iter().filter_map(|row| row.split(',').nth(4)).collect();
     let psi = units.iter().filter(|unit| **unit == "psi").count();
-    assert!(psi > 15, "started again, and read by what it is now: {units:?}");
+    assert!(psi > 15, "started and read again: {units:?}");
     let read = kept.notes.iter().filter(|note| matches!(note, LogEvent::ReadAgain(..)));
     assert_eq!(read.count(), 1, "once a minute is enough: {:?}", kept.notes);
     let has = |wanted: fn(&Remark) -> bool| outcome.remarks.iter().any(wanted);

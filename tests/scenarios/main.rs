@@ -24,7 +24,7 @@ use cangauge::measure::sample::{Sample, Source};
 use cangauge::tasks::log::{LogEvent, Observer};
 use std::ops::ControlFlow;
 
-/// Keeps what a recording gives, as the simulator's own record would write it.
+/// Keeps the rows and events of a recording, in the format of the simulator's record.
 #[derive(Default)]
 struct Kept {
     rows: Vec<String>,

@@ -1,4 +1,4 @@
-//! NMT commands to nodes that do not do as they are told, or later.
+//! NMT commands to nodes that obey late or not at all.
 
 use super::log_goes_on::Other;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
@@ -12,8 +12,7 @@ use cangauge::tasks::nmt::{Proof, StateReport, command, states};
 use std::path::Path;
 use std::time::Duration;
 
-/// A node in OPERATIONAL with a heartbeat every 100 ms, which obeys nothing but what it is told `obeys`, and that only
-/// after 250 ms.
+/// A node in OPERATIONAL with a heartbeat every 100 ms. It obeys only the frame `obeys`, after 250 ms.
 struct Slow {
     obeys: Option<Frame>,
     beat: Mono,
@@ -53,8 +52,8 @@ fn node() -> NodeId {
     NodeId::new(5).unwrap()
 }
 
-/// What comes of a command to a node that obeys this frame and no other.
-fn told(what: NmtCommand, obeys: Option<&str>) -> StateReport {
+/// Sends a command to a node that obeys only `obeys`. Returns the reported state.
+fn report_after(what: NmtCommand, obeys: Option<&str>) -> StateReport {
     let mut bus = MemoryBus::new(Clock::Virtual);
     let obeys = obeys.map(|text| text.parse().unwrap());
     bus.attach(Slow { obeys, beat: Mono::START + PERIOD, stops: None });
@@ -63,38 +62,41 @@ fn told(what: NmtCommand, obeys: Option<&str>) -> StateReport {
 }
 
 #[test]
-fn a_heartbeat_of_the_node_as_it_was_confirms_nothing() {
+fn heartbeat_with_the_old_state_confirms_nothing() {
     for reset in [NmtCommand::ResetNode, NmtCommand::ResetCommunication] {
-        assert_eq!(told(reset, None), StateReport { node: node(), state: None, by: Proof::None, is_present: true });
+        assert_eq!(
+            report_after(reset, None),
+            StateReport { node: node(), state: None, by: Proof::None, is_present: true }
+        );
     }
     let operational = Some(NmtState::Operational);
     let still = StateReport { node: node(), state: operational, by: Proof::Heartbeat, is_present: true };
-    assert_eq!(told(NmtCommand::Stop, None), still);
+    assert_eq!(report_after(NmtCommand::Stop, None), still);
 }
 
 #[test]
-fn what_a_heartbeat_tells_while_others_are_asked_counts() {
+fn heartbeat_during_the_check_of_another_node_counts() {
     let mut bus = MemoryBus::new(Clock::Virtual);
     let obeys = Some("000#0205".parse().unwrap());
     bus.attach(Slow { obeys, beat: Mono::START + PERIOD, stops: None });
     let mut master = Master::new(&mut bus, Timing { timeout: PERIOD, retries: 1 });
-    // It obeys after the time in which it is waited for; whether the other one has become silent is asked after that.
+    // The node obeys after its waiting time, during the SDO check of the other node.
     let silent = NodeId::new(44).unwrap();
     let reports = command(&mut master, NmtCommand::Stop, &[silent, node()], false).unwrap();
     assert_eq!((reports[1].state, reports[1].by), (Some(NmtState::Stopped), Proof::Heartbeat));
 }
 
 #[test]
-fn heartbeats_from_before_it_obeys_are_waited_over() {
-    let report = told(NmtCommand::Stop, Some("000#0205"));
+fn heartbeats_before_the_state_change_are_skipped() {
+    let report = report_after(NmtCommand::Stop, Some("000#0205"));
     let stopped = Some(NmtState::Stopped);
     assert_eq!(report, StateReport { node: node(), state: stopped, by: Proof::Heartbeat, is_present: true });
 }
 
 #[test]
-fn who_was_never_there_is_not_stopped() {
+fn absent_node_is_not_reported_as_stopped() {
     let mut bus = MemoryBus::new(Clock::Virtual);
-    // Somebody acknowledges.
+    // Another node acknowledges frames.
     bus.attach(Slow { obeys: None, beat: Mono::START + PERIOD, stops: None });
     let other = NodeId::new(9).unwrap();
     let mut master = Master::new(&mut bus, Timing::default());
@@ -103,7 +105,7 @@ fn who_was_never_there_is_not_stopped() {
 }
 
 #[test]
-fn a_node_that_somebody_else_guards_is_not_guarded() {
+fn node_guarded_by_another_master_is_not_guarded() {
     let bench = "clock = 'virtual'\n[[device]]\nkind = 'd20'\nnode = 5\n";
     for period in [None, Some(10), Some(150)] {
         let mut bus = Bench::from_toml(bench, Path::new("")).unwrap().open().unwrap();

@@ -1,4 +1,4 @@
-//! Somebody else sends SYNC already: a second one would double every synchronous TPDO.
+//! Another node sends SYNC already. A second SYNC producer would double every synchronous TPDO.
 
 use super::Kept;
 use cangauge::bus::memory::{MemoryBus, Outbox, Station};
@@ -16,7 +16,7 @@ use std::time::Duration;
 
 const PERIOD: Duration = Duration::from_millis(50);
 
-/// A controller that sends SYNC and knows nothing of us.
+/// A controller that sends SYNC.
 struct Controller {
     next: Mono,
 }

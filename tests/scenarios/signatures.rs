@@ -1,6 +1,5 @@
-//! "zero", "save" and "load" under bad conditions, at every frame that goes out: the request or its answer is lost, the
-//! user asks to stop, the device restarts. None of the signatures goes out twice, and what is told is what the device
-//! holds.
+//! "zero", "save" and "load" with a fault at each sent frame: the request or its answer is lost, Ctrl-C, the device
+//! restarts. No signature is sent twice, and the reported result matches the device.
 
 use cangauge::bus::memory::MemoryBus;
 use cangauge::bus::time::Mono;
@@ -19,54 +18,53 @@ use cangauge::tasks::{Failure, Kind, restore};
 use std::path::Path;
 use std::time::Duration;
 
-/// What happens to one frame that goes out.
+/// The fault at one sent frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Mishap {
-    LoseIt,
-    LoseItsAnswer,
+enum Fault {
+    LoseRequest,
+    LoseAnswer,
     Interrupt,
     /// The device restarts as soon as it has answered.
     Restart,
-    /// The device has restarted before, and nobody has seen its boot-up.
+    /// The device restarted before, and the program missed its boot-up.
     Restarted,
-    /// The device refuses it with this code instead of its answer.
+    /// The device rejects the request with this abort code.
     Refuse(u32),
     /// The device acknowledges it and does nothing.
     Pretend,
 }
 
-const MISHAPS: [Mishap; 5] =
-    [Mishap::LoseIt, Mishap::LoseItsAnswer, Mishap::Interrupt, Mishap::Restart, Mishap::Restarted];
+const FAULTS: [Fault; 5] = [Fault::LoseRequest, Fault::LoseAnswer, Fault::Interrupt, Fault::Restart, Fault::Restarted];
 
-/// A bus on which something happens to the frame of this number.
-struct Unlucky {
+/// A bus with a fault at the frame of the given number.
+struct FaultyBus {
     inner: MemoryBus,
-    at: Option<(usize, Mishap)>,
+    at: Option<(usize, Fault)>,
     sent: Vec<String>,
-    /// What its answer becomes.
+    /// Abort code that replaces the next answer.
     refusal: Option<u32>,
-    /// What is acknowledged and never got there.
+    /// A request that is acknowledged and not delivered.
     pretended: Option<Frame>,
-    /// Answers still to be lost.
+    /// Number of answers still to lose.
     deaf: bool,
     interrupted: bool,
     restarts: bool,
 }
 
-impl Unlucky {
-    fn of(kind: &str, settings: &str, at: Option<(usize, Mishap)>) -> Unlucky {
+impl FaultyBus {
+    fn of(kind: &str, settings: &str, at: Option<(usize, Fault)>) -> FaultyBus {
         let bench = format!("clock = \"virtual\"\n[[device]]\nkind = \"{kind}\"\nnode = 5\n{settings}");
         let inner = Bench::from_toml(&bench, Path::new("")).expect("a bench").open().expect("a bus");
         let (sent, refusal, pretended) = (Vec::new(), None, None);
-        Unlucky { inner, at, sent, refusal, pretended, deaf: false, interrupted: false, restarts: false }
+        FaultyBus { inner, at, sent, refusal, pretended, deaf: false, interrupted: false, restarts: false }
     }
 
-    /// How often this went out.
+    /// How many sent frames end with this text.
     fn count(&self, frame: &str) -> usize {
         self.sent.iter().filter(|sent| sent.ends_with(frame)).count()
     }
 
-    /// Lets the bus run on without anybody, then looks into the device.
+    /// Lets the bus run idle, then returns the object's bytes in the device.
     fn look(&mut self, object: &str) -> Vec<u8> {
         self.run_on();
         let now = self.inner.now().mono;
@@ -85,33 +83,33 @@ impl Unlucky {
         self.inner.stations::<Device>().next().expect("the device").state()
     }
 
-    /// Power off and on is a reset as far as what is kept goes.
+    /// Resets the device; for stored values this equals a power cycle.
     fn reset(&mut self) {
         self.inner.send(&"000#8105".parse().expect("a frame")).expect("sent");
         self.run_on();
     }
 }
 
-impl cangauge::bus::BitRateControl for Unlucky {
+impl cangauge::bus::BitRateControl for FaultyBus {
     cangauge::bus::delegate_bus!(self, self.inner => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
 }
 
-impl Bus for Unlucky {
+impl Bus for FaultyBus {
     cangauge::bus::delegate_bus!(self, self.inner => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let number = self.sent.len();
         self.sent.push(frame.to_string());
         match self.at {
-            Some((at, mishap)) if at == number => match mishap {
-                Mishap::LoseIt => return Ok(()),
-                Mishap::LoseItsAnswer => self.deaf = true,
-                Mishap::Interrupt => self.interrupted = true,
-                Mishap::Restart => self.restarts = true,
-                Mishap::Restarted => self.reset(),
-                Mishap::Refuse(code) => self.refusal = Some(code),
-                Mishap::Pretend => {
-                    // A read has an answer, too.
+            Some((at, fault)) if at == number => match fault {
+                Fault::LoseRequest => return Ok(()),
+                Fault::LoseAnswer => self.deaf = true,
+                Fault::Interrupt => self.interrupted = true,
+                Fault::Restart => self.restarts = true,
+                Fault::Restarted => self.reset(),
+                Fault::Refuse(code) => self.refusal = Some(code),
+                Fault::Pretend => {
+                    // Reading 1000h produces an answer.
                     self.pretended = Some(*frame);
                     return self.inner.send(&"605#4000100000000000".parse().expect("a frame"));
                 }
@@ -156,29 +154,29 @@ fn node() -> NodeId {
     NodeId::new(5).expect("a node-ID")
 }
 
-fn with<T>(bus: &mut Unlucky, work: impl FnOnce(&mut Master<'_>) -> T) -> T {
+fn with<T>(bus: &mut FaultyBus, work: impl FnOnce(&mut Master<'_>) -> T) -> T {
     let mut master = Master::new(bus, Timing::default());
     let result = work(&mut master);
     master.settle();
     result
 }
 
-/// How many frames go out when nothing happens.
-fn frames(run: impl Fn(&mut Unlucky), kind: &str, settings: &str) -> usize {
-    let mut bus = Unlucky::of(kind, settings, None);
+/// Number of frames sent without a fault.
+fn frames(run: impl Fn(&mut FaultyBus), kind: &str, settings: &str) -> usize {
+    let mut bus = FaultyBus::of(kind, settings, None);
     run(&mut bus);
     bus.sent.len()
 }
 
 const STILL: &str = "[[device.channel]]\nchannel = 1\nbase = 0.0625\namplitude = 0.0\nnoise = 0.0\n";
 
-fn zero(bus: &mut Unlucky, store: bool) -> Result<Zeroed, Failure> {
+fn zero(bus: &mut FaultyBus, store: bool) -> Result<Zeroed, Failure> {
     let options = Options { channel: None, limit: Limit::Default, samples: 2, force: false, store, dry_run: false };
     with(bus, |master| autozero(master, node(), &Default::default(), &options))
 }
 
 #[test]
-fn a_zero_that_is_told_is_there_and_one_that_is_denied_is_not() {
+fn reported_zero_matches_the_device() {
     for (kind, offset, new) in [
         ("mh4", "0x6127:1", (-0.0625f32).to_le_bytes()),
         ("d20", "0x6124:1", (-0.0625f32).to_le_bytes()),
@@ -186,34 +184,34 @@ fn a_zero_that_is_told_is_there_and_one_that_is_denied_is_not() {
     ] {
         let count = frames(|bus| drop(zero(bus, false)), kind, STILL);
         let mut acted_without_answer = 0;
-        // How a device is recognised is the same for all of them.
+        // The identification is the same for all kinds: it is tested once.
         let first = if kind == "mh4" { 0 } else { count.saturating_sub(20) };
-        for (at, mishap) in (first..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
-            let mut bus = Unlucky::of(kind, STILL, Some((at, mishap)));
+        for (at, fault) in (first..count).flat_map(|at| FAULTS.map(|fault| (at, fault))) {
+            let mut bus = FaultyBus::of(kind, STILL, Some((at, fault)));
             let result = zero(&mut bus, false);
-            let went = bus.count("2561017A65726F");
-            let place = format!("{kind}: {mishap:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
-            assert!(went <= 1, "{place}");
+            let sent_count = bus.count("2561017A65726F");
+            let place = format!("{kind}: {fault:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
+            assert!(sent_count <= 1, "{place}");
             let last = at + 1 == bus.sent.len();
             let holds = bus.look(offset);
             match result {
                 Ok(report) => {
-                    // A restart behind the last answer comes when everything has been told.
-                    assert!(holds == new || mishap == Mishap::Restart && last, "{place}");
+                    // A restart after the last answer comes after the report.
+                    assert!(holds == new || fault == Fault::Restart && last, "{place}");
                     assert!(report.after.expect("measured").abs() <= 0.001 && !report.stored, "{place}");
-                    assert_ne!(mishap, Mishap::Interrupt, "{place}");
+                    assert_ne!(fault, Fault::Interrupt, "{place}");
                     let silent = matches!(report.notes[0].fact, Fact::Autozero(AutozeroFact::ProvedBy { .. }));
-                    acted_without_answer += usize::from(silent && mishap == Mishap::LoseItsAnswer);
+                    acted_without_answer += usize::from(silent && fault == Fault::LoseAnswer);
                 }
                 Err(failure) => {
                     let nothing = ErrorMessage::of(&failure).message.contains("nothing was changed");
-                    assert!(!nothing || went == 0, "{place}");
-                    assert!(nothing || went == 1 || mishap != Mishap::Interrupt, "{place}");
+                    assert!(!nothing || sent_count == 0, "{place}");
+                    assert!(nothing || sent_count == 1 || fault != Fault::Interrupt, "{place}");
                     assert!(!nothing || holds == [0; 4], "{place}");
-                    if went > 0 && ErrorMessage::of(&failure).message.contains("the offset is as before") {
+                    if sent_count > 0 && ErrorMessage::of(&failure).message.contains("the offset is as before") {
                         assert_eq!(holds, [0; 4], "{place}");
                     }
-                    assert_eq!(failure.kind() == Kind::Interrupted, mishap == Mishap::Interrupt, "{place}");
+                    assert_eq!(failure.kind() == Kind::Interrupted, fault == Fault::Interrupt, "{place}");
                 }
             }
         }
@@ -222,16 +220,16 @@ fn a_zero_that_is_told_is_there_and_one_that_is_denied_is_not() {
 }
 
 #[test]
-fn a_zero_that_is_told_as_stored_outlasts_a_reset() {
+fn zero_reported_as_stored_survives_a_reset() {
     for (kind, offset, new) in
         [("mh4", "0x6127:1", (-0.0625f32).to_le_bytes()), ("dps", "0x6124:1", (-63i32).to_le_bytes())]
     {
         let count = frames(|bus| drop(zero(bus, true)), kind, STILL);
-        // What comes before is the same without storing.
-        for (at, mishap) in (count.saturating_sub(25)..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
-            let mut bus = Unlucky::of(kind, STILL, Some((at, mishap)));
+        // The steps before the store are tested without storing.
+        for (at, fault) in (count.saturating_sub(25)..count).flat_map(|at| FAULTS.map(|fault| (at, fault))) {
+            let mut bus = FaultyBus::of(kind, STILL, Some((at, fault)));
             let result = zero(&mut bus, true);
-            let place = format!("{kind}: {mishap:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
+            let place = format!("{kind}: {fault:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
             assert!(bus.count("73617665") <= 1 && bus.count("2561017A65726F") <= 1, "{place}");
             if let Ok(report) = result {
                 bus.reset();
@@ -241,18 +239,18 @@ fn a_zero_that_is_told_as_stored_outlasts_a_reset() {
     }
 }
 
-/// Operational, with a heartbeat that tells it; the number of digits is another one than it was stored with.
+/// OPERATIONAL with a heartbeat. The unit differs from the stored one.
 const RUNS: &str = "start = true\nset = { \"0x1017\" = 100, \"0x6131:1\" = 0xAB0000 }\n";
 
-fn save(bus: &mut Unlucky, verify: bool) -> Result<Done, Failure> {
+fn save(bus: &mut FaultyBus, verify: bool) -> Result<Done, Failure> {
     with(bus, |master| {
         let device = store::device(master, node(), &Default::default())?;
         store::store(master, &device, Group::All, verify)
     })
 }
 
-/// Writes a setting that is not stored yet.
-fn set(bus: &mut Unlucky) {
+/// Writes a setting without storing it.
+fn set(bus: &mut FaultyBus) {
     let request = "605#2F32610101000000";
     bus.inner.send(&request.parse().expect("a frame")).expect("sent");
     bus.run_on();
@@ -260,31 +258,30 @@ fn set(bus: &mut Unlucky) {
 }
 
 #[test]
-fn what_is_told_as_stored_outlasts_a_reset() {
+fn settings_reported_as_stored_survive_a_reset() {
     for verify in [false, true] {
-        let run = |bus: &mut Unlucky| {
+        let run = |bus: &mut FaultyBus| {
             set(bus);
             drop(save(bus, verify));
         };
         let count = frames(run, "mh4", RUNS);
-        // What comes before is the same with and without proof.
+        // The steps before the check are the same with and without it.
         let first = if verify { 0 } else { count.saturating_sub(20) };
-        for (at, mishap) in (first..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
-            let mut bus = Unlucky::of("mh4", RUNS, Some((at, mishap)));
+        for (at, fault) in (first..count).flat_map(|at| FAULTS.map(|fault| (at, fault))) {
+            let mut bus = FaultyBus::of("mh4", RUNS, Some((at, fault)));
             set(&mut bus);
             let result = save(&mut bus, verify);
-            let place = format!("verify {verify}: {mishap:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
+            let place = format!("verify {verify}: {fault:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
             assert!(bus.count("73617665") <= 1, "{place}");
             assert!(bus.state().is_some_and(|state| state == State::Operational), "{place}");
             match result {
                 Ok(done) => {
                     assert_eq!(done.verified, if verify { Verified::Reset } else { Verified::Ack });
                     bus.reset();
-                    // Whoever restarts in between has lost the setting before it was stored.
-                    // Proven is what was read of it before.
+                    // A restart before the store loses the setting. The check proves only values read before it.
                     let read = bus.sent.iter().position(|sent| sent.ends_with("#4032610100000000"));
                     let proven = read.is_some_and(|read| read < at);
-                    let restarts = matches!(mishap, Mishap::Restart | Mishap::Restarted) && !proven;
+                    let restarts = matches!(fault, Fault::Restart | Fault::Restarted) && !proven;
                     assert!(bus.look("0x6132:1") == [1] || restarts, "{place}");
                 }
                 Err(failure) => {
@@ -297,7 +294,7 @@ fn what_is_told_as_stored_outlasts_a_reset() {
     }
 }
 
-fn load(bus: &mut Unlucky) -> Result<Done, Failure> {
+fn load(bus: &mut FaultyBus) -> Result<Done, Failure> {
     with(bus, |master| {
         let device = store::device(master, node(), &Default::default())?;
         restore::restore(master, &device, Group::All, true)
@@ -305,28 +302,28 @@ fn load(bus: &mut Unlucky) -> Result<Done, Failure> {
 }
 
 #[test]
-fn a_signature_that_is_acknowledged_and_does_nothing() {
-    let mut bus = Unlucky::of("mh4", RUNS, None);
+fn acknowledged_signature_without_effect_is_detected() {
+    let mut bus = FaultyBus::of("mh4", RUNS, None);
     load(&mut bus).expect("restored");
     let at = bus.sent.iter().position(|frame| frame.ends_with("6C6F6164")).expect("\"load\"");
-    let failure = load(&mut Unlucky::of("mh4", RUNS, Some((at, Mishap::Pretend)))).expect_err("nothing was restored");
+    let failure = load(&mut FaultyBus::of("mh4", RUNS, Some((at, Fault::Pretend)))).expect_err("nothing was restored");
     assert_eq!(failure.kind(), Kind::Unexpected);
     assert!(ErrorMessage::of(&failure).message.contains("restored and reset, but not as delivered"), "{failure}");
-    let mut bus = Unlucky::of("mh4", STILL, None);
+    let mut bus = FaultyBus::of("mh4", STILL, None);
     zero(&mut bus, false).expect("zero");
     let at = bus.sent.iter().position(|frame| frame.ends_with("7A65726F")).expect("\"zero\"");
-    let failure = zero(&mut Unlucky::of("mh4", STILL, Some((at, Mishap::Pretend))), false).expect_err("no zero");
+    let failure = zero(&mut FaultyBus::of("mh4", STILL, Some((at, Fault::Pretend))), false).expect_err("no zero");
     assert_eq!(failure.kind(), Kind::Unexpected);
     assert!(ErrorMessage::of(&failure).message.contains("it took the signature, and nothing has changed"), "{failure}");
 }
 
 #[test]
-fn what_is_told_as_restored_is_as_delivered() {
+fn values_reported_as_restored_are_factory_defaults() {
     let count = frames(|bus| drop(load(bus)), "mh4", RUNS);
-    for (at, mishap) in (0..count).flat_map(|at| MISHAPS.map(|mishap| (at, mishap))) {
-        let mut bus = Unlucky::of("mh4", RUNS, Some((at, mishap)));
+    for (at, fault) in (0..count).flat_map(|at| FAULTS.map(|fault| (at, fault))) {
+        let mut bus = FaultyBus::of("mh4", RUNS, Some((at, fault)));
         let result = load(&mut bus);
-        let place = format!("{mishap:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
+        let place = format!("{fault:?} at {}: {result:?}", bus.sent[at.min(bus.sent.len() - 1)]);
         assert!(bus.count("6C6F6164") <= 1, "{place}");
         match result {
             Ok(done) => {
@@ -344,9 +341,9 @@ fn what_is_told_as_restored_is_as_delivered() {
 }
 
 #[test]
-fn a_refusal_is_told_in_the_words_of_the_device_and_only_its_form_is_tried_again() {
+fn rejection_is_reported_and_only_the_form_is_retried() {
     let place = |verify: bool| {
-        let mut usual = Unlucky::of("d20", "", None);
+        let mut usual = FaultyBus::of("d20", "", None);
         save(&mut usual, verify).expect("stored");
         usual.sent.iter().position(|sent| sent.ends_with("2210100173617665")).expect("the signature")
     };
@@ -355,14 +352,14 @@ fn a_refusal_is_told_in_the_words_of_the_device_and_only_its_form_is_tried_again
         (0x0606_0000, "access failed because of a hardware error"),
         (0x0800_0020, "data cannot be transferred or stored"),
     ] {
-        let mut bus = Unlucky::of("d20", "", Some((place(true), Mishap::Refuse(code))));
+        let mut bus = FaultyBus::of("d20", "", Some((place(true), Fault::Refuse(code))));
         let failure = save(&mut bus, true).expect_err("refused");
         assert_eq!((failure.kind(), failure.abort().map(|abort| abort.0)), (Kind::Refused, Some(code)));
         assert!(ErrorMessage::of(&failure).message.contains(words), "{failure}");
         assert_eq!((bus.count("73617665"), bus.count("000#8105")), (1, 0), "neither repeated nor reset");
     }
-    // A device that takes the size, or its absence, amiss has not acted.
-    let mut bus = Unlucky::of("d20", "", Some((place(false), Mishap::Refuse(0x0504_0001))));
+    // A device that rejects the form of the size has not executed the request.
+    let mut bus = FaultyBus::of("d20", "", Some((place(false), Fault::Refuse(0x0504_0001))));
     save(&mut bus, false).expect("stored");
     assert_eq!((bus.count("2210100173617665"), bus.count("2310100173617665")), (1, 1));
 }

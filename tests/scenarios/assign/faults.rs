@@ -1,6 +1,6 @@
 //! Devices that lose answers, reject requests, and do not come back.
 
-use super::{Held, Wanted, all_held, bus, id, run};
+use super::{Snapshot, Wanted, all_snapshots, bus, id, run};
 use cangauge::bus::memory::{Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
@@ -16,9 +16,9 @@ fn bench(kind: &str, oddities: &str) -> String {
     )
 }
 
-/// What holds after every run.
+/// Checks the devices after a run.
 #[track_caller]
-fn check(before: &[Held], after: &[Held], succeeded: bool, new: u8) {
+fn check(before: &[Snapshot], after: &[Snapshot], succeeded: bool, new: u8) {
     assert_eq!(before[1..], after[1..], "another device was changed");
     if succeeded {
         assert_eq!((after[0].0, after[0].2), (Some(new), Some(new)), "a success is the real state of the device");
@@ -45,13 +45,13 @@ fn every_fault_of_one_service() {
         for fault in faults {
             for target in ["5", "identity"] {
                 let mut bus = bus(&bench(kind, fault));
-                let before = all_held(&bus);
+                let before = all_snapshots(&bus);
                 let target = match target {
                     "5" => "5".to_owned(),
                     _ => identity(kind),
                 };
                 let done = run(&mut bus, &target, &id(12));
-                let after = all_held(&bus);
+                let after = all_snapshots(&bus);
                 check(&before, &after, done.result.is_ok(), 12);
                 if let Err(failure) = &done.result {
                     let says_all = failure.kind() == Kind::Refused;
@@ -59,7 +59,7 @@ fn every_fault_of_one_service() {
                     // "nothing was changed" holds even after a power cycle.
                     if ErrorMessage::of(&failure).message.contains("nothing was changed") {
                         bus.power_cycle();
-                        assert_eq!(all_held(&bus)[0], before[0], "{kind}{fault}: {failure}");
+                        assert_eq!(all_snapshots(&bus)[0], before[0], "{kind}{fault}: {failure}");
                     }
                 }
             }
@@ -75,23 +75,23 @@ fn identity(kind: &str) -> String {
 #[test]
 fn rejected_store_is_reverted_and_no_success() {
     let mut bus = bus(&bench("mh4", ", lss = { refuse = { '0x17' = 1 } }"));
-    let before = all_held(&bus);
+    let before = all_snapshots(&bus);
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::Refused);
     assert!(done.failure().1.contains("storing not supported"), "{}", done.failure().1);
     assert!(done.failure().1.contains("nothing was changed"), "{}", done.failure().1);
     assert!(ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap().contains("--via sdo"));
-    assert_eq!(all_held(&bus), before);
+    assert_eq!(all_snapshots(&bus), before);
     // No value is left pending: a reset changes nothing.
     let mut master = cangauge::master::Master::new(&mut bus, cangauge::master::Timing::default());
     master.send("000#8105".parse().unwrap());
     let until = master.now() + std::time::Duration::from_millis(500);
     while !matches!(master.next(until), Ok(cangauge::master::Happening::Deadline)) {}
     drop(master);
-    assert_eq!(all_held(&bus), before);
-    // Its objects work.
+    assert_eq!(all_snapshots(&bus), before);
+    // The device's objects work.
     run(&mut bus, "5", &Wanted { via: Via::Sdo, ..id(12) }).result.unwrap();
-    assert_eq!(all_held(&bus)[0].2, Some(12));
+    assert_eq!(all_snapshots(&bus)[0].2, Some(12));
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn silent_lss_uses_the_objects_of_the_description() {
     let done = run(&mut bus, "5", &id(12));
     assert!(done.warns("its own objects are used instead"), "{:?}", done.notes);
     done.result.unwrap();
-    assert_eq!(all_held(&bus)[0].2, Some(12));
+    assert_eq!(all_snapshots(&bus)[0].2, Some(12));
     // Not if the user chose LSS. The hint contains the identity.
     let mut bus = super::bus(&bench("mh4", &silent));
     let done = run(&mut bus, "5", &Wanted { via: Via::Lss, ..id(12) });
@@ -167,7 +167,7 @@ fn another_device_under_the_new_node_id() {
 #[test]
 fn rejected_bit_rate_changes_nothing() {
     let mut bus = bus(&bench("mh4", ", lss = { refuse = { '0x13' = 1 } }"));
-    let before = all_held(&bus);
+    let before = all_snapshots(&bus);
     let wanted = Wanted { rate: Some(RequestedRate::Bits(500_000)), ..id(12) };
     let done = run(&mut bus, "5", &wanted);
     assert_eq!(done.failure().0, Kind::Refused);
@@ -176,5 +176,5 @@ fn rejected_bit_rate_changes_nothing() {
         "{}",
         done.failure().1
     );
-    assert_eq!(all_held(&bus), before);
+    assert_eq!(all_snapshots(&bus), before);
 }

@@ -1,6 +1,6 @@
 //! Ctrl-C at every moment.
 
-use super::{Wanted, all_held, bus, id, run};
+use super::{Wanted, all_snapshots, bus, id, run};
 use cangauge::bus::memory::{Outbox, Station};
 use cangauge::bus::{BitRateControl, Bus, Mono};
 use cangauge::canopen::frame::Frame;
@@ -67,11 +67,11 @@ fn at_every_step(bench: &str, target: &str, wanted: &Wanted) {
     let mut interrupted = 0;
     for moment in moments(bench, target, wanted) {
         let mut bus = bus(bench);
-        let before = all_held(&bus);
+        let before = all_snapshots(&bus);
         let rate = bus.bit_rate();
         bus.interrupt_at(Mono::at(moment));
         let done = run(&mut bus, target, wanted);
-        let after = all_held(&bus);
+        let after = all_snapshots(&bus);
         assert_eq!(before[1..], after[1..], "{moment:?}: another device was changed");
         match &done.result {
             Ok(_) => {}
@@ -91,7 +91,7 @@ fn at_every_step(bench: &str, target: &str, wanted: &Wanted) {
                     let until = master.now() + Duration::from_millis(500);
                     while !matches!(master.next(until), Ok(cangauge::master::Happening::Deadline)) {}
                     drop(master);
-                    assert_eq!(all_held(&bus)[0], before[0], "{moment:?}: {failure}");
+                    assert_eq!(all_snapshots(&bus)[0], before[0], "{moment:?}: {failure}");
                 }
             }
         }

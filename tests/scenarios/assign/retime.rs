@@ -1,6 +1,6 @@
 //! Device and host change the bit rate together, and back.
 
-use super::{Done, Wanted, all_held, bus, run};
+use super::{Done, Wanted, all_snapshots, bus, run};
 use cangauge::bus::BitRateControl;
 use cangauge::bus::memory::MemoryBus;
 use cangauge::output::failure::ErrorMessage;
@@ -42,7 +42,7 @@ fn node_id_and_bit_rate_together() {
         assert_eq!(done.warns("cannot return to the old bit rate"), via == Via::Sdo, "{:?}", done.notes);
         let report = done.result.unwrap_or_else(|failure| panic!("{via:?}: {failure}"));
         assert!(report.retimed && report.confirmed != Confirmed::Acknowledge, "{via:?}");
-        assert_eq!(all_held(&bus), [(Some(12), NEW, Some(12), NEW)], "{via:?}");
+        assert_eq!(all_snapshots(&bus), [(Some(12), NEW, Some(12), NEW)], "{via:?}");
         assert_eq!(bus.bit_rate(), NEW);
     }
 }
@@ -53,7 +53,7 @@ fn without_the_host_nothing_is_reset() {
     let wanted = Wanted { id: Some(12), rate: Some(RequestedRate::Bits(500_000)), ..Wanted::default() };
     let report = run(&mut bus, "5", &wanted).result.unwrap();
     assert_eq!((report.retimed, report.confirmed), (false, Confirmed::Acknowledge));
-    assert_eq!(all_held(&bus), [(Some(5), OLD, Some(12), NEW), (Some(6), OLD, Some(6), OLD)]);
+    assert_eq!(all_snapshots(&bus), [(Some(5), OLD, Some(12), NEW), (Some(6), OLD, Some(6), OLD)]);
 }
 
 #[test]
@@ -76,21 +76,21 @@ fn rejected_if_another_device_is_on_the_bus() {
         "{ kind = 'mh4', node = 6, start = true, set = { '0x1801:5' = 100 } }",
     ] {
         let mut bus = bus(&format!("device = [{{ kind = 'mh4', node = 5 }}, {other}]"));
-        let before = all_held(&bus);
+        let before = all_snapshots(&bus);
         let done = retimed(&mut bus, "5");
         assert_eq!(done.failure().0, Kind::CheckFailed, "{other}");
         assert!(done.failure().1.contains("nothing was changed"), "{}", done.failure().1);
-        assert_eq!((bus.bit_rate(), all_held(&bus)), (OLD, before), "{other}");
+        assert_eq!((bus.bit_rate(), all_snapshots(&bus)), (OLD, before), "{other}");
     }
 }
 
 #[test]
 fn without_the_privilege_nothing_is_changed() {
     let mut bus = bus("retime = false\ndevice = [{ kind = 'mh4', node = 5 }]");
-    let before = all_held(&bus);
+    let before = all_snapshots(&bus);
     let done = retimed(&mut bus, "5");
     assert_eq!(done.failure().0, Kind::Bus, "{:?}", done.failure());
-    assert_eq!(all_held(&bus), before);
+    assert_eq!(all_snapshots(&bus), before);
 }
 
 #[test]

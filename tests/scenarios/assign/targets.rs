@@ -1,6 +1,6 @@
 //! The named device is changed, and no other.
 
-use super::{Wanted, all_held, bus, id, node, run};
+use super::{Wanted, all_snapshots, bus, id, node, run};
 use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{Outbox, Station};
 use cangauge::bus::time::Mono;
@@ -18,7 +18,7 @@ const ALL: &str = "device = [
     { kind = 'mh4', node = 1 }, { kind = 'd20', node = 2 }, { kind = 'mc1609', node = 3 }, { kind = 'dps', node = 127 },
 ]";
 
-const TWINS: &str = "device = [
+const DUPLICATES: &str = "device = [
     { kind = 'dps', node = 5, serial = 100, duplicate_id = true }, { kind = 'dps', node = 5, serial = 200, duplicate_id = true },
     { kind = 'mh4', node = 6 },
 ]";
@@ -27,12 +27,12 @@ const TWINS: &str = "device = [
 fn each_kind_by_its_node_id_among_all() {
     for (place, old) in [(0, 1), (1, 2), (2, 3), (3, 127)] {
         let mut bus = bus(ALL);
-        let mut expected = all_held(&bus);
+        let mut expected = all_snapshots(&bus);
         let done = run(&mut bus, &old.to_string(), &id(20));
         let report = done.result.unwrap();
         assert_eq!((report.confirmed, report.stored), (Confirmed::BootUp, true), "{old}");
         (expected[place].0, expected[place].2) = (Some(20), Some(20));
-        assert_eq!(all_held(&bus), expected, "{old}");
+        assert_eq!(all_snapshots(&bus), expected, "{old}");
     }
 }
 
@@ -40,26 +40,26 @@ fn each_kind_by_its_node_id_among_all() {
 fn each_kind_by_its_identity_among_all() {
     for (place, old) in [(0, 1), (1, 2), (2, 3), (3, 127)] {
         let mut bus = bus(ALL);
-        let mut expected = all_held(&bus);
+        let mut expected = all_snapshots(&bus);
         let address = run(&mut bus, &old.to_string(), &id(old)).result.unwrap().address.unwrap();
         let done = run(&mut bus, &address.to_string(), &id(20));
         let report = done.result.unwrap_or_else(|failure| panic!("{old}: {failure}"));
         assert_eq!((report.confirmed, report.old.map(|old| old.get())), (Confirmed::BootUp, Some(old)));
         (expected[place].0, expected[place].2) = (Some(20), Some(20));
-        assert_eq!(all_held(&bus), expected, "{old}");
+        assert_eq!(all_snapshots(&bus), expected, "{old}");
     }
 }
 
 #[test]
 fn taken_node_id_is_rejected() {
     let mut bus = bus(ALL);
-    let before = all_held(&bus);
+    let before = all_snapshots(&bus);
     for target in ["1", "0x362:0x443150:0x10000:20002"] {
         let done = run(&mut bus, target, &id(3));
         assert_eq!(done.failure().0, Kind::CheckFailed, "{target}");
         assert!(done.failure().1.contains("node-ID 3 is taken"), "{}", done.failure().1);
     }
-    assert_eq!(all_held(&bus), before);
+    assert_eq!(all_snapshots(&bus), before);
 }
 
 #[test]
@@ -79,20 +79,20 @@ fn lost_frame_does_not_make_a_node_id_free() {
     // More than the frames of the whole job.
     for lost in 0..150 {
         let mut bus = Faulty::new(bus(bench), FaultPlan { lose: BTreeSet::from([lost]), ..FaultPlan::default() });
-        let before = all_held(bus.inner());
+        let before = all_snapshots(bus.inner());
         let result = assign(&mut Master::new(&mut bus, Timing::default()), &job, &mut |_| {});
         assert!(result.is_err(), "{lost}");
-        assert_eq!(all_held(bus.inner()), before, "{lost}");
+        assert_eq!(all_snapshots(bus.inner()), before, "{lost}");
     }
 }
 
-/// Two devices with one node-ID that answer in turns: the serial number differs each time.
+/// Two devices with one node-ID that answer alternately, with different serial numbers.
 #[derive(Default)]
-struct Changeling {
+struct AlternatingDevices {
     reads: u8,
 }
 
-impl Station for Changeling {
+impl Station for AlternatingDevices {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
@@ -115,7 +115,7 @@ impl Station for Changeling {
 #[test]
 fn answers_that_differ_show_two_devices() {
     let mut bus = bus("device = [{ kind = 'mh4', node = 6 }]");
-    bus.attach(Changeling::default());
+    bus.attach(AlternatingDevices::default());
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::CheckFailed);
     assert!(done.failure().1.contains("its answers to the same request differ"), "{}", done.failure().1);
@@ -134,23 +134,23 @@ fn node_id_of_a_stopped_node_with_heartbeat_is_taken() {
 
 #[test]
 fn two_devices_with_one_node_id() {
-    let mut bus = bus(TWINS);
-    let before = all_held(&bus);
+    let mut bus = bus(DUPLICATES);
+    let before = all_snapshots(&bus);
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::CheckFailed);
     assert!(done.failure().1.contains("several devices have this node-ID"), "{}", done.failure().1);
     assert!(ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap().contains("VENDOR:PRODUCT:REVISION:SERIAL"));
-    assert_eq!(all_held(&bus), before);
+    assert_eq!(all_snapshots(&bus), before);
     // One of them is addressed by its identity. It is not reset, so that is no success yet.
     let done = run(&mut bus, "0x362:0x443150:0x10000:200", &id(12));
     assert_eq!(done.failure().0, Kind::Unexpected);
     assert!(done.failure().1.contains("not reset") && done.failure().1.contains("stored"), "{}", done.failure().1);
     let mut expected = before;
     expected[1].2 = Some(12);
-    assert_eq!(all_held(&bus), expected);
+    assert_eq!(all_snapshots(&bus), expected);
     bus.power_cycle();
     expected[1].0 = Some(12);
-    assert_eq!(all_held(&bus), expected);
+    assert_eq!(all_snapshots(&bus), expected);
 }
 
 #[test]
@@ -159,35 +159,35 @@ fn one_of_two_with_one_node_id_is_not_reset() {
         { kind = 'mh4', node = 5, serial = 100, duplicate_id = true }, { kind = 'mh4', node = 5, serial = 200, duplicate_id = true },
     ]";
     let mut bus = bus(twins);
-    let mut expected = all_held(&bus);
+    let mut expected = all_snapshots(&bus);
     let done = run(&mut bus, "0x47:1:0x10007:200", &id(12));
     assert_eq!(done.failure().0, Kind::Unexpected);
     assert!(done.failure().1.contains("another device has node-ID 5 too"), "{}", done.failure().1);
     assert!(done.warns("it is not reset"), "{:?}", done.notes);
-    // A reset would have restarted the other device too.
+    // A reset would restart the other device as well.
     expected[1].2 = Some(12);
-    assert_eq!(all_held(&bus), expected);
+    assert_eq!(all_snapshots(&bus), expected);
 }
 
 #[test]
 fn unconfigured_devices_one_after_the_other() {
     let mut bus =
         bus("device = [{ kind = 'mh4', serial = 9 }, { kind = 'mh4', node = 6 }, { kind = 'mh4', serial = 4 }]");
-    let mut expected = all_held(&bus);
+    let mut expected = all_snapshots(&bus);
     for (place, new) in [(2, 20), (0, 21)] {
         let done = run(&mut bus, "unconfigured", &id(new));
         let report = done.result.unwrap_or_else(|failure| panic!("{new}: {failure}"));
         assert_eq!((report.confirmed, report.old), (Confirmed::BootUp, None));
         (expected[place].0, expected[place].2) = (Some(new), Some(new));
-        assert_eq!(all_held(&bus), expected);
+        assert_eq!(all_snapshots(&bus), expected);
     }
     let done = run(&mut bus, "unconfigured", &id(22));
     assert_eq!(done.failure().0, Kind::NoAnswer);
-    assert_eq!(all_held(&bus), expected);
+    assert_eq!(all_snapshots(&bus), expected);
 }
 
 #[test]
-fn only_is_for_one_device_alone() {
+fn only_changes_the_sole_device() {
     for kind in ["mh4", "d20", "mc1609", "dps"] {
         let mut bus = bus(&format!("device = [{{ kind = '{kind}', node = 5 }}]"));
         let done = run(&mut bus, "only", &id(12));
@@ -195,7 +195,7 @@ fn only_is_for_one_device_alone() {
         assert_eq!(done.warns("does not support"), matches!(kind, "dps" | "d20"), "{kind} {:?}", done.notes);
         let report = done.result.unwrap_or_else(|failure| panic!("{kind}: {failure}"));
         assert_eq!(report.confirmed, Confirmed::BootUp, "{kind}");
-        assert_eq!(all_held(&bus)[0].2, Some(12), "{kind}");
+        assert_eq!(all_snapshots(&bus)[0].2, Some(12), "{kind}");
     }
 }
 
@@ -210,11 +210,11 @@ fn only_is_rejected_if_another_device_is_found() {
     ];
     for bench in two {
         let mut bus = bus(bench);
-        let before = all_held(&bus);
+        let before = all_snapshots(&bus);
         let done = run(&mut bus, "only", &id(12));
         assert_eq!(done.failure().0, Kind::CheckFailed, "{bench}");
         assert!(done.failure().1.ends_with("nothing was changed"), "{}", done.failure().1);
-        assert_eq!(all_held(&bus), before, "{bench}");
+        assert_eq!(all_snapshots(&bus), before, "{bench}");
     }
 }
 
@@ -222,7 +222,7 @@ fn only_is_rejected_if_another_device_is_found() {
 fn only_works_without_a_node_id() {
     let mut bus = bus("device = [{ kind = 'mh4' }]");
     let report = run(&mut bus, "only", &id(12)).result.unwrap();
-    assert_eq!((report.confirmed, all_held(&bus)[0].2), (Confirmed::BootUp, Some(12)));
+    assert_eq!((report.confirmed, all_snapshots(&bus)[0].2), (Confirmed::BootUp, Some(12)));
 }
 
 #[test]
@@ -232,7 +232,7 @@ fn forced_only_with_several_devices_is_no_success() {
     assert_eq!(done.failure().0, Kind::Unexpected, "{:?}", done.failure());
     assert!(done.warns("all of them accept the change"), "{:?}", done.notes);
     assert_eq!(
-        all_held(&bus).iter().map(|held| (held.0, held.2)).collect::<Vec<_>>(),
+        all_snapshots(&bus).iter().map(|held| (held.0, held.2)).collect::<Vec<_>>(),
         [(Some(5), Some(12)), (Some(6), Some(12))]
     );
 }
@@ -253,9 +253,9 @@ fn forced_store_accepts_several_answers() {
 fn absent_device_is_no_answer() {
     for target in ["9", "1:2:3:4", "unconfigured"] {
         let mut bus = bus(ALL);
-        let before = all_held(&bus);
+        let before = all_snapshots(&bus);
         assert_eq!(run(&mut bus, target, &id(12)).failure().0, Kind::NoAnswer, "{target}");
-        assert_eq!(all_held(&bus), before);
+        assert_eq!(all_snapshots(&bus), before);
     }
 }
 
@@ -270,44 +270,44 @@ fn device_without_serial_number_is_rejected() {
 #[test]
 fn two_devices_with_one_identity() {
     let mut bus = bus("device = [{ kind = 'mh4', node = 5, serial = 7 }, { kind = 'mh4', node = 6, serial = 7 }]");
-    let before = all_held(&bus);
+    let before = all_snapshots(&bus);
     for target in ["5", "6", "0x47:1:0x10007:7"] {
         let done = run(&mut bus, target, &id(12));
         assert_eq!(done.failure().0, Kind::CheckFailed, "{target}: {:?}", done.failure());
         assert!(done.failure().1.ends_with("nothing was changed"), "{}", done.failure().1);
     }
-    assert_eq!(all_held(&bus), before);
+    assert_eq!(all_snapshots(&bus), before);
     // Devices without 5Eh.
     for kind in ["dps", "d20"] {
         let twin = |node: u8| format!("{{ kind = '{kind}', node = {node}, serial = 7 }}");
         let mut bus = super::bus(&format!("device = [{}, {}]", twin(5), twin(6)));
-        let before = all_held(&bus);
+        let before = all_snapshots(&bus);
         assert_eq!(run(&mut bus, "5", &id(12)).failure().0, Kind::CheckFailed, "{kind}");
-        assert_eq!(all_held(&bus), before, "{kind}");
+        assert_eq!(all_snapshots(&bus), before, "{kind}");
     }
     // One of them has no node-ID, so SDO does not show it. Both answer to the identity.
     let mut bus = super::bus("device = [{ kind = 'mh4', node = 5, serial = 7 }, { kind = 'mh4', serial = 7 }]");
-    let before = all_held(&bus);
+    let before = all_snapshots(&bus);
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::CheckFailed, "{:?}", done.failure());
-    assert_eq!(all_held(&bus), before);
+    assert_eq!(all_snapshots(&bus), before);
 }
 
 #[test]
-fn by_objects_of_its_own() {
+fn assignment_by_manufacturer_objects() {
     let cases = [("mh4", None), ("baumer", Some("baumer"))];
     for (kind, device) in cases {
-        // The only rate of which Baumer's code is known.
+        // Baumer's code is known for this bit rate only.
         let mut bus = bus(&format!(
             "bit_rate = 500000\ndevice = [{{ kind = '{kind}', node = 5 }}, {{ kind = 'dps', node = 6 }}]"
         ));
-        let mut expected = all_held(&bus);
+        let mut expected = all_snapshots(&bus);
         let done = run(&mut bus, "5", &Wanted { via: Via::Sdo, device, ..id(12) });
         assert_eq!(done.warns("COB-IDs"), kind == "mh4", "{:?}", done.notes);
         let report = done.result.unwrap_or_else(|failure| panic!("{kind}: {failure}"));
         assert_eq!(report.confirmed, Confirmed::BootUp, "{kind}");
         (expected[0].0, expected[0].2) = (Some(12), Some(12));
-        assert_eq!(all_held(&bus), expected, "{kind}");
+        assert_eq!(all_snapshots(&bus), expected, "{kind}");
     }
     let mut bus = bus("device = [{ kind = 'dps', node = 6 }]");
     let done = run(&mut bus, "6", &Wanted { via: Via::Sdo, ..id(12) });
@@ -327,11 +327,11 @@ fn objects_that_need_a_store_are_not_written_without_one() {
         ("hydac-old", Some("hydac-old"), "as soon as they are written"),
     ] {
         let mut bus = bus(&format!("device = [{{ kind = '{kind}', node = 5 }}]"));
-        let expected = all_held(&bus);
+        let expected = all_snapshots(&bus);
         let done = run(&mut bus, "5", &Wanted { via: Via::Sdo, no_store: true, device, ..id(12) });
         let (failure, message) = done.failure();
         assert!(message.contains(why) && message.contains("nothing was changed"), "{failure:?} {message}");
-        assert_eq!(all_held(&bus), expected);
+        assert_eq!(all_snapshots(&bus), expected);
         assert!(!done.warns("1010h:1"), "{:?}", done.notes);
     }
 }
@@ -352,11 +352,11 @@ fn nmt_state_changed_for_lss_is_restored() {
 #[test]
 fn values_that_are_not_stored_are_lost_at_power_off() {
     let mut bus = bus(ALL);
-    let expected = all_held(&bus);
+    let expected = all_snapshots(&bus);
     let report = run(&mut bus, "1", &Wanted { no_store: true, ..id(12) }).result.unwrap();
-    assert_eq!((report.stored, all_held(&bus)[0].0, all_held(&bus)[0].2), (false, Some(12), Some(1)));
+    assert_eq!((report.stored, all_snapshots(&bus)[0].0, all_snapshots(&bus)[0].2), (false, Some(12), Some(1)));
     bus.power_cycle();
-    assert_eq!(all_held(&bus), expected);
+    assert_eq!(all_snapshots(&bus), expected);
 }
 
 #[test]
@@ -373,7 +373,7 @@ fn stale_cob_ids_are_reported() {
 #[test]
 fn unsupported_bit_rate_is_rejected_with_the_list() {
     let mut bus = bus(ALL);
-    let before = all_held(&bus);
+    let before = all_snapshots(&bus);
     for (target, rate, list) in [
         ("127", RequestedRate::Bits(800_000), "1M, 500k, 250k, 125k, 100k, 50k"),
         ("127", RequestedRate::Auto, "1M, 500k, 250k, 125k, 100k, 50k"),
@@ -384,7 +384,7 @@ fn unsupported_bit_rate_is_rejected_with_the_list() {
         let hint = ErrorMessage::of(&done.result.unwrap_err()).hint.unwrap();
         assert!(hint.contains(list), "{hint}");
     }
-    assert_eq!(all_held(&bus), before);
+    assert_eq!(all_snapshots(&bus), before);
     // Its own table: 5 is 100k.
     let done = run(&mut bus, "127", &Wanted { rate: Some(RequestedRate::Bits(100_000)), ..Wanted::default() });
     let report = done.result.unwrap();
@@ -394,5 +394,5 @@ fn unsupported_bit_rate_is_rejected_with_the_list() {
     );
     let stored = bus.stations::<Device>().map(|device| device.stored().1).collect::<Vec<_>>();
     assert_eq!(stored[3].map(short_bit_rate).as_deref(), Some("100k"));
-    assert_eq!(all_held(&bus)[..3], before[..3]);
+    assert_eq!(all_snapshots(&bus)[..3], before[..3]);
 }
