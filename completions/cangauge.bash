@@ -4299,7 +4299,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo__subcmd__read)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --type --hex --output --force --block --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --type --hex --bytes --output --force --block --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
