@@ -55,6 +55,8 @@ struct TpdoDecoder {
     wrong_lengths: u64,
     /// The length of the first TPDO with another length.
     other_length: Option<usize>,
+    /// A TPDO with the length of the mapping was received.
+    has_exact: bool,
     /// TPDOs had more than one length.
     is_mixed: bool,
     /// TPDOs of [`TpdoDecoder::other_length`] are used up to the mapped length.
@@ -209,6 +211,7 @@ impl Decoder {
             wrong_lengths: 0,
             other_length: None,
             is_mixed: false,
+            has_exact: false,
             uses_longer: false,
         }
     }
@@ -250,19 +253,19 @@ impl Decoder {
             return Decoded::Held(tpdo.node);
         }
         let data = frame.data();
-        if data.len() != tpdo.length || tpdo.uses_longer {
+        let is_exact = data.len() == tpdo.length;
+        tpdo.has_exact |= is_exact;
+        if !is_exact {
             tpdo.wrong_lengths += 1;
-            let other = *tpdo.other_length.get_or_insert(data.len());
-            if other != data.len() {
-                // Two devices send with this COB-ID, or the mapping has changed.
-                tpdo.is_mixed = true;
-                tpdo.uses_longer = false;
-            }
-            if !tpdo.uses_longer {
-                return Decoded::WrongLength(tpdo.node);
-            }
-        } else if tpdo.other_length.is_some() {
+        }
+        let other = if is_exact { tpdo.other_length } else { Some(*tpdo.other_length.get_or_insert(data.len())) };
+        if other.is_some_and(|other| tpdo.has_exact || other != data.len()) {
+            // Two devices send with this COB-ID, or the mapping has changed.
             tpdo.is_mixed = true;
+            tpdo.uses_longer = false;
+        }
+        if !is_exact && !tpdo.uses_longer {
+            return Decoded::WrongLength(tpdo.node);
         }
         for value in &tpdo.values {
             let Some((bytes, len)) = value.field.bytes(data) else { continue };

@@ -2,7 +2,7 @@
 //!
 //! A task gets a [`Node`] from [`survey`] (identity only, or everything that decoding needs), and passes it to
 //! - [`read`]: reads values, several nodes in parallel;
-//! - [`write`]: writes an object in the form that the node accepts, and says how it was confirmed;
+//! - [`mod@write`]: writes an object in the form that the node accepts, and says how it was confirmed;
 //! - [`wait`]: receives frames until a deadline, with one policy for Ctrl-C, link down and the end of a recording;
 //! - [`state`]: NMT states, commands, reset and the restart;
 //! - [`scan`] and [`targets`]: the nodes on the bus, and those that `all` means;

@@ -193,10 +193,20 @@ fn read_services<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(),
     ];
     let items: Vec<Item> = instruments
         .iter()
-        .flat_map(|instrument| objects.map(|(object, data_type)| (instrument.id, object, data_type)))
+        .flat_map(|node| objects[..3].iter().map(|&(object, data_type)| (node.id, object, data_type)))
         .collect();
     let values = read_known(master, &items)?;
-    for (instrument, values) in instruments.iter_mut().zip(values.chunks(objects.len())) {
+    // A description that lists the SYNC object and not 1019h says that the device has no SYNC counter.
+    let may_count = |node: &Node| match &node.model {
+        Some(model) => model.dictionary.has_index(0x1019) || !model.dictionary.has_index(0x1005),
+        None => true,
+    };
+    let counting: Vec<usize> = (0..instruments.len()).filter(|&at| may_count(&instruments[at])).collect();
+    let items: Vec<Item> = counting.iter().map(|&at| (instruments[at].id, objects[3].0, objects[3].1)).collect();
+    for (&at, value) in counting.iter().zip(read_known(master, &items)?) {
+        instruments[at].sync_overflow = small(value.as_ref()).filter(|overflow| (2..=240).contains(overflow));
+    }
+    for (instrument, values) in instruments.iter_mut().zip(values.chunks(3)) {
         instrument.heartbeat_ms = small(values[0].as_ref());
         if let Some(word) = small(values[1].as_ref()).map(CobId).filter(|word| word.is_valid()) {
             instrument.emergency = word.can_id();
@@ -204,7 +214,6 @@ fn read_services<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(),
         if let Some(word) = small(values[2].as_ref()).map(CobId) {
             instrument.sync = word.can_id();
         }
-        instrument.sync_overflow = small(values[3].as_ref()).filter(|overflow| (2..=240).contains(overflow));
     }
     Ok(())
 }
@@ -376,7 +385,9 @@ fn read_units<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A:
 /// Reads the measuring ranges (6148h, 6149h) where a value depends on them: an integer that may be too narrow, and a
 /// described signal without a status.
 fn read_ranges<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
-    let mut wanted: Vec<(usize, usize, [(ObjectId, DataType); 2])> = Vec::new();
+    // Node, signal, and its two ends.
+    type Range = (usize, usize, [(ObjectId, DataType); 2]);
+    let mut wanted: Vec<Range> = Vec::new();
     for (at, node) in instruments.iter().enumerate() {
         for (number, signal) in node.signals.iter().enumerate() {
             if !needs_range(node, signal) {
@@ -467,12 +478,11 @@ pub fn identify_each(
     each(master, nodes, &mut |master, nodes| identify(master, nodes, overrides))
 }
 
+/// Reads nodes in parallel.
+type ReadNodes<'a> = &'a mut dyn FnMut(&mut Master<'_>, &[NodeId]) -> Result<Vec<Node>, Error>;
+
 /// Reads all nodes in parallel; if one of them fails, each alone.
-fn each(
-    master: &mut Master<'_>,
-    nodes: &[NodeId],
-    read: &mut dyn FnMut(&mut Master<'_>, &[NodeId]) -> Result<Vec<Node>, Error>,
-) -> Result<Vec<Result<Node, SdoError>>, Error> {
+fn each(master: &mut Master<'_>, nodes: &[NodeId], read: ReadNodes<'_>) -> Result<Vec<Result<Node, SdoError>>, Error> {
     match read(master, nodes) {
         Ok(all) => return Ok(all.into_iter().map(Ok).collect()),
         Err(Error::Sdo(error)) if nodes.len() == 1 => return Ok(vec![Err(error)]),

@@ -131,7 +131,7 @@ pub fn write_with(
 /// Writes a value and reads it back.
 ///
 /// # Errors
-/// As [`write`]; [`Error::NotKept`] if the object reads differently.
+/// As [`write()`]; [`Error::NotKept`] if the object reads differently.
 pub fn write_and_verify(
     master: &mut Master<'_>,
     node: &Node,

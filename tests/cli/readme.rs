@@ -7,6 +7,7 @@ use clap::Parser;
 use clap::error::ErrorKind;
 use std::fs;
 use std::io::ErrorKind as IoError;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -94,7 +95,9 @@ fn commands_on_the_simulated_bus_work_as_printed() {
 fn the_python_example_works() {
     let [example] = blocks("python").try_into().expect("one example");
     let done = match Command::new("python3").env("PATH", search_path()).args(["-c", &example]).output() {
-        Err(error) if error.kind() == IoError::NotFound => return eprintln!("SKIPPED: there is no python3"),
+        Err(error) if error.kind() == IoError::NotFound => {
+            return writeln!(std::io::stderr(), "SKIPPED: there is no python3").expect("stderr");
+        }
         done => done.expect("python3"),
     };
     let stdout = String::from_utf8_lossy(&done.stdout);

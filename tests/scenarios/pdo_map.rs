@@ -314,12 +314,12 @@ fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Snapshot, we
     match &result {
         Ok(_) => assert_eq!(&held, new, "{what}"),
         Err(failure) => {
-            let message = &ErrorMessage::of(&failure).message;
+            let message = &ErrorMessage::of(failure).message;
             let said_to_be_half =
                 message.contains("is only partly changed") || message.contains("it is unknown whether");
             if said_to_be_half {
                 assert!(matches!(mishap, Mishap::Gone | Mishap::Stubborn(_)), "it could have been restored: {what}");
-                let hint = ErrorMessage::of(&failure).hint.unwrap_or_default();
+                let hint = ErrorMessage::of(failure).hint.unwrap_or_default();
                 assert!(hint.starts_with("when it answers again: cangauge "), "{what}");
             } else {
                 assert_eq!(&held, old, "{what}");
@@ -349,7 +349,7 @@ fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Snapshot, we
         let says = |message: &String| words.iter().any(|words| message.contains(words));
         let told = match &result {
             Ok(mapped) => mapped.notes.iter().any(|told| says(&note(told).message)),
-            Err(failure) => says(&ErrorMessage::of(&failure).message),
+            Err(failure) => says(&ErrorMessage::of(failure).message),
         };
         assert!(told || state == Some(before), "{state:?}: {what}");
     }

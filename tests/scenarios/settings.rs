@@ -245,7 +245,7 @@ fn an_acknowledge_is_no_proof() {
     };
     assert_eq!(
         refused(|master, device| unit::set(master, device, None, PSI).map(|_| ())),
-        "node 5: 0x6131:1 was acknowledged and reads 5111808"
+        "node 5: 0x6131:1 was acknowledged and reads 5111808 instead of 11206656"
     );
     assert_eq!(
         refused(|master, device| {

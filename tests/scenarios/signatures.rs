@@ -314,7 +314,10 @@ fn acknowledged_signature_without_effect_is_detected() {
     let at = bus.sent.iter().position(|frame| frame.ends_with("7A65726F")).expect("\"zero\"");
     let failure = zero(&mut FaultyBus::of("mh4", STILL, Some((at, Fault::Pretend))), false).expect_err("no zero");
     assert_eq!(failure.kind(), Kind::Unexpected);
-    assert!(ErrorMessage::of(&failure).message.contains("it took the signature, and nothing has changed"), "{failure}");
+    assert!(
+        ErrorMessage::of(&failure).message.contains("the device accepted the signature, and nothing has changed"),
+        "{failure}"
+    );
 }
 
 #[test]

@@ -6,11 +6,11 @@
 //! - An object without sub-objects has its own name.
 //! - An element of an array is `object:1`, as in device descriptions: `ai-input-pv:1`.
 //! - A member of a record has its own name if that is unique in the file (`vendor-id`), else `object:1`
-//! (`tpdo-1-parameter:1`; every PDO has a "COB-ID"). Sub-index 0, the count, is always `object:0`.
+//!   (`tpdo-1-parameter:1`; every PDO has a "COB-ID"). Sub-index 0, the count, is always `object:0`.
 //! - The index is appended to a name that two objects have, or that reads as a hexadecimal index ("Add", "Face"):
-//! `reserved-2005`.
+//!   `reserved-2005`.
 //! - A sub-object has a second name if that is unique: `identity-object:1`, and `ai-input-pv-1` in an array. So has an
-//! object with a user's name in a DCF (`Denotation`).
+//!   object with a user's name in a DCF (`Denotation`).
 //!
 //! No two entries have the same name, and [`Dictionary::find`] finds each by its [`Entry::full_name`].
 

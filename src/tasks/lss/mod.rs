@@ -6,7 +6,7 @@
 //! - A node is reset only if the reset cannot reach another device.
 //! - Success is what the device shows under its new node-ID, not what it acknowledged.
 //!
-//! The modules, from the bottom up: [`device`] (the device and how LSS reaches it), `node_id` and `nodes` (what answers
+//! The modules, from the bottom up: `device` (the device and how LSS reaches it), `node_id` and `nodes` (what answers
 //! on the bus), `session` (configuration state), `sole` and `resolve` (from the argument to the device), `method`,
 //! `objects`, `retime`, `confirm`, `cob_ids`, and the tasks themselves: `assign`, `services`, `find`.
 

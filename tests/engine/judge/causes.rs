@@ -9,7 +9,7 @@ pub(super) fn kinds(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     if run.bus.overran {
         return;
     }
-    let told = || format!("{:?}: {failure} (hint: {:?})", failure.kind(), ErrorMessage::of(&failure).hint);
+    let told = || format!("{:?}: {failure} (hint: {:?})", failure.kind(), ErrorMessage::of(failure).hint);
     let tap = &run.bus;
     if tap.interrupted.is_some() && !tap.was_down && !tap.was_off {
         // The failure may have happened before the interruption.
@@ -70,7 +70,7 @@ pub(super) fn kinds(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     if failure.kind() == Kind::NoAnswer && all_there(spec) && !may_be_silent(spec) {
         violations.push(("names the cause", format!("all devices answer: {}", told())));
     }
-    if failure.kind() == Kind::Unexpected && !may_be_odd(spec, &ErrorMessage::of(&failure).message) {
+    if failure.kind() == Kind::Unexpected && !may_be_odd(spec, &ErrorMessage::of(failure).message) {
         violations.push(("names the cause", format!("nothing is unexpected: {}", told())));
     }
     if failure.kind() == Kind::Refused

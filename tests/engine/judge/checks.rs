@@ -17,7 +17,7 @@ pub(super) fn checks(spec: &Spec, run: &mut Run, violations: &mut Vec<Violation>
         Ok(_) => complete && count(Outcome::Ok) == verdicts.len(),
         // Nodes with different SYNC COB-IDs are not measured.
         Err(failure) if failure.kind() == Kind::CheckFailed && spec.falsifies_data() && verdicts.is_empty() => {
-            ErrorMessage::of(&failure).message.contains("(1005h)")
+            ErrorMessage::of(failure).message.contains("(1005h)")
         }
         Err(failure) if failure.kind() == Kind::CheckFailed => count(Outcome::Fail) > 0,
         Err(_) => count(Outcome::Fail) == 0,

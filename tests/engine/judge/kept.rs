@@ -46,9 +46,7 @@ pub(super) fn after_power(spec: &Spec, run: &mut Run, violations: &mut Vec<Viola
         Ok(Claim::Stored) if !spec.falsifies_data() && !spec.is_changed_by_others() && !spec.shares_node_ids() => {
             heartbeat_kept(spec, bus, settled, violations);
         }
-        Err(failure)
-            if ErrorMessage::of(&failure).message.contains("nothing was changed") && !spec.falsifies_data() =>
-        {
+        Err(failure) if ErrorMessage::of(failure).message.contains("nothing was changed") && !spec.falsifies_data() => {
             // Settings that another program left configured become active with a power cycle.
             let own = |holds: &DeviceState| (holds.stored, holds.node.filter(|_| run.killed.is_none()));
             let before = run.before.iter().map(own);

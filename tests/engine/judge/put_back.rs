@@ -56,7 +56,7 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[DeviceState], violat
             {
                 let remarks = match &run.result {
                     Ok(said) => format!("{said:?}"),
-                    Err(failure) => ErrorMessage::of(&failure).message.clone(),
+                    Err(failure) => ErrorMessage::of(failure).message.clone(),
                 };
                 if !remarks.contains("StatesNotRestored")
                     && !remarks.contains("LeftOperational")

@@ -14,7 +14,7 @@ pub(super) fn check_cause(spec: &Spec, run: &Run, violations: &mut Vec<Violation
             was_silent(spec, run, failure, violations)
         }
         // What cannot be done is not even requested.
-        Kind::Refused if ErrorMessage::of(&failure).message.contains("refused by the device") => {
+        Kind::Refused if ErrorMessage::of(failure).message.contains("refused by the device") => {
             was_refused(run, failure, violations)
         }
         _ => {}
@@ -25,7 +25,7 @@ pub(super) fn check_cause(spec: &Spec, run: &Run, violations: &mut Vec<Violation
     if undoes {
         return;
     }
-    if stopped || failure.kind() == Kind::Usage || ErrorMessage::of(&failure).message.contains("nothing was changed") {
+    if stopped || failure.kind() == Kind::Usage || ErrorMessage::of(failure).message.contains("nothing was changed") {
         let changes = (0..run.bus.frames.len()).find_map(|place| taken(&run.bus.frames[place..]));
         if let Some((at, frame)) = changes {
             violations.push(("reports what was changed", format!("{failure}, and {frame} at {:?}", at.since_start())));
@@ -73,10 +73,10 @@ fn begins(frame: &Frame) -> Option<ObjectId> {
 /// If the failure says "no answer": a request without an answer exists.
 fn was_silent(spec: &Spec, run: &Run, failure: &Failure, violations: &mut Vec<Violation>) {
     let (Some(node), Some(object)) = (failure.node, failure.object) else { return };
-    if ErrorMessage::of(&failure).message.contains("in the middle") {
+    if ErrorMessage::of(failure).message.contains("in the middle") {
         return;
     }
-    let writes = ErrorMessage::of(&failure).message.contains(&format!("write {object}"));
+    let writes = ErrorMessage::of(failure).message.contains(&format!("write {object}"));
     let asks = |frame: &Frame| {
         let writing = frame.data().first().is_some_and(|first| matches!(first >> 5, 1 | 6));
         let started = begins(frame).filter(|_| frame.id() == CanId::sdo_request(node));

@@ -55,9 +55,9 @@ fn every_fault_of_one_service() {
                 check(&before, &after, done.result.is_ok(), 12);
                 if let Err(failure) = &done.result {
                     let says_all = failure.kind() == Kind::Refused;
-                    assert!(says_all || ErrorMessage::of(&failure).hint.is_some(), "{kind}{fault}: {failure}");
+                    assert!(says_all || ErrorMessage::of(failure).hint.is_some(), "{kind}{fault}: {failure}");
                     // "nothing was changed" holds even after a power cycle.
-                    if ErrorMessage::of(&failure).message.contains("nothing was changed") {
+                    if ErrorMessage::of(failure).message.contains("nothing was changed") {
                         bus.power_cycle();
                         assert_eq!(all_snapshots(&bus)[0], before[0], "{kind}{fault}: {failure}");
                     }

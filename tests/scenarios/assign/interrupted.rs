@@ -79,13 +79,13 @@ fn at_every_step(bench: &str, target: &str, wanted: &Wanted) {
                 assert_eq!(failure.kind(), Kind::Interrupted, "{moment:?}: {failure}");
                 interrupted += 1;
                 assert!(
-                    bus.bit_rate() == rate || ErrorMessage::of(&failure).message.contains("configured"),
+                    bus.bit_rate() == rate || ErrorMessage::of(failure).message.contains("configured"),
                     "{moment:?}: {failure}"
                 );
-                if ErrorMessage::of(&failure).message.contains("not stored") {
+                if ErrorMessage::of(failure).message.contains("not stored") {
                     assert_eq!((after[0].2, after[0].3), (before[0].2, before[0].3), "{moment:?}: {failure}");
                 }
-                if ErrorMessage::of(&failure).message.contains("nothing was changed") {
+                if ErrorMessage::of(failure).message.contains("nothing was changed") {
                     let mut master = cangauge::master::Master::new(&mut bus, cangauge::master::Timing::default());
                     master.send("000#8105".parse().unwrap());
                     let until = master.now() + Duration::from_millis(500);
