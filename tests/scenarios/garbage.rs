@@ -45,7 +45,8 @@ impl GarbageSender {
                     let data = [[0x03, 0xe0, 0xff, 0x7e][usize::from(low % 4)]; 8];
                     let harmless = match function {
                         0 => low == 0 && data[0] == 0x03,
-                        1 => low != 0,
+                        // Without data this is the boot-up of a device before CiA 301 V4.
+                        1 => low != 0 && length > 0,
                         0xc => false,
                         _ => !TPDOS.contains(&(id, length)),
                     };

@@ -252,14 +252,14 @@ fn an_acknowledge_is_no_proof() {
             let wanted = FilterRequest { kind: Some(FilterType::Moving), ..FilterRequest::default() };
             filter::set(master, device, None, wanted).map(|_| ())
         }),
-        "node 5: 0x61A0:1 was acknowledged and reads 0"
+        "node 5: 0x61A0:1 was acknowledged and reads 0 instead of 1"
     );
     assert_eq!(
         refused(|master, device| limits::set(master, device, "ch1", &[(Limit::Delta, 0.5)]).map(|_| ())),
-        "node 5: 0x6133:1 was acknowledged and reads 0"
+        "node 5: 0x6133:1 was acknowledged and reads 0 instead of 0.5; the previous limits are set again"
     );
     assert_eq!(
         refused(|master, device| errors::clear(master, device).map(|_| ())),
-        "node 5: 0x1003:0 was acknowledged, and the history still holds 1"
+        "node 5: it acknowledged the write of 0x1003:0, but the history still has 1 error"
     );
 }
