@@ -51,14 +51,14 @@ def sdo_read(cangauge, directory):
         assert read(10, "1018h:4") == "1010\n"
         assert read(10, "1000") == "131476\n"
         assert read(10, "1017") == "0\n"
-        assert read(10, "1018:1", "--hex") == "0x34120000\n"
+        assert read(10, "1018:1", "--hex") == "0x00001234\n"
         assert read(10, "6130:1", "--type", "r32") == "-100\n"
         assert read(11, "9130:1", "--type", "i32") == "-5000\n"
         # A transfer with several segments.
         assert read(10, "1008") == "python-canopen pressure transmitter\n"
         assert read(10, "2001", "--type", "vs") == "as delivered\n"
         # The type is unknown: the bytes are printed.
-        assert read(10, "2000") == "0xEFBE\n"
+        assert read(10, "2000") == "EF BE\n"
         assert read(10, "2000", "--type", "u16") == "48879\n"
         assert read(10, "vendor-id", "1018:4") == "vendor-id 4660\n0x1018:4 1010\n"
         path = os.path.join(directory, "bytes")
@@ -93,7 +93,7 @@ def sdo_write(cangauge, directory):
         assert read(10, "6132:1", "--type", "u8") == "3"
         # The type follows from reading the object.
         write(10, "2000", 513, "--verify")
-        assert read(10, "2000") == "0x0102"
+        assert read(10, "2000") == "01 02"
         # A segmented download.
         text = "a text that needs several segments"
         write(10, "2001", text, "--type", "vs", "--verify")

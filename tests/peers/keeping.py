@@ -134,8 +134,10 @@ def python_device_is_zeroed_and_stores(cangauge, directory):
     with network(cangauge.interface) as bus:
         device = Transmitter(bus)
         done = cangauge.run(*PATIENT, "autozero", 5, "--samples", 2, "--format", "json")
-        assert done.json() == [{"node": 5, "channel": 1, "unit": "bar", "before": UNZEROED, "after": 0.0,
-                                "offset_before": 0.0, "offset": -UNZEROED, "stored": False}], done
+        [report] = done.json()
+        assert [note["code"] for note in report.pop("notes")] == ["undo", "not-stored"], done
+        assert report == {"node": 5, "channel": 1, "signal": "ch1", "unit": "bar", "before": UNZEROED, "after": 0.0,
+                          "offset_before": 0.0, "offset": -UNZEROED, "stored": False}, done
         assert device.take() == [(AUTOZERO, 1, b"zero")]
         # The printed command undoes it.
         undo = next(line.split("undo: cangauge ")[1] for line in done.err.splitlines() if "undo" in line)

@@ -28,6 +28,12 @@ def pdo_show(cangauge, directory):
         cangauge.run(*PATIENT, "pdo", "show", 10, 2, exit=4)
 
 
+def after(done):
+    """The TPDOs in the report of `pdo map`, without the facts about the command."""
+    facts = ("writes", "stored", "notes")
+    return [{key: value for key, value in pdo.items() if key not in facts} for pdo in done.json()]
+
+
 def pdo_map(cangauge, directory):
     def change(*arguments, **options):
         return cangauge.run(*PATIENT, "pdo", "map", 10, 1, *arguments, "--format", "json", **options)
@@ -41,7 +47,7 @@ def pdo_map(cangauge, directory):
         delivered = settings(cangauge, 10)
         # Reverse the mapping and send slower. The new TPDO is decoded with it.
         done = change("ch1.status", "ch1", "--event-timer", "40ms")
-        assert done.json() == settings(cangauge, 10), done
+        assert after(done) == settings(cangauge, 10), done
         assert [entry["object"] for entry in done.json()[0]["mapping"]] == ["0x6150:1", "0x6130:1"], done
         assert done.json()[0]["event_timer_ms"] == 40 and done.json()[0]["valid"], done
         cangauge.run(*PATIENT, "nmt", "start", 10)
@@ -55,15 +61,15 @@ def pdo_map(cangauge, directory):
         # Identifiers that the other device or this one uses.
         for taken in ("0x18B", "0x8A", "0x80"):
             refused = change("--cob-id", taken, exit=1)
-            assert "is occupied by" in refused.err and settings(cangauge, 10) == moved.json(), refused
+            assert "is occupied by" in refused.err and settings(cangauge, 10) == after(moved), refused
         again = change("ch1.status", "ch1", "--transmission", "timer", "--inhibit", "0")
-        assert again.json() == moved.json(), again
+        assert after(again) == after(moved), again
         # Five entries are too many: the device rejects one, and the old mapping is restored.
         refused = change("ch1.status", "ch1.status", "ch1.status", "ch1.status", "ch1.status", exit=4)
         error = json.loads(refused.err)["error"]
         assert (error["object"], error["abort"]) == ("0x1A00:5", "0x06090011"), error
         assert error["message"].endswith("TPDO1 has its old mapping and parameters"), error
-        assert settings(cangauge, 10) == moved.json()
+        assert settings(cangauge, 10) == after(moved)
         assert watch()[0] == ["ch1"]
         # Restore the factory defaults.
         change("ch1", "ch1.status", "--event-timer", "50ms", "--cob-id", "0x18A")
