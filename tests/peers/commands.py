@@ -102,10 +102,10 @@ def sdo_write(cangauge, directory):
         with open(path, "wb") as file:
             file.write(bytes(range(1, 200)))
         write(10, "2001", "--input", path)
-        assert read(10, "2001", "--hex") == "0x" + bytes(range(1, 200)).hex().upper()
+        assert read(10, "2001", "--bytes") == bytes(range(1, 200)).hex(" ").upper()
         # Several objects in one command.
         write(11, "1017=300", "2000=1")
-        assert read(11, "1017") == "300" and read(11, "2000") == "0x0100"
+        assert read(11, "1017") == "300" and read(11, "2000") == "01 00"
         # Too large: nothing is sent. Read-only or missing: the device rejects it and keeps its value.
         write(10, "1017", 65536, exit=2)
         write(10, "1018:1", 5, exit=4)

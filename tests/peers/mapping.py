@@ -61,7 +61,7 @@ def pdo_map(cangauge, directory):
         # Identifiers that the other device or this one uses.
         for taken in ("0x18B", "0x8A", "0x80"):
             refused = change("--cob-id", taken, exit=1)
-            assert "is occupied by" in refused.err and settings(cangauge, 10) == after(moved), refused
+            assert "is used by" in refused.err and settings(cangauge, 10) == after(moved), refused
         again = change("ch1.status", "ch1", "--transmission", "timer", "--inhibit", "0")
         assert after(again) == after(moved), again
         # Five entries are too many: the device rejects one, and the old mapping is restored.
