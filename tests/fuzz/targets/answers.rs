@@ -9,7 +9,7 @@ use cangauge::canopen::id::CanId;
 use cangauge::master::{Master, Timing};
 use cangauge::node::Overrides;
 use cangauge::output::failure::ErrorMessage;
-use cangauge::output::{info, info_json, json};
+use cangauge::output::report::{Format, render};
 use cangauge::tasks::scan::scan;
 use cangauge::tasks::settings::info::read;
 use cangauge::tasks::settings::open;
@@ -83,6 +83,8 @@ fn assert_harmless(text: &[u8]) {
     assert!(!text.contains(steers), "{text:?}");
 }
 
+const FORMATS: [Format; 3] = [Format::Text, Format::Json, Format::Csv];
+
 fuzz_target!(|data: &[u8]| {
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(Answerer { script: data.to_vec(), at: 0, segments: 0 });
@@ -92,12 +94,15 @@ fuzz_target!(|data: &[u8]| {
     let overrides = Overrides::new();
     if let Ok(found) = scan(&mut master, &[node()], timing.timeout, 1, &overrides) {
         assert!(found.len() <= 1);
-        found.iter().for_each(|found| json::found(&mut text, found).expect("memory"));
+        for format in FORMATS {
+            render(&found, format, &mut text).expect("memory");
+        }
     }
     match open(&mut master, node(), &overrides).and_then(|device| read(&mut master, &device)) {
         Ok(page) => {
-            info::text(&mut text, &page).expect("memory");
-            info_json::object(&mut text, &page).expect("memory");
+            for format in FORMATS {
+                render(std::slice::from_ref(&page), format, &mut text).expect("memory");
+            }
         }
         Err(failure) => {
             assert_eq!(failure.node, Some(node()), "{}", ErrorMessage::of(&failure).message);
