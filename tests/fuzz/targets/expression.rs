@@ -14,7 +14,7 @@ fuzz_target!(|data: &[u8]| {
                 // Added parentheses and spaces can make it too long.
                 Err(error) => assert!(printed.chars().count() > 1000, "{text:?}: {printed:?}: {error}"),
             }
-            let _ = expression.wanted();
+            let _ = (expression.wanted(), expression.needs_many_samples());
         }
         Err(error) => {
             assert!(error.at <= error.text.len() && !error.message.is_empty());

@@ -38,7 +38,7 @@ fuzz_target!(|data: &[u8]| {
     let mapped = mapping.len();
     instrument.tpdos.push(Tpdo { number, cob_id: CobId(TPDO), transmission: None, event_timer_ms: None, mapping });
     let mut decoder = Decoder::default();
-    decoder.add(&instrument, &[]);
+    decoder.add(instrument.layout(), &[]);
     assert!(decoder.sources().len() <= mapped);
     let at = Stamp { mono: Mono::START, wall: Wall::at(Duration::ZERO) };
     while !bytes.is_empty() {
