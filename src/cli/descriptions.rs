@@ -157,7 +157,8 @@ fn named(global: &Global) -> anyhow::Result<Vec<Named>> {
     Ok(named)
 }
 
-fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result<Arc<Model>> {
+/// The built-in description with this name, or the contents of a file.
+pub(super) fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result<Arc<Model>> {
     if !is_eds {
         if let Some(model) = catalog::by_name(what) {
             if !global.accept_mismatch {
@@ -166,15 +167,10 @@ fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result<Arc<Model>
             return Ok(Arc::new(Model { made_for: Vec::new(), ..Model::clone(&model) }));
         }
         if !what.contains(['.', '/']) {
-            let names: Vec<&str> = catalog::names().collect();
-            let hint = format!("built-in devices: {}; or name a file", names.join(", "));
-            return Err(ErrorMessage::usage(format!("no built-in device \"{what}\"")).hint(hint).into());
+            return Err(unknown(what).into());
         }
     }
-    let mut bytes = Vec::new();
-    File::open(what)
-        .and_then(|file| file.take(MAX_FILE).read_to_end(&mut bytes))
-        .map_err(|source| FileError { what: format!("read {what}"), source })?;
+    let bytes = read_file(what)?;
     let usage = |error: String| ErrorMessage::usage(format!("{what}: {error}"));
     let extension = Path::new(what).extension().map(|extension| extension.to_ascii_lowercase());
     let mut model = if is_eds || extension.is_some_and(|extension| extension == "eds" || extension == "dcf") {
@@ -191,6 +187,20 @@ fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result<Arc<Model>
     }
     model.warnings.iter_mut().for_each(|(_, text)| *text = format!("{what}: {text}"));
     Ok(Arc::new(model))
+}
+
+/// No description has this name.
+pub(super) fn unknown(name: &str) -> ErrorMessage {
+    let names: Vec<&str> = catalog::names().collect();
+    let hint = format!("built-in devices: {}; or name a file", names.join(", "));
+    ErrorMessage::usage(format!("no built-in device \"{name}\"")).hint(hint)
+}
+
+/// The bytes of a file that the user named.
+pub(super) fn read_file(name: &str) -> Result<Vec<u8>, FileError> {
+    let mut bytes = Vec::new();
+    let read = File::open(name).and_then(|file| file.take(MAX_FILE).read_to_end(&mut bytes));
+    read.map(|_| bytes).map_err(|source| FileError { what: format!("read {name}"), source })
 }
 
 /// One line for all warnings; with `-v` each one.

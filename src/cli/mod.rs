@@ -6,6 +6,7 @@ mod bus;
 mod check;
 mod completions;
 mod descriptions;
+mod devices;
 mod each;
 mod errors;
 pub mod exit;
@@ -17,6 +18,7 @@ mod log;
 mod lss;
 mod minmax;
 mod nmt;
+mod objects;
 mod open;
 pub mod parse;
 mod pdo;
@@ -212,6 +214,8 @@ commands! {
     Store(store::Store): "store";
     Restore(store::Restore): "restore";
     Sim(sim::Sim): "sim";
+    Objects(objects::Objects): "objects";
+    Devices(devices::Devices): "devices";
     Completions(completions::Completions): "completions";
 }
 
@@ -220,6 +224,7 @@ impl Command {
     fn only_reads(&self) -> bool {
         match self {
             Command::Scan(_) | Command::Read(_) | Command::Info(_) => true,
+            Command::Objects(_) | Command::Devices(_) => true,
             Command::Sdo(sdo) => sdo.only_reads(),
             _ => false,
         }

@@ -181,6 +181,11 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     FILES.iter().map(|(name, _)| *name)
 }
 
+/// The file of the built-in description with this name, with its comments.
+pub fn text(name: &str) -> Option<&'static str> {
+    FILES.iter().find(|(other, _)| *other == name).map(|(_, text)| *text)
+}
+
 /// The built-in description with this name.
 pub fn by_name(name: &str) -> Option<Arc<Model>> {
     file(names().position(|other| other == name)?)

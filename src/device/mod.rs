@@ -9,6 +9,7 @@ pub mod nearest;
 pub mod profiles;
 pub mod quirk;
 pub mod scalar;
+pub mod search;
 pub mod sensor;
 pub mod standard;
 pub mod unit;

@@ -44,7 +44,7 @@ fn hexadecimal(bytes: &[u8]) -> Option<String> {
 }
 
 /// Whether manuals print the values of an object in hexadecimal: COB-IDs, mapping entries, unit codes.
-fn is_usually_hexadecimal(object: ObjectId) -> bool {
+pub(super) fn is_usually_hexadecimal(object: ObjectId) -> bool {
     match object.index {
         0x1005 | 0x1012 | 0x1014 => object.sub == 0,
         0x1200..=0x12ff => matches!(object.sub, 1 | 2),

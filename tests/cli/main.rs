@@ -6,6 +6,7 @@ mod autozero;
 mod bus;
 mod check;
 mod descriptions;
+mod devices;
 mod examples;
 mod half_dead;
 mod hostile;

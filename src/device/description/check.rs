@@ -33,6 +33,7 @@ pub(super) fn check(description: &Description, tables: &Tables<'_, '_>) {
     bit_rates(description, tables);
     assign(description, &known, tables);
     autozero(description, &known, tables);
+    pdos(description, tables);
     if let Some((startup, table)) = description.startup.as_ref().zip(tables.startup) {
         known.require(table, "object", startup.object);
     }
@@ -102,6 +103,53 @@ fn objects(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>
     }
 }
 
+/// Every TPDO has its parameters, and its default mapping contains described objects with their width.
+fn pdos(description: &Description, tables: &Tables<'_, '_>) {
+    let has = |index: u16| description.objects.iter().any(|object| object.at.first.index == index);
+    let numbers: BTreeSet<u16> = description.objects.iter().filter_map(|object| tpdo(object.at.first.index)).collect();
+    if let Some(signal) = tables.signals.first().filter(|_| numbers.is_empty()) {
+        signal.note("name", "no TPDO is described (objects 18xxh and 1Axxh): they are read from the device");
+    }
+    let mut reported = BTreeSet::new();
+    for (entry, table) in description.objects.iter().zip(&tables.objects) {
+        let index = entry.at.first.index;
+        let Some(number) = tpdo(index) else { continue };
+        let missing = [0x1800, 0x1a00].map(|start: u16| start + number).into_iter().find(|index| !has(*index));
+        if let Some(missing) = missing.filter(|missing| reported.insert(*missing)) {
+            table.mistake("at", format!("at: there is no [[object]] 0x{missing:04X} of the same TPDO"));
+        }
+        if let Some(Scalar::Integer(word)) = entry.default
+            && (0x1a00..0x1c00).contains(&index)
+            && entry.at.first.sub > 0
+            && word != 0
+        {
+            mapped(description, table, word);
+        }
+    }
+}
+
+/// The number of the TPDO to which an index belongs, counted from 0.
+fn tpdo(index: u16) -> Option<u16> {
+    (0x1800..0x1c00).contains(&index).then_some(index & 0x1ff)
+}
+
+/// The entry of a default mapping.
+fn mapped(description: &Description, table: &Table<'_>, word: i64) {
+    let [bits, sub, low, high, ..] = word.to_le_bytes();
+    let object = ObjectId::new(u16::from_le_bytes([low, high]), sub);
+    let Some(entry) = description.object(object) else {
+        return table.mistake("default", format!("default: it maps {object}, and there is no such [[object]]"));
+    };
+    let width = entry.data_type.width().map(|width| 8 * width);
+    if width != Some(usize::from(bits)) && entry.data_type != DataType::Boolean {
+        let message = format!("default: it maps {bits} bits of {object}, which has the type {}", entry.data_type);
+        table.mistake("default", message);
+    }
+    if !entry.pdo {
+        table.mistake("default", format!("default: it maps {object}, and [[object]] {} has no pdo = true", entry.at));
+    }
+}
+
 /// Default, limits, ranges and meanings fit the type; the default and the meanings are allowed.
 fn values(entry: &ObjectEntry, table: &Table<'_>) {
     for (key, scalar) in [("low", &entry.low), ("high", &entry.high), ("default", &entry.default)] {
@@ -162,7 +210,10 @@ fn emergencies(description: &Description, tables: &Tables<'_, '_>) {
 }
 
 fn identify(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>) {
-    let Some(table) = tables.identify else { return };
+    let Some(table) = tables.identify.filter(|_| !description.identify.is_empty()) else {
+        let text = "no [identify]: the device is not recognised, the description is used only with --device";
+        return tables.file.note("name", text);
+    };
     for (object, value) in &description.identify.confirm {
         match description.object(*object) {
             None => known.require(table, "confirm", *object),

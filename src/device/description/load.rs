@@ -10,20 +10,26 @@ use toml::de::DeTable;
 /// # Errors
 /// Every mistake that was found, in the order of the lines; a TOML syntax error is the only one then.
 pub fn read(text: &str) -> Result<Description, Vec<DescriptionError>> {
+    read_with_notes(text).0
+}
+
+/// Reads a description. Also returns what may be a mistake, although the description can be used, in the order of the
+/// lines.
+pub fn read_with_notes(text: &str) -> (Result<Description, Vec<DescriptionError>>, Vec<DescriptionError>) {
     let source = Source::new(text);
-    let document = match DeTable::parse(text) {
-        Ok(document) => document,
+    let description = match DeTable::parse(text) {
+        Ok(document) => description(&mut Table::new(document.get_ref(), 0, &source)),
         Err(error) => {
             source.mistake(error.span().map_or(0, |span| span.start), error.message());
-            return Err(source.into_mistakes());
+            None
         }
     };
-    let description = description(&mut Table::new(document.get_ref(), 0, &source));
-    let mistakes = source.into_mistakes();
-    match description {
+    let [mistakes, notes] = source.into_findings();
+    let result = match description {
         Some(description) if mistakes.is_empty() => Ok(description),
         _ => Err(mistakes),
-    }
+    };
+    (result, notes)
 }
 
 /// Reads every table of the file, then checks what they state about each other.

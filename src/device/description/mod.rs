@@ -10,7 +10,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use load::read;
+pub use load::{read, read_with_notes};
 pub use object::{Access, ObjectEntry, ObjectRun, Signature, StoreGroup};
 
 use super::assign::AssignEntry;

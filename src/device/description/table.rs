@@ -15,25 +15,37 @@ use toml::de::{DeTable, DeValue};
 pub(super) struct Source<'a> {
     text: &'a str,
     mistakes: RefCell<Vec<DescriptionError>>,
+    notes: RefCell<Vec<DescriptionError>>,
 }
 
 impl<'a> Source<'a> {
     pub(super) fn new(text: &'a str) -> Source<'a> {
-        Source { text, mistakes: RefCell::default() }
+        Source { text, mistakes: RefCell::default(), notes: RefCell::default() }
     }
 
     /// Adds a mistake at a byte offset of the text.
     pub(super) fn mistake(&self, offset: usize, message: impl Into<String>) {
-        let before = self.text.as_bytes().get(..offset).unwrap_or_default();
-        let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
-        self.mistakes.borrow_mut().push(DescriptionError { line, message: message.into() });
+        self.mistakes.borrow_mut().push(self.at(offset, message));
     }
 
-    /// Every mistake, in the order of the lines.
-    pub(super) fn into_mistakes(self) -> Vec<DescriptionError> {
-        let mut mistakes = self.mistakes.into_inner();
-        mistakes.sort_by_key(|mistake| mistake.line);
-        mistakes
+    /// Adds something that may be a mistake; the description can be used.
+    fn note(&self, offset: usize, message: impl Into<String>) {
+        self.notes.borrow_mut().push(self.at(offset, message));
+    }
+
+    fn at(&self, offset: usize, message: impl Into<String>) -> DescriptionError {
+        let before = self.text.as_bytes().get(..offset).unwrap_or_default();
+        let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
+        DescriptionError { line, message: message.into() }
+    }
+
+    /// Every mistake and every note, in the order of the lines.
+    pub(super) fn into_findings(self) -> [Vec<DescriptionError>; 2] {
+        [self.mistakes, self.notes].map(|findings| {
+            let mut findings = findings.into_inner();
+            findings.sort_by_key(|finding| finding.line);
+            findings
+        })
     }
 }
 
@@ -70,6 +82,12 @@ impl<'t> Table<'t> {
     pub(super) fn mistake(&self, key: &str, message: impl Into<String>) {
         let offset = self.table.get(key).map_or(self.offset, |value| value.span().start);
         self.source.mistake(offset, message);
+    }
+
+    /// Adds a note at the value of a key, or at the table if it has no such key.
+    pub(super) fn note(&self, key: &str, message: impl Into<String>) {
+        let offset = self.table.get(key).map_or(self.offset, |value| value.span().start);
+        self.source.note(offset, message);
     }
 
     /// The value of a key; `None` if it is missing or wrong.

@@ -109,3 +109,33 @@ fn the_layout_of_the_error_history() {
     assert_eq!(ErrorHistory::CodeLowBytesSwapped.read(0x0103_f001), (0xf001, Some([1, 3])));
     assert_eq!(ErrorHistory::CodeHigh.read(0x5030_0000), (0x5030, None));
 }
+
+#[test]
+fn tpdos_have_parameters_and_map_described_objects() {
+    let mapping = |at: &str, default: &str| {
+        format!("[[object]]\nat = \"{at}\"\nname = \"m{at}\"\ntype = \"u32\"\naccess = \"rw\"\ndefault = {default}\n")
+            .replace("m0x1A00:1", "mapping")
+            .replace("m0x1800:1", "cob-id")
+    };
+    let value = "[[object]]\nat = \"0x2000:1\"\nname = \"v\"\ntype = \"i16\"\naccess = \"ro\"\npdo = true\n";
+    let with =
+        |default: &str| mistakes(&(value.to_owned() + &mapping("0x1800:1", "384") + &mapping("0x1A00:1", default)));
+    assert_eq!(with("0x20000110"), Vec::<String>::new());
+    assert_eq!(with("0x20000120"), ["x.toml:21: default: it maps 32 bits of 0x2000:1, which has the type i16"]);
+    assert_eq!(with("0x20000210"), ["x.toml:21: default: it maps 0x2000:2, and there is no such [[object]]"]);
+    let alone = mistakes(&(value.to_owned() + &mapping("0x1A00:1", "0")));
+    assert_eq!(alone, ["x.toml:11: at: there is no [[object]] 0x1800 of the same TPDO"]);
+    let hidden =
+        value.replace("pdo = true", "pdo = false") + &mapping("0x1800:1", "384") + &mapping("0x1A00:1", "0x20000110");
+    assert_eq!(mistakes(&hidden), ["x.toml:21: default: it maps 0x2000:1, and [[object]] 0x2000:1 has no pdo = true"]);
+}
+
+#[test]
+fn notes_name_what_may_be_a_mistake() {
+    let signal = "[[signal]]\nname = \"p\"\nchannel = 1\nvalue = \"0x6130:1\"\n";
+    let notes = |text: &str| -> Vec<usize> {
+        read_with_notes(&format!("{HEAD}{text}")).1.iter().map(|note| note.line).collect()
+    };
+    assert_eq!(notes(signal), [1, 5], "no [identify], no TPDO");
+    assert_eq!(notes(&format!("[identify]\nvendor_id = 1\n{signal}")), [7]);
+}
