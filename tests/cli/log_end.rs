@@ -185,13 +185,30 @@ fn signal(child: &std::process::Child, name: &str) {
     assert!(status.success());
 }
 
-/// On the real clock.
+/// `command` as the last arguments of another program that runs it.
+#[cfg(unix)]
+fn started_by(runner: &[&str], command: &Command) -> Command {
+    let mut started = Command::new(runner[0]);
+    started.args(&runner[1..]).arg(command.get_program()).args(command.get_args());
+    if let Some(folder) = command.get_current_dir() {
+        started.current_dir(folder);
+    }
+    for (name, value) in command.get_envs() {
+        match value {
+            Some(value) => started.env(name, value),
+            None => started.env_remove(name),
+        };
+    }
+    started
+}
+
+/// On the real clock. `env` sets SIGHUP to its default: the tests themselves may run under `nohup`.
 #[test]
 #[cfg(unix)]
 fn signals_end_a_recording_with_success() {
     for name in ["INT", "TERM", "HUP"] {
         let bench = Bench::real("dps@127");
-        let mut command = bench.traced(&["log", "127"]);
+        let mut command = started_by(&["env", "--default-signal=HUP"], &bench.traced(&["log", "127"]));
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
         let mut reader = BufReader::new(child.stdout.take().expect("stdout"));
         let mut text = String::new();
@@ -297,14 +314,8 @@ fn closed_output_before_the_planned_end_is_not_complete() {
 fn hangup_is_ignored_under_nohup() {
     let bench = Bench::real("dps@127");
     let command = bench.traced(&["log", "127", "--duration", "2s", "-o", "run.csv"]);
-    let program = command.get_program().to_owned();
-    let arguments: Vec<_> = command.get_args().map(ToOwned::to_owned).collect();
-    let mut nohup = Command::new("sh");
-    nohup.args(["-c", "trap '' HUP; exec \"$0\" \"$@\""]).arg(program).args(arguments);
-    if let Some(folder) = command.get_current_dir() {
-        nohup.current_dir(folder);
-    }
-    let mut child = nohup.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("a shell");
+    let mut nohup = started_by(&["env", "--ignore-signal=HUP"], &command);
+    let mut child = nohup.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("env");
     while !bench.path("trace").metadata().is_ok_and(|trace| trace.len() > 0) {
         assert!(child.try_wait().expect("a child").is_none(), "it ended");
         std::thread::yield_now();
