@@ -236,6 +236,11 @@ impl Decoder {
         self.tpdos.get(&id).map_or(0, |tpdo| tpdo.values.len() as u64)
     }
 
+    /// Whether the TPDO with this COB-ID carries this source.
+    pub fn carries(&self, id: CanId, source: usize) -> bool {
+        self.tpdos.get(&id).is_some_and(|tpdo| tpdo.values.iter().any(|value| value.reading.source == source))
+    }
+
     /// TPDOs of a node that had another length than their mapping.
     pub fn wrong_lengths(&self, node: NodeId) -> u64 {
         self.tpdos.values().filter(|tpdo| tpdo.node == node).map(|tpdo| tpdo.wrong_lengths).sum()

@@ -5,6 +5,7 @@ pub mod check_progress;
 pub mod console;
 pub mod csv;
 pub mod devices;
+pub mod diagnosis;
 pub mod doubt;
 mod elapsed;
 pub mod events;

@@ -40,7 +40,7 @@ use passive::SetupListener;
 use poll::Poll;
 pub use producer::SyncStatistics;
 use recording::Recording;
-pub use remark::{Remark, SilenceReason};
+pub use remark::Remark;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -267,6 +267,9 @@ pub fn log(
         recording.run(master, observer)
     });
     master.set_tolerates_outages(false);
+    if result.is_ok() {
+        recording.ask_silent_nodes(master);
+    }
     let restored = recording.states.restore(master);
     recording.remarks.extend(recording.states.remark());
     if let Err(error) = restored {

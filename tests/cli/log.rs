@@ -215,7 +215,11 @@ fn sync_is_refused_if_the_cob_ids_differ() {
         "[[device]]\nkind = \"mh4\"\nnode = 5\nset = { \"0x1005\" = 0x90 }\n[[device]]\nkind = \"mh4\"\nnode = 6\n",
     );
     let done = bench.run("log 5,6 --sync 10ms").exit(1);
-    assert_eq!(done.stderr, "cangauge: the nodes have different COB-IDs of SYNC (1005h)\n");
+    assert_eq!(
+        done.stderr,
+        "cangauge: the nodes have different COB-IDs of SYNC (1005h): node 5: 090, node 6: 080\n\
+         hint: set 1005h to the same value in all nodes, or record them one by one\n"
+    );
     assert_eq!(done.frames_of("000"), [""; 0], "nothing was started");
 }
 

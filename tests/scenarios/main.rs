@@ -17,6 +17,7 @@ mod second_master;
 mod second_sync;
 mod settings;
 mod signatures;
+mod silence;
 mod stalled;
 
 use cangauge::bus::Stamp;

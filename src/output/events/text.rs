@@ -1,11 +1,11 @@
 //! The text of the events of a recording.
 
-use super::super::failure::reason_text;
 use super::{EventText, Weight};
 use crate::bus::time::spoken;
 use crate::bus::{Fault, ReceiveBuffer};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
+use crate::output::diagnosis;
 use crate::output::failure::ErrorMessage;
 use crate::tasks::log::{Change, LogEvent, Remark, TpdoChange};
 
@@ -144,8 +144,11 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::SmallReceiveBuffer(buffer) => format!("frames were dropped: {}", buffer_text(*buffer)),
         Remark::Doubt(node, signal, doubt) => crate::output::doubt::doubt(*node, signal, *doubt),
         Remark::MayClip(node, value) => crate::output::doubt::may_clip(*node, value),
-        Remark::NoMeasurements(node, reason) => {
-            format!("node {node}: no measurements: {}", reason_text(*reason))
+        Remark::NoMeasurements(node, None, silence) => {
+            format!("node {node}: no measurements: {}", diagnosis::reason(silence))
+        }
+        Remark::NoMeasurements(node, Some(signal), silence) => {
+            format!("node {node}: no measurements of {signal}: {}", diagnosis::reason(silence))
         }
     }
 }

@@ -18,8 +18,6 @@ mod scan;
 pub(super) mod settings;
 mod store;
 
-pub(super) use log::reason_text;
-
 use super::json;
 use super::notes::{Told, effect};
 use crate::canopen::id::NodeId;

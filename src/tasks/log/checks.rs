@@ -6,6 +6,7 @@ use crate::canopen::nmt::booted;
 use crate::canopen::pdo::Transmission;
 use crate::master::{Happening, Master};
 use crate::measure::decode::Wanted;
+use crate::measure::layout::Tpdo;
 use crate::node::Node;
 use crate::node::wait::{Policy, wait};
 use crate::tasks::Failure;
@@ -17,21 +18,7 @@ use std::time::Duration;
 pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), Failure> {
     let polled = matches!(options.mode, Mode::Poll(_));
     for item in &options.wanted {
-        let carried = |node: &Node| {
-            let entries = || {
-                let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
-                valid.flat_map(|tpdo| &tpdo.mapping)
-            };
-            match &node.wanted(item) {
-                Wanted::Signal(name) => node.mapped_signals().any(|signal| signal.name == *name),
-                Wanted::Object(object, _) => entries().any(|entry| entry.object == *object),
-                Wanted::Status(name) => node
-                    .signals
-                    .iter()
-                    .filter(|signal| signal.name == *name)
-                    .any(|signal| entries().any(|entry| Some(entry.object) == signal.status)),
-            }
-        };
+        let carried = |node: &Node| node.tpdos.iter().any(|tpdo| tpdo.cob_id.is_valid() && carries(node, tpdo, item));
         if !nodes.iter().any(carried) {
             let has = |name: &str, with_status: bool| {
                 let signals = nodes.iter().flat_map(|node| &node.signals);
@@ -51,11 +38,30 @@ pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), F
                 Wanted::Object(..) => item.name(),
             };
             if !polled {
-                return Err(Failure::general(LogFailure::NotMapped { name }));
+                let disabled = nodes.iter().find_map(|node| {
+                    let tpdo = node.tpdos.iter().find(|tpdo| carries(node, tpdo, item))?;
+                    Some((node.id, tpdo.number))
+                });
+                return Err(Failure::general(LogFailure::NotMapped { name, disabled }));
             }
         }
     }
     Ok(())
+}
+
+/// Whether a signal or object is mapped into a TPDO.
+fn carries(node: &Node, tpdo: &Tpdo, item: &Wanted) -> bool {
+    let mut entries = tpdo.mapping.iter().map(|entry| entry.object);
+    let mut signals = node.signals.iter();
+    match &node.wanted(item) {
+        Wanted::Signal(name) => {
+            entries.any(|object| node.signals.iter().any(|signal| signal.name == *name && signal.is_value(object)))
+        }
+        Wanted::Object(object, _) => entries.any(|mapped| mapped == *object),
+        Wanted::Status(name) => {
+            signals.any(|signal| signal.name == *name && entries.any(|object| Some(object) == signal.status))
+        }
+    }
 }
 
 fn unknown_signal(name: &str, nodes: &[Node]) -> LogFailure {
@@ -78,7 +84,8 @@ pub(super) fn refuse_second_sync(
 ) -> Result<(), Failure> {
     let ids: BTreeSet<CanId> = nodes.iter().map(|node| node.sync).collect();
     if ids.len() > 1 {
-        return Err(Failure::general(LogFailure::DifferentSyncIds));
+        let values = nodes.iter().map(|node| (node.id, node.sync)).collect();
+        return Err(Failure::general(LogFailure::DifferentSyncIds(values)));
     }
     if nodes.iter().any(|node| node.sync_overflow != nodes[0].sync_overflow) {
         let values = nodes.iter().map(|node| (node.id, node.sync_overflow.unwrap_or(0))).collect();

@@ -1,8 +1,10 @@
 //! Causes of failures: nothing was recorded, or a recording ended early.
 
-use super::SilenceReason;
-use crate::canopen::id::NodeId;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::nmt::NmtState;
+use crate::canopen::pdo::TpdoNumber;
 use crate::tasks::Kind;
+use crate::tasks::diagnosis::Silence;
 use crate::tasks::failure::Cause;
 use std::time::Duration;
 
@@ -25,9 +27,11 @@ pub enum LogFailure {
     NotMapped {
         /// The signal or object.
         name: String,
+        /// A TPDO that contains it and is disabled.
+        disabled: Option<(NodeId, TpdoNumber)>,
     },
     /// The nodes have different COB-IDs of SYNC (1005h).
-    DifferentSyncIds,
+    DifferentSyncIds(Vec<(NodeId, CanId)>),
     /// The nodes have different overflow values of the SYNC counter (1019h); 0 if the node expects no counter.
     DifferentSyncCounters(Vec<(NodeId, u8)>),
     /// Another node sends SYNC.
@@ -38,19 +42,19 @@ pub enum LogFailure {
     NothingReceived {
         /// How long it waited.
         within: Duration,
-        /// The nodes.
-        nodes: Vec<NodeId>,
+        /// The nodes, each with the state that its last heartbeat showed.
+        nodes: Vec<(NodeId, Option<NmtState>)>,
+        /// Whether any frame was received.
+        has_traffic: bool,
+        /// The interface; `None` for a recording that is replayed.
+        interface: Option<String>,
     },
-    /// The node, or with `of_several` each of several nodes, sent no measurements, for this reason.
+    /// The nodes sent no measurements, for these reasons.
     NoMeasurements {
         /// How long it waited.
         within: Duration,
-        /// The node.
-        node: NodeId,
-        /// The reason.
-        reason: SilenceReason,
-        /// Whether several nodes were to be recorded.
-        of_several: bool,
+        /// The nodes.
+        nodes: Vec<(NodeId, Silence)>,
     },
     /// These nodes stopped before the end. With `all`, no node was left.
     NodesLost {
@@ -101,7 +105,7 @@ impl LogFailure {
             | LogFailure::UnknownMapping
             | LogFailure::OtherColumns { .. } => Kind::Usage,
             LogFailure::NotMapped { .. } => Kind::Unexpected,
-            LogFailure::DifferentSyncIds | LogFailure::DifferentSyncCounters(_) | LogFailure::SecondSyncProducer => {
+            LogFailure::DifferentSyncIds(_) | LogFailure::DifferentSyncCounters(_) | LogFailure::SecondSyncProducer => {
                 Kind::CheckFailed
             }
             LogFailure::NothingReceived { .. }

@@ -1,6 +1,7 @@
 //! Polling by SDO: every signal of every node once per interval, all nodes in parallel.
 
 use super::nth;
+use super::silence::Silent;
 use crate::bus::Mono;
 use crate::canopen::id::NodeId;
 use crate::master::{Answer, Master, SdoError, Ticket};
@@ -21,7 +22,8 @@ pub(super) struct Poll {
     live: Vec<bool>,
     open: BTreeMap<Ticket, (usize, Part)>,
     answers: Vec<Parts>,
-    failing: Vec<bool>,
+    /// The last answer of each target, if it was an error.
+    errors: Vec<Option<SdoError>>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -52,7 +54,7 @@ impl Poll {
             live: Vec::new(),
             open: BTreeMap::new(),
             answers: Vec::new(),
-            failing: Vec::new(),
+            errors: Vec::new(),
         };
         for node in nodes {
             poll.set_node(node, wanted, decoder)?;
@@ -82,16 +84,29 @@ impl Poll {
                 !self.live[at] && self.answers[at].under_way == 0 && self.targets[at].source.node == node.id
             };
             match (0..self.targets.len()).find(is_free) {
-                Some(at) => (self.targets[at], self.live[at], self.failing[at]) = (target, true, false),
+                Some(at) => (self.targets[at], self.live[at], self.errors[at]) = (target, true, None),
                 None => {
                     self.targets.push(target);
                     self.live.push(true);
                     self.answers.push(Parts::default());
-                    self.failing.push(false);
+                    self.errors.push(None);
                 }
             }
         }
         Ok(())
+    }
+
+    /// Why the last poll of a silent node or source failed.
+    pub(super) fn error(&self, silent: Silent) -> Option<&SdoError> {
+        let is_meant = |target: &Target| match silent {
+            Silent::Node(node) => target.source.node == node,
+            Silent::Source(_, source) => target.reading.source == source,
+        };
+        self.targets
+            .iter()
+            .zip(&self.errors)
+            .filter(|(target, _)| is_meant(target))
+            .find_map(|(_, error)| error.as_ref())
     }
 
     /// Stops polling a node. Answers under way are ignored.
@@ -165,13 +180,10 @@ impl Poll {
         match sample(&self.targets[at], parts.value?, parts.status) {
             Ok(sample) => {
                 samples.push(sample);
-                self.failing[at] = false;
+                self.errors[at] = None;
                 None
             }
-            Err(error) => {
-                let first = !std::mem::replace(&mut self.failing[at], true);
-                first.then_some(error)
-            }
+            Err(error) => self.errors[at].replace(error.clone()).is_none().then_some(error),
         }
     }
 }

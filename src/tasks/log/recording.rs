@@ -11,25 +11,30 @@ mod tally;
 use super::passive::SetupListener;
 use super::poll::Poll;
 use super::rereads::Rereads;
-use super::silence::Evidence;
+use super::silence::Questions;
 use super::states::NmtStates;
 use super::{LogEvent, LogOptions, Observer, Remark};
-use crate::bus::{Bus, Filters, ReceiveBuffer, Received, TimestampSource};
+use crate::bus::{Bus, Filters, Mono, ReceiveBuffer, Received, TimestampSource};
 use crate::canopen::id::{CanId, NodeId};
 use crate::master::{Answer, Error, Master, SdoError, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::sample::{Doubt, Sample};
 use crate::node::Node;
+use crate::tasks::diagnosis::Heard;
 use due::DueTpdos;
 use emergencies::Emergencies;
 use liveness::Liveness;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
+use std::time::Duration;
 use tally::Tally;
+
+/// In a shorter recording, a signal without values is no finding.
+const MIN_SIGNAL_TIME: Duration = Duration::from_secs(1);
 
 /// A recording: what is known of the nodes, and what was recorded.
 pub(super) struct Recording<'o> {
-    options: &'o LogOptions,
+    pub(super) options: &'o LogOptions,
     pub(super) nodes: Vec<Node>,
     pub(super) decoder: Decoder,
     pub(super) poll: Option<Poll>,
@@ -42,13 +47,21 @@ pub(super) struct Recording<'o> {
     rereads: Rereads,
     timestamps: TimestampSource,
     receive_buffer: Option<ReceiveBuffer>,
-    link_is_up: bool,
+    pub(super) link_is_up: bool,
+    /// The interface; `None` for a recording that is replayed.
+    pub(super) interface: Option<String>,
+    /// Whether any frame was received.
+    pub(super) has_traffic: bool,
+    /// SYNC messages of other nodes by COB-ID, and the length of the last one.
+    pub(super) syncs_received: BTreeMap<CanId, (u64, usize)>,
+    pub(super) questions: Questions,
+    started: Mono,
     /// Nodes whose TPDOs were reported to have a wrong length.
     wrong_length_reported: BTreeSet<NodeId>,
     /// Nodes whose heartbeats were reported to have not one byte.
     odd_heartbeats: BTreeSet<NodeId>,
     /// What each node sent last.
-    pub(super) evidence: BTreeMap<NodeId, Evidence>,
+    pub(super) heard: BTreeMap<NodeId, Heard>,
     pub(super) remarks: Vec<Remark>,
     /// Doubts about sources that were reported.
     doubts: BTreeSet<(usize, Doubt)>,
@@ -78,9 +91,14 @@ impl<'o> Recording<'o> {
             timestamps: bus.timestamps(),
             receive_buffer: bus.receive_buffer(),
             link_is_up: true,
+            interface: bus.is_live().then(|| bus.name().to_owned()),
+            has_traffic: false,
+            syncs_received: BTreeMap::new(),
+            questions: Questions::default(),
+            started: bus.mono(),
             wrong_length_reported: BTreeSet::new(),
             odd_heartbeats: BTreeSet::new(),
-            evidence: BTreeMap::new(),
+            heard: BTreeMap::new(),
             remarks: Vec::new(),
             doubts: BTreeSet::new(),
             interrupted: false,
@@ -96,6 +114,41 @@ impl<'o> Recording<'o> {
     /// Values recorded so far.
     pub(super) fn rows(&self) -> u64 {
         self.tally.rows
+    }
+
+    /// Values of a source recorded so far.
+    pub(super) fn count(&self, source: usize) -> u64 {
+        self.tally.count(source)
+    }
+
+    /// Whether values of this node are expected.
+    pub(super) fn is_expected(&self, node: NodeId) -> bool {
+        self.liveness.has(node)
+    }
+
+    /// Whether this node sent at least one value.
+    pub(super) fn has_sent(&self, node: NodeId) -> bool {
+        self.liveness.has_sent(node)
+    }
+
+    /// Whether the setup of this node is not known any more.
+    pub(super) fn is_held(&self, node: NodeId) -> bool {
+        self.rereads.held().any(|held| held == node)
+    }
+
+    /// The time since the start of the recording.
+    pub(super) fn waited(&self) -> Duration {
+        self.tally.end().since(self.started)
+    }
+
+    /// Whether the recording was too short to judge single signals.
+    pub(super) fn is_short(&self) -> bool {
+        self.waited() < MIN_SIGNAL_TIME
+    }
+
+    /// Whether the user ended the recording.
+    pub(super) fn is_interrupted(&self) -> bool {
+        self.interrupted
     }
 
     /// The user ended the recording.
@@ -148,6 +201,7 @@ impl<'o> Recording<'o> {
         self.tally.extend_to(received.at.mono);
         self.samples.clear();
         self.due.frame(&received.frame);
+        self.has_traffic = true;
         if let Some(listener) = &mut self.listener {
             if let Some(node) = listener.take(received, &mut self.decoder) {
                 self.emergencies.learn(&listener.known_node(node));
@@ -173,6 +227,10 @@ impl<'o> Recording<'o> {
     ) -> Result<ControlFlow<()>, Error> {
         if self.rereads.has(ticket) {
             self.read_again(ticket, &result, master, observer)?;
+            return Ok(ControlFlow::Continue(()));
+        }
+        if self.questions.open.as_ref().is_some_and(|open| open.has(ticket)) {
+            self.take_finding(ticket, &result, master, observer);
             return Ok(ControlFlow::Continue(()));
         }
         let Some(poll) = &mut self.poll else { return Ok(ControlFlow::Continue(())) };

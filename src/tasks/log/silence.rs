@@ -1,21 +1,41 @@
-//! Why a recording has no value. The reason comes from what the node sent last, then from its setup.
+//! Which nodes and signals of a recording have no value, and why.
 
 use super::recording::Recording;
-use super::{FIRST_SAMPLE_TIMEOUT, LogFailure, LogOptions, Mode, SilenceReason};
-use crate::canopen::nmt::NmtState;
-use crate::canopen::pdo::Transmission;
+use super::{FIRST_SAMPLE_TIMEOUT, LogFailure, LogOptions, Mode};
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::object::ObjectId;
+use crate::master::Master;
 use crate::measure::layout::Tpdo;
 use crate::node::Node;
 use crate::tasks::Failure;
+use crate::tasks::diagnosis::{
+    Findings, Heard, Inquiry, Running, Silence, SilenceCause, Situation, diagnose, questions,
+};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// What a node sent last.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Evidence {
-    /// The state of the last heartbeat; `None` after a boot-up.
-    pub(super) state: Option<NmtState>,
-    /// The error code of the last emergency.
-    pub(super) emergency: Option<u16>,
+/// A node without values, or one source of a node that has others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Silent {
+    Node(NodeId),
+    Source(NodeId, usize),
+}
+
+impl Silent {
+    pub(super) fn node(self) -> NodeId {
+        match self {
+            Silent::Node(node) | Silent::Source(node, _) => node,
+        }
+    }
+}
+
+/// The questions to silent nodes of a recording, and the answers.
+#[derive(Default)]
+pub(super) struct Questions {
+    /// Whether the nodes were asked during the recording.
+    pub(super) were_asked: bool,
+    pub(super) open: Option<Inquiry>,
+    pub(super) findings: BTreeMap<NodeId, Findings>,
 }
 
 /// Why a recording has not one row.
@@ -24,65 +44,140 @@ pub(super) fn why_nothing(recording: &Recording<'_>, options: &LogOptions) -> Fa
     if let Some(&node) = recording.listener.as_ref().and_then(|listener| listener.not_understood.first()) {
         return Failure::at(node, LogFailure::UnknownMapping);
     }
-    let Some(first) = recording.nodes.first() else {
-        return Failure::general(LogFailure::NothingReceived { within, nodes: options.nodes.clone() });
-    };
-    let reason = silence_reason(recording, first, options);
-    let of_several = recording.nodes.len() > 1;
-    let cause = LogFailure::NoMeasurements { within, node: first.id, reason, of_several };
-    if of_several { Failure::general(cause) } else { Failure::at(first.id, cause) }
+    if recording.nodes.is_empty() {
+        let state = |node: &NodeId| recording.heard.get(node).and_then(|heard| heard.state);
+        let nodes = options.nodes.iter().map(|node| (*node, state(node))).collect();
+        let (has_traffic, interface) = (recording.has_traffic, recording.interface.clone());
+        return Failure::general(LogFailure::NothingReceived { within, nodes, has_traffic, interface });
+    }
+    let nodes: Vec<(NodeId, Silence)> =
+        recording.silent().into_iter().map(|silent| (silent.node(), recording.silence(silent))).collect();
+    match nodes.as_slice() {
+        [(only, _)] => Failure::at(*only, LogFailure::NoMeasurements { within, nodes }),
+        _ => Failure::general(LogFailure::NoMeasurements { within, nodes }),
+    }
 }
 
 fn waited(options: &LogOptions) -> Duration {
     options.duration.unwrap_or(FIRST_SAMPLE_TIMEOUT).min(FIRST_SAMPLE_TIMEOUT)
 }
 
-/// Why a node sends no measurements.
-pub(super) fn silence_reason(recording: &Recording<'_>, node: &Node, options: &LogOptions) -> SilenceReason {
-    if matches!(options.mode, Mode::Poll(_)) {
-        return SilenceReason::NoAnswer;
-    }
-    let evidence = recording.evidence.get(&node.id).copied().unwrap_or_default();
-    if let Some(state) = evidence.state.filter(|&state| state != NmtState::Operational) {
-        let was_started = recording.states.has_started(node.id);
-        return SilenceReason::NotOperational { state, was_started, emergency: evidence.emergency };
-    }
-    if let Some((mapped, received)) = recording.decoder.wrong_length(node.id) {
-        return SilenceReason::WrongLength { mapped, received };
-    }
-    let mut valid: Vec<&Tpdo> = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).collect();
-    let Some(first) = node.tpdos.first() else { return SilenceReason::NoTpdo };
-    let Some(first_valid) = valid.first() else { return SilenceReason::AllTpdosDisabled(first.number) };
-    if valid.iter().all(|tpdo| tpdo.mapping.is_empty()) {
-        return SilenceReason::NothingMapped(first_valid.number);
-    }
-    // The TPDOs of the requested signals.
-    let has_values = |tpdo: &&Tpdo| recording.decoder.values_of(tpdo.cob_id.can_id()) > 0;
-    if valid.iter().any(has_values) {
-        valid.retain(has_values);
-    }
-    let reasons = valid.iter().map(|tpdo| tpdo_reason(tpdo, options, recording.syncs()));
-    reasons
-        .reduce(|first, other| if first == SilenceReason::Unknown { other } else { first })
-        .unwrap_or(SilenceReason::Unknown)
-}
-
-/// Why a valid TPDO is not sent, by its parameters.
-fn tpdo_reason(tpdo: &Tpdo, options: &LogOptions, syncs: u64) -> SilenceReason {
-    let number = tpdo.number;
-    let sends_sync = matches!(options.mode, Mode::Sync(_));
-    match tpdo.transmission {
-        Some(Transmission::Rtr(_)) => SilenceReason::OnlyOnRequest(number),
-        Some(Transmission::AcyclicSync | Transmission::Sync(_)) if !sends_sync => SilenceReason::WaitsForSync(number),
-        Some(Transmission::AcyclicSync) => SilenceReason::SteadyAtSync(number),
-        Some(Transmission::Sync(every)) if u64::from(every) > syncs => SilenceReason::TooFewSyncs(number, every, syncs),
-        Some(Transmission::Sync(_)) => SilenceReason::NotSentAtSync(number),
-        _ => match tpdo.event_timer_ms {
-            Some(0) => SilenceReason::NoEventTimer(number),
-            Some(timer) if Duration::from_millis(u64::from(timer)) >= waited(options) => {
-                SilenceReason::SlowEventTimer(number, timer)
+impl Recording<'_> {
+    /// The nodes without values, and the sources without values of nodes that have others.
+    pub(super) fn silent(&self) -> Vec<Silent> {
+        let expected = |node: &&Node| self.is_expected(node.id);
+        let mut silent = Vec::new();
+        for node in self.nodes.iter().filter(expected) {
+            if !self.has_sent(node.id) {
+                silent.push(Silent::Node(node.id));
+                continue;
             }
-            _ => SilenceReason::Unknown,
-        },
+            let sources = self.decoder.sources().iter().enumerate();
+            let own: Vec<(usize, &str)> = sources
+                .filter(|(_, source)| source.node == node.id)
+                .map(|(at, source)| (at, &*source.signal))
+                .collect();
+            for &(at, name) in &own {
+                // A signal whose unit became known later has two sources.
+                let is_last = own.iter().all(|&(other, its)| its != name || other <= at);
+                if is_last && own.iter().all(|&(other, its)| its != name || self.count(other) == 0) {
+                    silent.push(Silent::Source(node.id, at));
+                }
+            }
+        }
+        silent
+    }
+
+    /// Why a node or a source has no values.
+    pub(super) fn silence(&self, silent: Silent) -> Silence {
+        let id = silent.node();
+        let of_recording = |cause| Silence { cause, emergency: None, running: Running::Unknown };
+        if !self.link_is_up {
+            return of_recording(SilenceCause::InterfaceDown);
+        }
+        if self.is_held(id) {
+            return of_recording(SilenceCause::NotReadAgain);
+        }
+        if let Some(error) = self.poll.as_ref().and_then(|poll| poll.error(silent)) {
+            return of_recording(SilenceCause::PollFailed(Box::new(error.clone())));
+        }
+        let Some(node) = self.nodes.iter().find(|node| node.id == id) else {
+            return of_recording(SilenceCause::NoTpdo);
+        };
+        let carries = |tpdo: &Tpdo| self.carries(silent, tpdo);
+        let heard = Heard {
+            sends_tpdos: self.has_sent(id) || self.decoder.wrong_length(id).is_some(),
+            wrong_length: self.decoder.wrong_length(id),
+            shared: self.shared_cob_id(node, &carries),
+            syncs: self.syncs_received.get(&node.sync).copied().unwrap_or_default(),
+            ..self.heard.get(&id).copied().unwrap_or_default()
+        };
+        let situation = Situation {
+            waited: self.waited(),
+            syncs_sent: matches!(self.options.mode, Mode::Sync(_)).then(|| self.syncs()),
+            was_started: self.states.has_started(id),
+        };
+        diagnose(node, &carries, &heard, self.questions.findings.get(&id), &situation)
+    }
+
+    /// Whether a TPDO carries values of a silent node or source that are recorded.
+    fn carries(&self, silent: Silent, tpdo: &Tpdo) -> bool {
+        let id = tpdo.cob_id.can_id();
+        match silent {
+            Silent::Node(_) => self.decoder.values_of(id) > 0,
+            Silent::Source(_, source) => self.decoder.carries(id, source),
+        }
+    }
+
+    /// A COB-ID with which another recorded node sends TPDOs too.
+    fn shared_cob_id(&self, node: &Node, carries: &dyn Fn(&Tpdo) -> bool) -> Option<(CanId, NodeId)> {
+        let valid = |node: &Node| {
+            node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).map(|tpdo| tpdo.cob_id.can_id()).collect::<Vec<_>>()
+        };
+        let own = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid() && carries(tpdo));
+        let mut own = own.map(|tpdo| tpdo.cob_id.can_id());
+        own.find_map(|id| {
+            let other = self.nodes.iter().find(|other| other.id != node.id && valid(other).contains(&id))?;
+            Some((id, other.id))
+        })
+    }
+
+    /// What to ask silent nodes. A polled node has answered already, or not.
+    fn questions(&self) -> Vec<(NodeId, Vec<ObjectId>)> {
+        if matches!(self.options.mode, Mode::Poll(_) | Mode::Passive) || !self.link_is_up || self.interface.is_none() {
+            return Vec::new();
+        }
+        let mut asked: BTreeMap<NodeId, Vec<_>> = BTreeMap::new();
+        for silent in self.silent() {
+            let Some(node) = self.nodes.iter().find(|node| node.id == silent.node()) else { continue };
+            let objects = questions(node, &|tpdo| self.carries(silent, tpdo));
+            let known = asked.entry(node.id).or_default();
+            let new: Vec<_> = objects.into_iter().filter(|object| !known.contains(object)).collect();
+            known.extend(new);
+        }
+        asked.into_iter().collect()
+    }
+
+    /// Asks the silent nodes during a recording. The answers are reported when all are there.
+    pub(super) fn ask_silent_nodes_meanwhile(&mut self, master: &mut Master<'_>) {
+        self.questions.were_asked = true;
+        let asked = self.questions();
+        if !asked.is_empty() {
+            self.questions.open = Some(Inquiry::begin(master, &asked));
+        }
+    }
+
+    /// Asks the silent nodes at the end of a recording. A failure of the bus only makes the reasons less exact.
+    pub(super) fn ask_silent_nodes(&mut self, master: &mut Master<'_>) {
+        let asked = self.questions();
+        if asked.is_empty() || self.is_interrupted() || self.rows() > 0 && self.is_short() {
+            return;
+        }
+        let is_unknown =
+            |node: &NodeId| !self.has_sent(*node) && self.heard.get(node).is_none_or(|heard| heard.state.is_none());
+        let guarded: Vec<NodeId> = asked.iter().map(|(node, _)| *node).filter(is_unknown).collect();
+        if let Ok(findings) = Inquiry::complete(master, &asked, &guarded) {
+            self.questions.findings.extend(findings);
+        }
     }
 }

@@ -50,6 +50,9 @@ impl Recording<'_> {
             self.odd_heartbeat(node, length, at, observer);
         } else if let Some(node) = writes_setup(frame) {
             self.request_reread(node, RereadReason::Written, at.mono, master);
+        } else if !frame.is_remote() && self.nodes.iter().any(|node| node.sync == frame.id()) {
+            let (count, length) = self.syncs_received.entry(frame.id()).or_default();
+            (*count, *length) = (*count + 1, frame.data().len());
         }
     }
 
@@ -59,7 +62,7 @@ impl Recording<'_> {
         }
         self.tally.emergencies += 1;
         if emergency.code != 0 {
-            self.evidence.entry(node).or_default().emergency = Some(emergency.code);
+            self.heard.entry(node).or_default().emergency = Some(emergency.code);
         }
         if !self.emergencies.is_new(node, emergency, at.mono) {
             return;
@@ -89,13 +92,15 @@ impl Recording<'_> {
             listener.forget(node, &mut self.decoder);
             self.update_sources();
         }
-        if !self.liveness.has(node) {
-            return;
-        }
-        self.evidence.entry(node).or_default().state = match life {
+        let heard = self.heard.entry(node).or_default();
+        (heard.booted, heard.heartbeat_stopped) = (is_boot_up, false);
+        heard.state = match life {
             Life::State(state) => Some(state),
             Life::BootUp => None,
         };
+        if !self.liveness.has(node) {
+            return;
+        }
         match self.liveness.take_life(node, life, at.mono) {
             HeartbeatChange::None => {}
             HeartbeatChange::Back => {
@@ -256,6 +261,23 @@ impl Recording<'_> {
         Ok(())
     }
 
+    /// Takes an answer to a question to a silent node. After the last one, the reasons are reported.
+    pub(super) fn take_finding(
+        &mut self,
+        ticket: Ticket,
+        result: &Result<Answer, SdoError>,
+        master: &mut Master<'_>,
+        observer: &mut dyn Observer,
+    ) {
+        let Some(open) = &mut self.questions.open else { return };
+        let Some(findings) = open.take(ticket, result, master) else { return };
+        (self.questions.open, self.questions.findings) = (None, findings);
+        let at = master.bus().now();
+        for remark in self.silence_remarks() {
+            observer.event(&LogEvent::Remark(remark), at);
+        }
+    }
+
     /// The controller reports a fault.
     pub(super) fn fault(&mut self, fault: Fault, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
         observer.event(&LogEvent::Fault(fault), at);
@@ -287,6 +309,7 @@ impl Recording<'_> {
         }
         while let Some((node, silence)) = self.liveness.next_lost_heartbeat(now) {
             self.tally.events.heartbeat_losses += 1;
+            self.heard.entry(node).or_default().heartbeat_stopped = true;
             observer.event(&LogEvent::HeartbeatLost(node, silence), master.bus().now());
         }
     }

@@ -1,7 +1,7 @@
 //! The result of a recording.
 
 use super::Recording;
-use crate::tasks::log::silence::{silence_reason, why_nothing};
+use crate::tasks::log::silence::{Silent, why_nothing};
 use crate::tasks::log::{RecordingReport, Remark};
 
 impl Recording<'_> {
@@ -39,12 +39,22 @@ impl Recording<'_> {
         let buffer = self.receive_buffer.filter(|buffer| self.tally.dropped > 0 && buffer.is_small());
         self.remarks.extend(buffer.map(Remark::SmallReceiveBuffer));
         self.remarks.extend(self.rereads.held().map(Remark::NotReadAgain));
-        if self.tally.rows == 0 {
-            return;
+        if self.tally.rows > 0 {
+            let remarks = self.silence_remarks();
+            self.remarks.extend(remarks);
         }
-        let silent = self.nodes.iter().filter(|node| self.liveness.has(node.id) && !self.liveness.has_sent(node.id));
-        let reasons = silent.map(|node| Remark::NoMeasurements(node.id, silence_reason(self, node, self.options)));
-        let reasons: Vec<Remark> = reasons.collect();
-        self.remarks.extend(reasons);
+    }
+
+    /// Why nodes, or signals of nodes that sent others, have no values.
+    pub(super) fn silence_remarks(&self) -> Vec<Remark> {
+        let silent = self.silent().into_iter().filter_map(|silent| {
+            let signal = match silent {
+                Silent::Node(_) => None,
+                Silent::Source(..) if self.is_short() => return None,
+                Silent::Source(_, source) => Some(self.decoder.sources()[source].signal.to_string()),
+            };
+            Some(Remark::NoMeasurements(silent.node(), signal, Box::new(self.silence(silent))))
+        });
+        silent.collect()
     }
 }

@@ -64,6 +64,7 @@ impl Recording<'_> {
             observer.event(&LogEvent::Buffer(buffer), master.bus().now());
         }
         let start = master.now();
+        self.started = start;
         self.tally.extend_to(start);
         for node in &self.nodes {
             self.liveness.watch_heartbeat(node, self.options.mode, start);
@@ -148,6 +149,9 @@ impl Recording<'_> {
             return ControlFlow::Continue(());
         }
         schedule.next_tick = now + TICK;
+        if !self.questions.were_asked && now >= schedule.start + FIRST_SAMPLE_TIMEOUT {
+            self.ask_silent_nodes_meanwhile(master);
+        }
         self.report_repeated(master.bus().now(), false, observer);
         observer.tick(master.bus().now(), self.tally.rows)
     }

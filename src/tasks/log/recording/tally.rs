@@ -77,6 +77,11 @@ impl Tally {
         gap
     }
 
+    /// The number of values of a source.
+    pub(super) fn count(&self, source: usize) -> u64 {
+        self.statistics.get(source).map_or(0, Statistics::count)
+    }
+
     /// Sets the end of the recording. It never moves back.
     pub(super) fn extend_to(&mut self, at: Mono) {
         self.end = self.end.max(at);

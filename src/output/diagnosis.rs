@@ -1,0 +1,159 @@
+//! Text for the reasons why a node sends no measurements, and what to do about them.
+
+use crate::bus::time::spoken;
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::nmt::NmtState;
+use crate::canopen::pdo::TpdoNumber;
+use crate::node::state::Proof;
+use crate::tasks::diagnosis::{Running, Silence, SilenceCause, TpdoCause};
+use std::time::Duration;
+
+/// Why a node, or a signal of it, sends no measurements.
+pub fn reason(silence: &Silence) -> String {
+    let text = match &silence.cause {
+        SilenceCause::InterfaceDown => return "the interface is down".to_owned(),
+        SilenceCause::NotReadAgain => return "it restarted, and its setup could not be read again".to_owned(),
+        SilenceCause::PollFailed(error) => return error.to_string(),
+        SilenceCause::NotOperational { state, by, was_started } => {
+            let again = match (was_started, state) {
+                (true, NmtState::PreOperational) => " again after the start",
+                (true, _) => " after the start",
+                (false, _) => "",
+            };
+            let by = if *by == Proof::Heartbeat { "" } else { " (node guarding)" };
+            format!("it is {state}{again}{by}")
+        }
+        SilenceCause::Restarted => "it restarted, and has sent no heartbeat since".to_owned(),
+        SilenceCause::Unreachable { had_heartbeat: true } => {
+            "its heartbeat stopped, and it does not answer: it has no power or cable".to_owned()
+        }
+        SilenceCause::Unreachable { had_heartbeat: false } => {
+            "it does not answer: it is stopped, or has no power or cable".to_owned()
+        }
+        SilenceCause::HeartbeatStopped => "its heartbeat stopped".to_owned(),
+        SilenceCause::WrongLength { mapped, received } => {
+            format!("its TPDOs have {received} bytes, their mapping {mapped}")
+        }
+        SilenceCause::SharedCobId(id, other) => format!("node {other} sends TPDOs with the same COB-ID {id}"),
+        SilenceCause::NoTpdo => "it has no TPDO".to_owned(),
+        SilenceCause::Tpdo(number, cause) => tpdo_reason(*number, *cause, silence.running),
+    };
+    match silence.emergency {
+        Some(code) => format!("{text}, emergency {code:04X}h"),
+        None => text,
+    }
+}
+
+/// Why a TPDO is not sent.
+fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String {
+    let communication = number.communication(0).index;
+    let mapping = number.mapping(0).index;
+    let also = or_not_running(running);
+    match cause {
+        TpdoCause::Disabled => format!("its TPDOs are disabled (bit 31 of {communication:04X}h:1)"),
+        TpdoCause::NothingMapped(Some(code @ 0xfe..)) => {
+            format!("{number} is a multiplexed PDO ({mapping:04X}h:0 is {code:02X}h), which cannot be decoded")
+        }
+        TpdoCause::NothingMapped(Some(0)) => format!("nothing is mapped into {number} ({mapping:04X}h:0 is 0)"),
+        TpdoCause::NothingMapped(_) => format!("the mapping of {number} could not be read ({mapping:04X}h)"),
+        TpdoCause::OnlyOnRequest(code) => {
+            format!("{number} is sent on remote request only ({communication:04X}h:2 is {code})")
+        }
+        TpdoCause::WaitsForSync(CanId::SYNC) => format!("{number} waits for SYNC, and no node sends SYNC"),
+        TpdoCause::WaitsForSync(id) => {
+            format!("{number} waits for SYNC with COB-ID {id} (1005h), and no node sends it")
+        }
+        TpdoCause::SyncCounter { is_expected: true } => {
+            format!("{number} waits for SYNC with a counter (1019h), and SYNC is sent without one{also}")
+        }
+        TpdoCause::SyncCounter { is_expected: false } => {
+            format!("{number} waits for SYNC without a counter (1019h is 0), and SYNC is sent with one{also}")
+        }
+        TpdoCause::TooFewSyncs { every, seen } => {
+            let every = if every == 1 { "every SYNC".to_owned() } else { format!("every {every}th SYNC") };
+            format!("{number} is sent at {every} ({communication:04X}h:2), and {seen} SYNC were sent")
+        }
+        TpdoCause::SteadyAtSync => format!(
+            "{number} is sent at a SYNC only after a change ({communication:04X}h:2 is 0): its value is steady{also}"
+        ),
+        TpdoCause::NotSentAtSync => not_sent(number, "at SYNC, and SYNC was sent", running),
+        TpdoCause::SlowEventTimer(timer) => {
+            format!("the event timer of {number} is longer ({communication:04X}h:5 is {timer} ms)")
+        }
+        TpdoCause::InhibitTime(inhibit) => {
+            let inhibit = spoken(Duration::from_micros(100) * u32::from(inhibit));
+            format!("the inhibit time of {number} is longer ({communication:04X}h:3 is {inhibit}){also}")
+        }
+        TpdoCause::ChannelOff(mode) => format!("its channel is off ({mode} is 0)"),
+        TpdoCause::InterruptsDisabled(object) => {
+            format!("its analogue inputs are not sent on change ({object} is 0), and {number} has no event timer")
+        }
+        TpdoCause::NoTrigger(first, last) => format!(
+            "{number} has no event timer ({communication:04X}h:5 is 0), and delta and limits are 0 ({first} to {last})"
+        ),
+        TpdoCause::SendsOnChange => {
+            format!("{number} has no event timer ({communication:04X}h:5 is 0): its value does not change enough{also}")
+        }
+        TpdoCause::Due(timer) => not_sent(number, &format!("every {timer} ms ({communication:04X}h:5)"), running),
+        TpdoCause::UnknownType => {
+            format!("the transmission type of {number} cannot be read ({communication:04X}h:2){also}")
+        }
+    }
+}
+
+/// A TPDO that is due, and was not received.
+fn not_sent(number: TpdoNumber, when: &str, running: Running) -> String {
+    let state = match running {
+        Running::Operational => "the node is operational",
+        Running::NotStopped => "the node answers SDO, and is probably not operational",
+        Running::Unknown => "the node is not operational, or has no power or cable",
+    };
+    format!("{number} is due {when}, and no {number} was received: {state}")
+}
+
+/// What else may be the cause, if the state of the node is unknown.
+fn or_not_running(running: Running) -> &'static str {
+    match running {
+        Running::Operational => "",
+        Running::NotStopped => ", or the node is not operational",
+        Running::Unknown => ", or the node is not operational, or has no power or cable",
+    }
+}
+
+/// A command to type, or one thing to check.
+pub fn hint(silence: &Silence, node: NodeId) -> Option<String> {
+    let poll = || Some("read by SDO instead: add --poll 100ms".to_owned());
+    match &silence.cause {
+        SilenceCause::InterfaceDown => Some("show the interfaces: cangauge bus list".to_owned()),
+        SilenceCause::NotReadAgain | SilenceCause::PollFailed(_) | SilenceCause::SharedCobId(..) => None,
+        SilenceCause::NotOperational { state: NmtState::Stopped, .. } => Some(format!("cangauge nmt preop {node}")),
+        SilenceCause::NotOperational { .. } if silence.emergency.is_some() => Some(format!("cangauge errors {node}")),
+        SilenceCause::NotOperational { .. } | SilenceCause::Restarted => Some(format!("cangauge nmt start {node}")),
+        SilenceCause::Unreachable { had_heartbeat: false } => {
+            Some(format!("check its power and cable; if it is stopped: cangauge nmt preop {node}"))
+        }
+        SilenceCause::Unreachable { had_heartbeat: true } | SilenceCause::HeartbeatStopped => {
+            Some("check its power and cable".to_owned())
+        }
+        SilenceCause::WrongLength { .. } | SilenceCause::NoTpdo => poll(),
+        SilenceCause::Tpdo(number, cause) => match cause {
+            TpdoCause::WaitsForSync(_) => Some(format!("add --sync 100ms, or read by SDO: --poll 100ms (node {node})")),
+            TpdoCause::NotSentAtSync | TpdoCause::Due(_) if silence.running == Running::Operational => poll(),
+            TpdoCause::NotSentAtSync | TpdoCause::Due(_) => Some(format!("cangauge nmt state {node} --probe")),
+            TpdoCause::SlowEventTimer(_) | TpdoCause::NoTrigger(..) | TpdoCause::SendsOnChange => Some(format!(
+                "read by SDO instead: add --poll 100ms (or: cangauge pdo map {node} {} --event-timer 100ms)",
+                number.get()
+            )),
+            TpdoCause::Disabled
+            | TpdoCause::NothingMapped(_)
+            | TpdoCause::OnlyOnRequest(_)
+            | TpdoCause::SyncCounter { .. }
+            | TpdoCause::TooFewSyncs { .. }
+            | TpdoCause::SteadyAtSync
+            | TpdoCause::InhibitTime(_)
+            | TpdoCause::ChannelOff(_)
+            | TpdoCause::InterruptsDisabled(_)
+            | TpdoCause::UnknownType => poll(),
+        },
+    }
+}

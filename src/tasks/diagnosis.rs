@@ -1,0 +1,291 @@
+//! Why a node sends no measurements.
+//!
+//! [`diagnose`] decides from evidence, in this order: what the node sent last ([`Heard`]), what it answers now
+//! ([`Inquiry`]), and the parameters of the TPDOs that carry the requested signals. Causes that cannot be told apart are
+//! named together: see [`Running`].
+
+mod inquiry;
+
+pub use inquiry::{Findings, Inquiry, questions};
+
+use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::nmt::NmtState;
+use crate::canopen::object::ObjectId;
+use crate::canopen::pdo::{TpdoNumber, Transmission};
+use crate::master::SdoError;
+use crate::measure::layout::Tpdo;
+use crate::node::Node;
+use crate::node::state::Proof;
+use std::time::Duration;
+
+/// Why a node, or a signal of it, sends no measurements.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Silence {
+    /// The cause.
+    pub cause: SilenceCause,
+    /// The code of the last emergency of the node.
+    pub emergency: Option<u16>,
+    /// What is known of the NMT state, for causes that do not explain the silence of a running node for certain.
+    pub running: Running,
+}
+
+/// What is known of the NMT state of a node that is not known to be in another state than OPERATIONAL.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Running {
+    /// It is OPERATIONAL.
+    Operational,
+    /// It answers SDO requests: it is OPERATIONAL or PRE-OPERATIONAL.
+    NotStopped,
+    /// Nothing.
+    Unknown,
+}
+
+/// The cause of a silence.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SilenceCause {
+    /// The interface of the host is down.
+    InterfaceDown,
+    /// The node restarted, and its setup could not be read again.
+    NotReadAgain,
+    /// Its value could not be polled.
+    PollFailed(Box<SdoError>),
+    /// It is not operational.
+    NotOperational {
+        /// Its state.
+        state: NmtState,
+        /// What showed the state.
+        by: Proof,
+        /// Whether it had been started before.
+        was_started: bool,
+    },
+    /// It restarted, and has not been operational since.
+    Restarted,
+    /// It sends no heartbeat, and does not answer. With `had_heartbeat` its heartbeat stopped, so it is not in STOPPED.
+    Unreachable {
+        /// Whether it has a heartbeat.
+        had_heartbeat: bool,
+    },
+    /// Its heartbeat stopped. Nothing was asked since.
+    HeartbeatStopped,
+    /// Its TPDOs have another length than their mapping, in bytes.
+    WrongLength {
+        /// The length of the mapping.
+        mapped: usize,
+        /// The length of the received TPDOs.
+        received: usize,
+    },
+    /// Another node sends TPDOs with the same COB-ID.
+    SharedCobId(CanId, NodeId),
+    /// It has no TPDO.
+    NoTpdo,
+    /// The TPDO is not sent.
+    Tpdo(TpdoNumber, TpdoCause),
+}
+
+/// Why a TPDO is not sent, by its parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TpdoCause {
+    /// Bit 31 of the COB-ID is set in all TPDOs of the node; this is the first one.
+    Disabled,
+    /// No object is mapped; the value of 1Axxh:0, if it was read: FEh and FFh stand for multiplexed PDOs.
+    NothingMapped(Option<u8>),
+    /// It is sent on remote request only (transmission type 252 or 253).
+    OnlyOnRequest(u8),
+    /// It waits for SYNC with this COB-ID, and none was received or sent.
+    WaitsForSync(CanId),
+    /// SYNC has a counter and the node expects none, or the other way round.
+    SyncCounter {
+        /// Whether the node expects a counter.
+        is_expected: bool,
+    },
+    /// It is sent at every n-th SYNC, and fewer were seen.
+    TooFewSyncs {
+        /// n.
+        every: u8,
+        /// SYNC messages seen.
+        seen: u64,
+    },
+    /// It is sent at a SYNC after a change only, and its value is steady.
+    SteadyAtSync,
+    /// It is sent at SYNC; SYNC was sent, and it was not received.
+    NotSentAtSync,
+    /// Its event timer in milliseconds is longer than the time waited.
+    SlowEventTimer(u16),
+    /// Its inhibit time in multiples of 100 µs is longer than the time waited.
+    InhibitTime(u16),
+    /// The channel of its value is switched off by this object (6112h).
+    ChannelOff(ObjectId),
+    /// The node sends analogue inputs only if this object is 1 (6423h of CiA 401).
+    InterruptsDisabled(ObjectId),
+    /// It has no event timer, and no change triggers it: delta and limits are 0, from the first to the last of these objects.
+    NoTrigger(ObjectId, ObjectId),
+    /// It has no event timer, and is sent on change only.
+    SendsOnChange,
+    /// Its event timer in milliseconds is running, and it was not received.
+    Due(u16),
+    /// Its transmission type cannot be read.
+    UnknownType,
+}
+
+/// What a node sent while it was observed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Heard {
+    /// The state of its last heartbeat; `None` after a boot-up.
+    pub state: Option<NmtState>,
+    /// Its last heartbeat or boot-up message was a boot-up message.
+    pub booted: bool,
+    /// Its heartbeat stopped.
+    pub heartbeat_stopped: bool,
+    /// The code of its last emergency.
+    pub emergency: Option<u16>,
+    /// It sent TPDOs: it is operational.
+    pub sends_tpdos: bool,
+    /// SYNC messages for it that others sent, and the length of the last one.
+    pub syncs: (u64, usize),
+    /// The mapped and the received length in bytes of TPDOs that make no values.
+    pub wrong_length: Option<(usize, usize)>,
+    /// A COB-ID with which another node sends TPDOs too.
+    pub shared: Option<(CanId, NodeId)>,
+}
+
+/// What was done to get measurements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Situation {
+    /// How long it waited.
+    pub waited: Duration,
+    /// SYNC messages that the program sent; `None` if it sends no SYNC.
+    pub syncs_sent: Option<u64>,
+    /// Whether the program started the node.
+    pub was_started: bool,
+}
+
+/// Decides why a node sends no measurements. `carries` says whether a TPDO carries what was requested.
+pub fn diagnose(
+    node: &Node,
+    carries: &dyn Fn(&Tpdo) -> bool,
+    heard: &Heard,
+    findings: Option<&Findings>,
+    situation: &Situation,
+) -> Silence {
+    let heartbeat = heard.state.filter(|_| !heard.heartbeat_stopped).map(|state| (state, Proof::Heartbeat));
+    let known = heartbeat.or_else(|| findings.and_then(|findings| findings.state));
+    let answers = findings.map(|findings| findings.answers);
+    let is_operational = heard.sends_tpdos || known.is_some_and(|(state, _)| state == NmtState::Operational);
+    let running = match answers {
+        _ if is_operational => Running::Operational,
+        Some(true) => Running::NotStopped,
+        _ => Running::Unknown,
+    };
+    let was_started = situation.was_started;
+    let cause = match known {
+        Some((state, by)) if state != NmtState::Operational => SilenceCause::NotOperational { state, by, was_started },
+        _ if heard.booted && !is_operational => SilenceCause::Restarted,
+        _ if heard.wrong_length.is_some() || heard.shared.is_some() => frames_cause(heard),
+        _ if answers == Some(false) && !heard.sends_tpdos => {
+            SilenceCause::Unreachable { had_heartbeat: heard.heartbeat_stopped }
+        }
+        _ if heard.heartbeat_stopped && answers.is_none() => SilenceCause::HeartbeatStopped,
+        _ => setup_cause(node, carries, heard, findings, situation),
+    };
+    Silence { cause, emergency: heard.emergency, running }
+}
+
+/// Why the TPDOs that were received make no values.
+fn frames_cause(heard: &Heard) -> SilenceCause {
+    match (heard.wrong_length, heard.shared) {
+        (Some((mapped, received)), _) => SilenceCause::WrongLength { mapped, received },
+        (None, Some((id, other))) => SilenceCause::SharedCobId(id, other),
+        (None, None) => SilenceCause::NoTpdo,
+    }
+}
+
+/// Why a node that may be operational sends no measurements, by the parameters of its TPDOs.
+fn setup_cause(
+    node: &Node,
+    carries: &dyn Fn(&Tpdo) -> bool,
+    heard: &Heard,
+    findings: Option<&Findings>,
+    situation: &Situation,
+) -> SilenceCause {
+    let Some(first) = node.tpdos.first() else { return SilenceCause::NoTpdo };
+    let valid: Vec<&Tpdo> = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).collect();
+    if valid.is_empty() {
+        return SilenceCause::Tpdo(first.number, TpdoCause::Disabled);
+    }
+    let candidates: Vec<&Tpdo> = valid.iter().copied().filter(|tpdo| carries(tpdo)).collect();
+    let candidates = if candidates.is_empty() { valid } else { candidates };
+    let empty = Findings::default();
+    let known = findings.unwrap_or(&empty);
+    let causes: Vec<(TpdoNumber, TpdoCause)> =
+        candidates.iter().map(|tpdo| (tpdo.number, tpdo_cause(node, tpdo, heard, known, situation))).collect();
+    // A TPDO that is due and is not sent shows that the parameters of the others are not the cause.
+    let is_due = |cause: &TpdoCause| matches!(cause, TpdoCause::Due(_) | TpdoCause::NotSentAtSync);
+    let cause = causes.iter().find(|(_, cause)| is_due(cause)).or(causes.first());
+    cause.map_or(SilenceCause::NoTpdo, |&(number, cause)| SilenceCause::Tpdo(number, cause))
+}
+
+/// Why a valid TPDO is not sent.
+fn tpdo_cause(node: &Node, tpdo: &Tpdo, heard: &Heard, findings: &Findings, situation: &Situation) -> TpdoCause {
+    if tpdo.mapping.is_empty() {
+        return TpdoCause::NothingMapped(findings.small(tpdo.number.mapping(0)));
+    }
+    let (received, length) = heard.syncs;
+    let seen = situation.syncs_sent.unwrap_or(0) + received;
+    let is_expected = node.sync_overflow.is_some();
+    match tpdo.transmission {
+        None => TpdoCause::UnknownType,
+        Some(Transmission::Rtr(code)) => TpdoCause::OnlyOnRequest(code),
+        Some(Transmission::AcyclicSync | Transmission::Sync(_)) if seen == 0 && situation.syncs_sent.is_none() => {
+            TpdoCause::WaitsForSync(node.sync)
+        }
+        Some(Transmission::AcyclicSync | Transmission::Sync(_)) if received > 0 && is_expected != (length > 0) => {
+            TpdoCause::SyncCounter { is_expected }
+        }
+        Some(Transmission::Sync(every)) if u64::from(every) > seen => TpdoCause::TooFewSyncs { every, seen },
+        Some(Transmission::AcyclicSync) if seen == 0 => TpdoCause::TooFewSyncs { every: 1, seen },
+        Some(Transmission::AcyclicSync) => channel_off(node, tpdo, findings).unwrap_or(TpdoCause::SteadyAtSync),
+        Some(Transmission::Sync(_)) => channel_off(node, tpdo, findings).unwrap_or(TpdoCause::NotSentAtSync),
+        Some(Transmission::Manufacturer | Transmission::Profile | Transmission::Reserved(_)) => {
+            event_cause(node, tpdo, findings, situation.waited)
+        }
+    }
+}
+
+/// Why a TPDO that is sent by its event timer or on change is not sent.
+fn event_cause(node: &Node, tpdo: &Tpdo, findings: &Findings, waited: Duration) -> TpdoCause {
+    let inhibit: Option<u16> = findings.small(tpdo.number.communication(3));
+    let inhibit = inhibit.filter(|&inhibit| Duration::from_micros(100) * u32::from(inhibit) >= waited);
+    match tpdo.event_timer_ms.filter(|&timer| timer > 0) {
+        Some(timer) if Duration::from_millis(timer.into()) >= waited => TpdoCause::SlowEventTimer(timer),
+        Some(timer) => inhibit.map_or(TpdoCause::Due(timer), TpdoCause::InhibitTime),
+        None => channel_off(node, tpdo, findings)
+            .or_else(|| interrupts_disabled(node, tpdo, findings))
+            .or_else(|| no_trigger(node, tpdo, findings))
+            .or(inhibit.map(TpdoCause::InhibitTime))
+            .unwrap_or(TpdoCause::SendsOnChange),
+    }
+}
+
+/// All channels of a TPDO are off.
+fn channel_off(node: &Node, tpdo: &Tpdo, findings: &Findings) -> Option<TpdoCause> {
+    let modes: Vec<ObjectId> =
+        tpdo.mapping.iter().filter_map(|entry| inquiry::operating_mode(node, entry.object)).collect();
+    let are_off = !modes.is_empty() && modes.iter().all(|&mode| findings.is_zero(mode) == Some(true));
+    are_off.then(|| TpdoCause::ChannelOff(modes[0]))
+}
+
+fn interrupts_disabled(node: &Node, tpdo: &Tpdo, findings: &Findings) -> Option<TpdoCause> {
+    let enable = tpdo.mapping.iter().find_map(|entry| inquiry::interrupt_enable(node, entry.object))?;
+    (findings.is_zero(enable) == Some(true)).then_some(TpdoCause::InterruptsDisabled(enable))
+}
+
+/// The deltas and limits of all values of a TPDO were read, and are 0. An object that does not exist triggers nothing.
+fn no_trigger(node: &Node, tpdo: &Tpdo, findings: &Findings) -> Option<TpdoCause> {
+    let values: Vec<[ObjectId; 3]> =
+        tpdo.mapping.iter().filter_map(|entry| inquiry::triggers(node, entry.object)).collect();
+    let is_known = |object: &ObjectId| findings.is_zero(*object).is_some();
+    let is_set = |object: &ObjectId| findings.is_zero(*object) == Some(false);
+    let first = values.first()?;
+    let all_zero = values.iter().all(|of_value| of_value.iter().any(is_known) && !of_value.iter().any(is_set));
+    all_zero.then_some(TpdoCause::NoTrigger(first[0], first[2]))
+}
