@@ -305,6 +305,9 @@ pub enum BusError {
     /// The operating system denies the operation.
     #[error("no permission to {0}")]
     Permission(String),
+    /// Another cangauge process uses the same nodes or the whole bus.
+    #[error("{0}")]
+    InUse(String),
     /// This bus can only receive.
     #[error("{0} can only receive")]
     ReceiveOnly(String),

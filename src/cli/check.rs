@@ -97,9 +97,9 @@ impl Check {
         }
         global.print(&verdict::rows(&report))?;
         match all_satisfied(&report.verdicts, &report.failures) {
-            // A node that was named must answer: without its data the check has no result.
-            Err(failure) if failure.kind() != Kind::CheckFailed && self.nodes == Nodes::All && report.is_partial() => {
-                Err(Several { kind: Kind::Partial, failures: report.failures }.into())
+            Err(failure) if failure.kind() != Kind::CheckFailed && report.is_partial() => {
+                let failures = if report.failures.is_empty() { vec![failure] } else { report.failures };
+                Err(Several { kind: Kind::Partial, failures }.into())
             }
             result => Ok(result?),
         }
@@ -142,7 +142,7 @@ impl Check {
             };
             // Without --poll the nodes are only used until the recording starts.
             let claims = self.poll.is_none().then(|| std::mem::take(claims));
-            let mut view = View { progress, console, is_all: self.nodes == Nodes::All, started: None, claims };
+            let mut view = View { progress, console, started: None, claims };
             let report = check(master, &options, &mut view);
             let interrupted = report.as_ref().is_err_and(|failure| failure.kind() == Kind::Interrupted);
             view.progress.finish(interrupted);
@@ -163,18 +163,12 @@ impl Check {
 struct View {
     progress: CheckProgress,
     console: Console,
-    /// The user typed `all`: a node that fails does not stop the check of the others.
-    is_all: bool,
     started: Option<Stamp>,
     /// Keeps other cangauge processes away from the nodes until the recording starts.
     claims: Option<Claims>,
 }
 
 impl Observer for View {
-    fn failed(&mut self, failures: &[Failure]) -> Result<(), Failure> {
-        failures.first().filter(|_| !self.is_all).map_or(Ok(()), |failure| Err(failure.clone()))
-    }
-
     fn samples(&mut self, _samples: &[Sample], _sources: &[Source]) -> ControlFlow<()> {
         self.claims = None;
         ControlFlow::Continue(())

@@ -133,7 +133,6 @@ impl Log {
             let mut recorder =
                 Recorder::new(files.rows(waits)?, files.rows_name(), files.events(waits)?, progress, console);
             // Without --poll the nodes are free for others as soon as the recording runs.
-            recorder.is_all = self.nodes == Nodes::All;
             recorder.claims = self.poll.is_none().then(|| std::mem::take(claims));
             let mut checker = Checker::new(&self.expect, &options.nodes, true, &mut recorder);
             let report = log(master, &options, &mut checker);

@@ -240,7 +240,7 @@ impl Global {
         Console {
             quiet: self.quiet,
             verbose: self.verbose,
-            json: self.format == Format::Json,
+            json: self.format.is_json(),
             color: match self.color {
                 When::Auto => ColorChoice::Auto,
                 When::Always => ColorChoice::Always,
@@ -267,6 +267,11 @@ impl Global {
         }
     }
 
+    /// Whether the output is for people.
+    pub(crate) fn prints_text(&self) -> bool {
+        self.format.is_text()
+    }
+
     /// Prints reports to stdout in the chosen format.
     pub(crate) fn print<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
         render(reports, self.format, &mut io::stdout().lock()).map_err(exit::stdout)
@@ -274,12 +279,12 @@ impl Global {
 
     /// Prints reports if the format is for programs. A note on stderr tells people.
     pub(crate) fn print_data<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
-        if self.format == Format::Text { Ok(()) } else { self.print(reports) }
+        if self.prints_text() { Ok(()) } else { self.print(reports) }
     }
 
     /// Prints reports if the format is JSON: results of a command that failed.
     pub(crate) fn print_json<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
-        if self.format == Format::Json { self.print(reports) } else { Ok(()) }
+        if self.format.is_json() { self.print(reports) } else { Ok(()) }
     }
 
     /// Prints reports one by one as they arrive.

@@ -3,19 +3,20 @@
 use super::Global;
 use super::args::{BusSpec, Nodes};
 use super::exit::{FileError, IntoFailure};
-use crate::bus::Bus;
 use crate::bus::claim::{ClaimError, Claims, IfHeld, Part};
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
 use crate::bus::replay::{Replay, ReplayNote};
 use crate::bus::trace::Traced;
+use crate::bus::{Bus, BusError};
 use crate::canopen::id::NodeId;
-use crate::master::Master;
+use crate::master::{Error, Master};
 use crate::node::targets;
 use crate::output;
+use crate::output::failure::ErrorMessage;
 use crate::sim::{Bench, BenchError};
+use crate::tasks::Failure;
 use crate::tasks::scan::ScanFailure;
-use crate::tasks::{Failure, Kind};
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
@@ -25,7 +26,7 @@ use std::time::Duration;
 const CLAIM_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The bus that the options name, or the only one there is.
-pub(super) fn spec(global: &Global) -> Result<BusSpec, Failure> {
+pub(super) fn spec(global: &Global) -> Result<BusSpec, ErrorMessage> {
     global.bus.clone().map_or_else(only_interface, Ok)
 }
 
@@ -45,12 +46,11 @@ pub(super) fn claim(global: &Global, spec: &BusSpec) -> Result<Claims, Failure> 
     let mut report = |what: &ClaimError| global.console().note(&format!("{what}; {consequence}"));
     Claims::take(bus, &global.claim, if_held, &mut report).map_err(|error| match error {
         ClaimError::InUse(part, _) => {
-            let hint = "wait until it ends, or end it; to work beside it, add --ignore-lock";
             let node = if let Part::Node(node) = part { Some(node) } else { None };
-            Failure { node, ..Failure::new(Kind::Bus, error.to_string()) }.hint(hint)
+            Failure { node, ..BusError::InUse(error.to_string()).into() }
         }
-        ClaimError::Interrupted => Failure::new(Kind::Interrupted, error.to_string()),
-        ClaimError::System(..) => Failure::new(Kind::Io, error.to_string()),
+        ClaimError::Interrupted => Error::Interrupted.into(),
+        ClaimError::System(part, source) => BusError::File { what: format!("claim {part}"), source }.into(),
     })
 }
 
@@ -99,7 +99,7 @@ pub(super) fn bench(spec: &str) -> anyhow::Result<Bench> {
 /// What is wrong with a bench, in the contract's kinds.
 pub(super) fn bench_error(error: BenchError) -> anyhow::Error {
     match error {
-        BenchError::Usage(message) => Failure::new(Kind::Usage, message).into(),
+        BenchError::Usage(message) => ErrorMessage::usage(message).into(),
         BenchError::Io { path, source } => FileError { what: path.display().to_string(), source }.into(),
     }
 }
@@ -113,7 +113,7 @@ fn socketcan(name: &str, even_down: bool) -> Result<Box<dyn Bus>, Failure> {
 
 #[cfg(not(target_os = "linux"))]
 fn socketcan(name: &str, _: bool) -> Result<Box<dyn Bus>, Failure> {
-    let error = crate::bus::BusError::Unsupported(format!("{name}: this system has no SocketCAN"));
+    let error = BusError::Unsupported(format!("{name}: this system has no SocketCAN"));
     Err(error).or_fail()
 }
 
@@ -127,7 +127,7 @@ fn interfaces() -> Vec<(String, bool)> {
     Vec::new()
 }
 
-fn only_interface() -> Result<BusSpec, Failure> {
+fn only_interface() -> Result<BusSpec, ErrorMessage> {
     let all = interfaces();
     let up: Vec<&String> = all.iter().filter(|(_, up)| *up).map(|(name, _)| name).collect();
     if let [only] = up.as_slice() {
@@ -146,7 +146,7 @@ fn only_interface() -> Result<BusSpec, Failure> {
         Some(name) => format!("name one: --bus {name}, or without hardware: --bus sim"),
         None => "without hardware: --bus sim".to_owned(),
     };
-    Err(Failure::new(Kind::Usage, message).hint(hint))
+    Err(ErrorMessage::usage(message).hint(hint))
 }
 
 /// The nodes that the user named, or for `all` those of [`all`].

@@ -1,7 +1,7 @@
 //! `cangauge pdo`.
 
 use super::args::{Duration, Nodes, ObjectArg};
-use super::exit::stdout;
+use super::exit::{several, stdout};
 use super::{Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -233,9 +233,9 @@ impl MapArgs {
 impl WatchArgs {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let console = global.console();
-        let mut failed = None;
+        let (mut failed, mut node_failures) = (None, Vec::new());
         let mut rows = global.stream::<ReceivedTpdo>()?;
-        global.with_claims(|master, claims| {
+        let (asked, result) = global.with_claims(|master, claims| {
             let nodes = open::nodes(master, global, &self.nodes)?;
             let overrides = descriptions::overrides_on(master, global, &nodes)?;
             let mut claims = Some(std::mem::take(claims));
@@ -245,6 +245,10 @@ impl WatchArgs {
                 match *event {
                     WatchEvent::Restarted(node) => {
                         console.warn(&format!("node {node} restarted; its mapping is assumed to be unchanged"));
+                    }
+                    WatchEvent::Failed(failure) => {
+                        console.warn(&format!("{}: the node is not shown", ErrorMessage::of(failure).message));
+                        node_failures.push(failure.clone());
                     }
                     WatchEvent::NothingYet => {
                         console.note("no TPDO yet: are the nodes operational, and does a node send SYNC?");
@@ -265,8 +269,17 @@ impl WatchArgs {
                 ControlFlow::Continue(())
             };
             let duration = self.duration.map(|duration| duration.0);
-            Ok(watch(master, &nodes, &overrides, duration, &mut report)?)
+            Ok((nodes.len(), watch(master, &nodes, &overrides, duration, &mut report)))
         })?;
-        failed.map_or(Ok(()), |error| Err(stdout(error)))
+        if let Some(error) = failed {
+            return Err(stdout(error));
+        }
+        match result {
+            Ok(failures) => Ok(several(asked, failures)?),
+            Err(failure) => {
+                node_failures.push(failure);
+                Ok(several(node_failures.len(), node_failures)?)
+            }
+        }
     }
 }

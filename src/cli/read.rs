@@ -1,18 +1,18 @@
 //! `cangauge read`.
 
 use super::args::{Nodes, SignalArg};
-use super::exit::{IntoFailure, several, stdout};
-use super::{Format, Global, descriptions, open};
+use super::exit::{IntoFailure, several};
+use super::{Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
-use crate::measure::sample::{Doubt, Number, Raw, Sample, Status};
+use crate::measure::sample::{Doubt, Sample};
+use crate::output::doubt;
 use crate::output::failure::ErrorMessage;
-use crate::output::{csv, doubt, json, table, text};
-use crate::tasks::read::{Target, read};
+use crate::output::read::ReadValue;
+use crate::tasks::read::{ReadFailure, Readings, Target, read};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
-use std::io::{self, Write};
 
 /// Read measured values now, scaled, with unit and status
 ///
@@ -37,18 +37,6 @@ pub(super) fn parse_unit(text: &str) -> Result<Unit, String> {
         .ok_or_else(|| format!("\"{text}\" is not a known unit (bar, mbar, kPa, MPa, psi, degC, degF, K, 0x4E0000)"))
 }
 
-/// A value ready to be shown.
-struct Shown {
-    target: Target,
-    value: Option<Number>,
-    /// The text of the value: as sent, or converted with the precision of what was sent.
-    text: String,
-    unit: String,
-    status: Option<Status>,
-    doubt: Option<Doubt>,
-    raw: Raw,
-}
-
 impl Read {
     /// What it does not share with another cangauge.
     pub(super) fn claim(&self) -> Claim {
@@ -63,115 +51,63 @@ impl Read {
             let results = read(master, &nodes, &wanted, &overrides).or_fail()?;
             Ok((nodes.len(), results))
         })?;
-        let bare = asked == 1 && wanted.len() == 1;
-        let (mut shown, mut failures) = (Vec::new(), Vec::new());
+        let is_bare = asked == 1 && wanted.len() == 1;
+        let (mut values, mut failures) = (Vec::new(), Vec::new());
         for result in results {
-            match result.and_then(|samples| {
-                for (target, sample) in &samples {
-                    if let Some(doubt) = sample.doubt.filter(|doubt| !bare || *doubt != Doubt::UnknownType) {
-                        let (node, signal) = (target.source.node, &target.source.signal);
-                        global.console().warn(&doubt::doubt(node, signal, doubt));
-                    }
-                }
-                samples.into_iter().map(|(target, sample)| self.show(target, &sample)).collect::<Result<Vec<_>, _>>()
-            }) {
-                Ok(values) => shown.extend(values),
+            match result.and_then(|readings| self.convert(global, readings, is_bare)) {
+                Ok(converted) => values.extend(converted),
                 Err(failure) => failures.push(failure),
             }
         }
-        // Everybody was meant who has it; that somebody has it not is no failure, unless nobody has.
-        if self.nodes == Nodes::All && !shown.is_empty() {
-            let (without, failed) = failures.into_iter().partition(|failure| failure.kind() == Kind::Usage);
+        // `all` means the nodes that have the signal. It fails if no node has it.
+        if self.nodes == Nodes::All && !values.is_empty() {
+            let (without, failed): (Vec<_>, Vec<_>) =
+                failures.into_iter().partition(|failure| failure.kind() == Kind::Usage);
             failures = failed;
-            let without: Vec<Failure> = without;
             without.iter().for_each(|failure| global.console().note(&ErrorMessage::from(failure).message));
         }
-        let invalid = print(&shown, global.format, bare).map_err(stdout)?;
-        if let Some(failure) = invalid {
-            failures.push(failure);
-        }
+        let reports: Vec<ReadValue<'_>> = values.iter().map(|value| self.report(value, is_bare)).collect();
+        global.print(&reports)?;
         Ok(several(asked, failures)?)
     }
 
-    fn show(&self, target: Target, sample: &Sample) -> Result<Shown, Failure> {
-        let as_sent = sample.value.map(|value| value.to_string()).unwrap_or_default();
-        let (value, text, unit) = match (self.unit, target.unit) {
-            (None, _) => (sample.value, as_sent, target.source.unit.to_string()),
-            (Some(to), from) => {
-                let from = from.ok_or_else(|| {
-                    let message = format!("{} has no unit to convert from", target.source.signal);
-                    Failure::of_node(Kind::Usage, target.source.node, message)
-                })?;
-                let converted = match sample.value {
-                    None => None,
-                    Some(value) => Some(from.convert(value.as_f64(), to).ok_or_else(|| {
-                        let message = format!("{} is in {from}, which is no {to}", target.source.signal);
-                        Failure::of_node(Kind::Usage, target.source.node, message)
-                    })?),
-                };
-                let shown = converted.map(|value| text::significant(value, precision(sample.value)));
-                (converted.map(Number::Real64), shown.unwrap_or_default(), to.to_string())
+    /// Prints the warnings of the readings of one node, and converts the values.
+    fn convert(&self, global: &Global, readings: Readings, is_bare: bool) -> Result<Vec<Converted>, Failure> {
+        for (target, sample) in &readings {
+            if let Some(doubt) = sample.doubt.filter(|doubt| !is_bare || *doubt != Doubt::UnknownType) {
+                let (node, signal) = (target.source.node, &target.source.signal);
+                global.console().warn(&doubt::doubt(node, signal, doubt));
             }
+        }
+        let convert = |(target, sample): (Target, Sample)| {
+            let converted = self.unit.map(|unit| target.convert(sample.value, unit)).transpose()?;
+            // An empty line is not a number.
+            if is_bare && global.prints_text() && sample.value.is_none() {
+                return Err(no_value(&target, &sample));
+            }
+            Ok((target, sample, converted.flatten()))
         };
-        let (status, doubt, raw) = (sample.status, sample.doubt, sample.raw);
-        Ok(Shown { target, value, text, unit, status, doubt, raw })
+        readings.into_iter().map(convert).collect()
+    }
+
+    fn report<'a>(&self, (target, sample, converted): &'a Converted, is_bare: bool) -> ReadValue<'a> {
+        let value = ReadValue::new(&target.source, sample, is_bare);
+        match self.unit {
+            Some(unit) => value.converted(*converted, unit),
+            None => value,
+        }
     }
 }
 
-/// How many significant digits a value was sent with: a converted one has no more.
-fn precision(value: Option<Number>) -> usize {
-    match value {
-        Some(Number::Decimal { mantissa, .. }) => mantissa.unsigned_abs().to_string().len().max(4),
-        Some(Number::Real32(_)) | None => 7,
-        Some(Number::Real64(_)) => 15,
-    }
-}
+/// A reading, and its value in the requested unit.
+type Converted = (Target, Sample, Option<f64>);
 
-/// Prints; a bare value that is invalid is a failure, since an empty line is no number.
-fn print(shown: &[Shown], format: Format, bare: bool) -> io::Result<Option<Failure>> {
-    let mut out = io::stdout().lock();
-    match format {
-        Format::Json => {
-            for item in shown {
-                json::reading(&mut out, &item.target.source, item.value, &item.unit, item.status)?;
-            }
-        }
-        Format::Csv => {
-            let cells = |item: &Shown| {
-                let status = item.status.map_or("", Status::as_str);
-                let source = &item.target.source;
-                [&source.node.to_string(), &*source.signal, &item.text, &item.unit, status].map(str::to_owned).to_vec()
-            };
-            csv::write(&mut out, &["node", "signal", "value", "unit", "status"], shown.iter().map(cells))?;
-        }
-        Format::Text if bare => {
-            if let [item] = shown {
-                if item.value.is_none() {
-                    let source = &item.target.source;
-                    if item.doubt == Some(Doubt::UnknownType) {
-                        let raw: String = item.raw.bytes().iter().map(|byte| format!("{byte:02X}")).collect();
-                        let message = format!("{} (received 0x{raw})", doubt::unknown_type(&source.signal));
-                        let remedy = doubt::type_remedy(source.node, &source.signal);
-                        return Ok(Some(Failure::of_node(Kind::Usage, source.node, message).hint(remedy)));
-                    }
-                    let status = item.status.map_or("invalid", Status::as_str);
-                    let message = format!("{} has no valid value: {status}", source.signal);
-                    return Ok(Some(Failure::of_node(Kind::Unexpected, source.node, message)));
-                }
-                writeln!(out, "{}", item.text)?;
-            }
-        }
-        Format::Text => {
-            let cell = |item: &Shown| {
-                let value = if item.text.is_empty() { "-".to_owned() } else { format!("{} {}", item.text, item.unit) };
-                let status = item.status.map_or("(tells no status)", Status::as_str);
-                let source = &item.target.source;
-                vec![source.node.to_string(), source.signal.to_string(), value.trim_end().to_owned(), status.to_owned()]
-            };
-            let rows: Vec<_> = shown.iter().map(cell).collect();
-            table::write(&mut out, &[table::Align::Left; 4], &rows)?;
-        }
-    }
-    out.flush()?;
-    Ok(None)
+/// Why a reading has no value.
+fn no_value(target: &Target, sample: &Sample) -> Failure {
+    let signal = target.source.signal.to_string();
+    let cause = match sample.doubt {
+        Some(Doubt::UnknownType) => ReadFailure::TypeUnknown { signal, raw: sample.raw },
+        _ => ReadFailure::Invalid { signal, status: sample.status },
+    };
+    Failure::at(target.source.node, cause)
 }

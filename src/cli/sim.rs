@@ -5,8 +5,8 @@ use super::exit::IntoFailure;
 use super::{Global, open};
 use crate::bus::claim::Claim;
 use crate::bus::memory::Station;
+use crate::output::failure::ErrorMessage;
 use crate::sim;
-use crate::tasks::{Failure, Kind};
 use clap::Args;
 
 /// Simulate devices on a bus until Ctrl-C
@@ -29,12 +29,9 @@ impl Sim {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let bench = open::bench(&self.devices.join(","))?;
         if let Some(BusSpec::Sim(_)) = global.bus {
-            return Err(Failure::new(
-                Kind::Usage,
-                "no other program can reach the simulated bus: it is inside this program",
-            )
-            .hint("name an interface, for example a virtual one: cangauge -b vcan0 sim mh4@5")
-            .into());
+            let message = "no other program can reach the simulated bus: it is inside this program";
+            let hint = "name an interface, for example a virtual one: cangauge -b vcan0 sim mh4@5";
+            return Err(ErrorMessage::usage(message).hint(hint).into());
         }
         let mut bus = open::open(global)?;
         let devices = bench.into_devices().map_err(open::bench_error)?;

@@ -4,10 +4,10 @@ use super::Global;
 use super::args::Nodes;
 use super::each::{Each, each};
 use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
+use crate::output::notes;
 use crate::output::report::Report;
 use crate::output::store::{Restored, Stored};
-use crate::tasks::store::{Done, Group};
+use crate::tasks::store::{Group, StoreReport};
 use crate::tasks::{restore, store};
 use clap::{Args, ValueEnum};
 
@@ -99,11 +99,11 @@ impl Restore {
 }
 
 /// Prints the reports, the notes and the failures.
-fn print<R: Report>(each: Each<Done>, global: &Global, report: fn(NodeId, Done) -> R) -> anyhow::Result<()> {
-    let reports: Vec<R> = each.done.iter().map(|(node, done)| report(*node, done.clone())).collect();
+fn print<R: Report>(each: Each<StoreReport>, global: &Global, report: fn(StoreReport) -> R) -> anyhow::Result<()> {
+    let reports: Vec<R> = each.done.iter().map(|(_, done)| report(done.clone())).collect();
     global.print(&reports)?;
-    for (node, done) in &each.done {
-        done.notes.iter().for_each(|note| global.console().note(&format!("node {node}: {note}")));
+    for note in each.done.iter().flat_map(|(_, done)| &done.notes) {
+        notes::print(&global.console(), note);
     }
     each.end()
 }

@@ -1,7 +1,7 @@
 //! JSON Lines: one object a line.
 
 use super::text::steers;
-use crate::measure::sample::{Number, Source, Status};
+use crate::measure::sample::Number;
 use serde::Serialize;
 use serde_json::ser::Formatter;
 use std::io::{self, Write};
@@ -45,32 +45,6 @@ impl Serialize for JsonNumber {
             _ => serializer.serialize_none(),
         }
     }
-}
-
-/// A measured value of `read`.
-pub fn reading(
-    out: &mut dyn Write,
-    source: &Source,
-    value: Option<Number>,
-    unit: &str,
-    status: Option<Status>,
-) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct Reading<'a> {
-        node: u8,
-        signal: &'a str,
-        value: JsonNumber,
-        unit: Option<&'a str>,
-        status: Option<&'a str>,
-    }
-    let reading = Reading {
-        node: source.node.get(),
-        signal: &source.signal,
-        value: JsonNumber(value),
-        unit: Some(unit).filter(|unit| !unit.is_empty()),
-        status: status.map(Status::as_str),
-    };
-    line(out, &reading)
 }
 
 /// A value of the object dictionary as JSON has it: numbers as numbers, the rest as text.

@@ -22,6 +22,7 @@ pub mod notes;
 pub mod objects;
 pub mod pdo;
 pub mod progress;
+pub mod read;
 pub mod replay;
 pub mod report;
 pub mod rows;

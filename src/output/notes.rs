@@ -4,10 +4,11 @@
 
 use super::console::Console;
 use super::failure::host::up_by_hand;
-use super::failure::{self, autozero, pdo, settings};
+use super::failure::{self, autozero, pdo, settings, store};
 use super::lss;
 use super::report::Cell;
 use crate::canopen::id::NodeId;
+use crate::tasks::note::StateEffect;
 use crate::tasks::{Effect, Fact, Note};
 use serde::Serialize;
 
@@ -75,7 +76,8 @@ pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> Told {
         Effect::Lss(effect) => failure::lss::effect(effect),
         Effect::Pdo(effect) => pdo::effect(&number, effect),
         Effect::Settings(effect) => settings::effect(&number, effect),
-        Effect::Text(text) | Effect::Hint(text) => Told::new("other", text.clone()),
+        Effect::State(state) => state_text(&number, *state),
+        Effect::Store(effect) => store::effect(&number, effect),
     }
 }
 
@@ -96,13 +98,33 @@ pub fn note(note: &Note) -> Told {
         ),
         Fact::Autozero(fact) => autozero::fact(note.node, fact),
         Fact::Lss(fact) => lss::fact(fact),
-        Fact::Pdo(fact) => pdo::fact(note.node, fact),
+        Fact::Pdo(fact) => pdo::fact(fact),
         Fact::Settings(fact) => settings::fact(fact),
-        Fact::Text(text) => Told::new("other", text.clone()),
+        Fact::State(state) => state_text(&note.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string()), *state),
+        Fact::Store(fact) => store::fact(note.node, fact),
         Fact::StateAsBooted => Told::new(
             "state-as-booted",
             "the state before the reset is unknown; the node is in the state in which it boots",
         ),
+    }
+}
+
+/// The text for an NMT state that is not the previous one.
+fn state_text(node: &str, state: StateEffect) -> Told {
+    match state {
+        StateEffect::Unknown => Told::new(
+            "left-pre-operational",
+            "the node was set to PRE-OPERATIONAL; its previous state is unknown, so it stays there",
+        )
+        .command("start it", format!("cangauge nmt start {node}")),
+        StateEffect::Differs { before, now } => {
+            Told::new("state-differs", format!("the node was {before} before and is {now} now"))
+                .command("show its state", format!("cangauge nmt state {node}"))
+        }
+        StateEffect::Unconfirmed { before } => {
+            Told::new("state-unconfirmed", format!("the node was set to {before} again, without confirmation"))
+        }
+        StateEffect::NotRestored => Told::new("state-not-restored", "the previous NMT state was not restored"),
     }
 }
 

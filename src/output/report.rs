@@ -31,6 +31,18 @@ pub enum Format {
     Csv,
 }
 
+impl Format {
+    /// Whether it is for people.
+    pub fn is_text(self) -> bool {
+        self == Format::Text
+    }
+
+    /// Whether it is JSON Lines.
+    pub fn is_json(self) -> bool {
+        self == Format::Json
+    }
+}
+
 /// One field of a report.
 #[derive(Clone, Copy, Debug)]
 pub struct Column {

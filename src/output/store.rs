@@ -1,23 +1,27 @@
 //! Reports of `store` and `restore`.
 
+use super::notes;
 use super::report::{Cell, Column, Report, rows_only};
-use crate::canopen::id::NodeId;
-use crate::tasks::store::Done;
+use crate::tasks::store::{Group, StoreReport};
 use std::io::{self, Write};
 
-/// What a node stored.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Stored(pub NodeId, pub Done);
+/// The result of `store`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stored(pub StoreReport);
 
-/// What a node restored.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Restored(pub NodeId, pub Done);
+/// The result of `restore`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Restored(pub StoreReport);
+
+const fn columns(groups: &'static str) -> [Column; 4] {
+    [Column::new("node").right(), Column::new(groups), Column::new("verified"), Column::new("notes").json_only()]
+}
 
 impl Report for Stored {
-    const COLUMNS: &'static [Column] = &[Column::new("node").right(), Column::new("stored"), Column::new("verified")];
+    const COLUMNS: &'static [Column] = &columns("stored");
 
     fn cells(&self) -> Vec<Cell> {
-        cells(self.0, &self.1)
+        cells(&self.0)
     }
 
     fn text(reports: &[Stored], out: &mut dyn Write) -> io::Result<()> {
@@ -26,10 +30,10 @@ impl Report for Stored {
 }
 
 impl Report for Restored {
-    const COLUMNS: &'static [Column] = &[Column::new("node").right(), Column::new("restored"), Column::new("verified")];
+    const COLUMNS: &'static [Column] = &columns("restored");
 
     fn cells(&self) -> Vec<Cell> {
-        cells(self.0, &self.1)
+        cells(&self.0)
     }
 
     fn text(reports: &[Restored], out: &mut dyn Write) -> io::Result<()> {
@@ -37,6 +41,7 @@ impl Report for Restored {
     }
 }
 
-fn cells(node: NodeId, done: &Done) -> Vec<Cell> {
-    vec![node.into(), done.groups().into(), done.verified.as_str().into()]
+fn cells(report: &StoreReport) -> Vec<Cell> {
+    let groups = Group::names(&report.groups);
+    vec![report.node.into(), groups.into(), report.verified.as_str().into(), notes::cell(&report.notes)]
 }

@@ -1,8 +1,7 @@
-//! Sets the zero of a measuring channel (CiA 404, 6125h): measures, checks, writes the signature once, measures
-//! again.
+//! Sets a measuring channel to zero (CiA 404, 6125h): measures, checks, writes the signature once, measures again.
 //!
-//! The checks go by the measuring range. A reading is taken for zero up to 1 % of it, offsets may add up to 5 %, and
-//! the readings may be 0.5 % apart; a limit that is named instead also bounds what offsets add up to.
+//! The limits are shares of the measuring range: a reading within 1 % is accepted, the total offset is limited to 5 %,
+//! and the readings may vary by 0.5 %. A limit that the user states also limits the total offset.
 
 mod channel;
 mod failure;
@@ -18,68 +17,66 @@ use crate::device::description::StoreGroup;
 use crate::device::unit::Unit;
 use crate::master::{Master, SdoFailure};
 use crate::measure::sample::Number;
-use crate::node::Node;
-use crate::node::Overrides;
 use crate::node::survey::survey_nodes;
-use crate::tasks::signature::{may_have_acted, sign};
-use crate::tasks::store::{self, Group, Plan};
-use crate::tasks::{Effect, Fact, Failure, Kind, Note};
+use crate::node::write::write;
+use crate::node::{Error as Cannot, Node, Overrides};
+use crate::tasks::store::{self, Group, StorePlan};
+use crate::tasks::{Effect, Failure, Kind, Note};
 use channel::{Channel, Offset};
 use safety::{Limits, Measured};
 use samples::Samples;
-use std::time::Duration;
 
-/// What is asked for.
+/// The options of an autozero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Which channel; `None` is the only one.
+    /// The channel; `None`: the only one.
     pub channel: Option<u8>,
-    /// What is still taken for zero.
+    /// The largest reading that is accepted as zero.
     pub limit: Limit,
-    /// How many readings there are before and after.
+    /// The number of readings before, and of those after.
     pub samples: u32,
-    /// Whether the zero is set whatever speaks against it.
+    /// Whether the safety checks are skipped.
     pub force: bool,
-    /// Whether it is stored.
+    /// Whether the zero is stored.
     pub store: bool,
     /// Whether nothing is changed.
     pub dry_run: bool,
 }
 
-/// What was done.
+/// The result of an autozero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Zeroed {
     /// The CiA 404 channel.
     pub channel: u8,
     /// Its name.
     pub signal: String,
-    /// The unit of all numbers, in ASCII; empty where the device tells none.
+    /// The unit of all numbers, in ASCII; empty if the device reports none.
     pub unit: String,
-    /// The mean before; `None` when a reading was invalid.
+    /// The mean before; `None` if a reading was invalid.
     pub before: Option<f64>,
-    /// The mean after; `None` when nothing was changed.
+    /// The mean after; `None` if nothing was changed.
     pub after: Option<f64>,
-    /// The offset before; `None` where none can be read.
+    /// The offset before; `None` if none can be read.
     pub offset_before: Option<Number>,
-    /// The offset after; `None` where none can be read, or nothing was changed.
+    /// The offset after; `None` if none can be read, or nothing was changed.
     pub offset: Option<Number>,
     /// Whether it was stored.
     pub stored: bool,
-    /// Digits behind the point that tell something of this range.
+    /// The significant decimals.
     pub decimals: usize,
     /// Notes: skipped checks, how to undo it, whether it is stored.
     pub notes: Vec<Note>,
 }
 
 impl Zeroed {
-    /// How far the zero was moved: the change of the offset, else of the reading.
+    /// The shift of the zero: the change of the offset, else of the reading.
     pub fn shift(&self) -> Option<f64> {
         let offsets = self.offset.zip(self.offset_before).map(|(new, old)| new.as_f64() - old.as_f64());
         offsets.or_else(|| Some(self.after? - self.before?))
     }
 }
 
-/// One procedure.
+/// An autozero in progress.
 struct Procedure<'a> {
     device: &'a Node,
     channel: Channel,
@@ -90,7 +87,7 @@ struct Procedure<'a> {
     group: Group,
 }
 
-/// What came of the signature.
+/// The result of the signature.
 struct Written {
     offsets: Vec<Offset>,
     after: Samples,
@@ -98,12 +95,11 @@ struct Written {
     is_offset_proof: Option<bool>,
 }
 
-/// Sets the zero of a channel, unless something speaks against it. With `store` the group that keeps the offset is
-/// stored.
+/// Sets a channel to zero if the safety checks allow it. With `store`, the group with the offset is stored.
 ///
 /// # Errors
-/// What speaks against it (nothing was changed), refusals, silence, a reading that is not zero afterwards, and what
-/// stops everything. Each says what was changed by then, so far as it is known.
+/// A safety check (nothing was changed); the device rejects a request or does not answer; a reading that is not zero
+/// afterwards; bus errors and Ctrl-C. The effects say what was changed before.
 pub fn autozero(
     master: &mut Master<'_>,
     node: NodeId,
@@ -137,7 +133,7 @@ pub fn autozero(
 }
 
 impl<'a> Procedure<'a> {
-    /// Reads everything that has to be known before.
+    /// Reads what the checks need.
     fn prepare(master: &mut Master<'_>, device: &'a Node, options: &Options) -> Result<Procedure<'a>, Failure> {
         let channel = channel::find(master, device, options.channel)?;
         let unit = channel.signal.unit;
@@ -153,7 +149,7 @@ impl<'a> Procedure<'a> {
         Ok(Procedure { device, channel, limits, decimals, offsets, before, group })
     }
 
-    /// What speaks against it: a failure, or with `force` notes.
+    /// Runs the safety checks: a failure, or notes with `force`.
     fn check(&self, options: &Options) -> Result<Vec<Note>, Failure> {
         let (node, channel) = (self.device.id, &self.channel);
         if self.before.booted {
@@ -186,20 +182,21 @@ impl<'a> Procedure<'a> {
         let unsure = |failure: Failure| {
             failure.with(node, sent.clone()).with(node, AutozeroEffect::OffsetBefore { offset, signal: signal() })
         };
-        let result = sign(master, device, channel.object, &channel.signature, Duration::ZERO);
-        let error = match result.map_err(|error| unsure(error.into()))? {
-            Ok(()) => None,
-            Err(error) if !may_have_acted(&error) => return Err(error.into()),
-            Err(error) if matches!(error.failure, SdoFailure::Cancelled) => return Err(unsure(error.into())),
-            Err(error) => Some(error),
+        let error = match write(master, device, channel.object, &channel.signature) {
+            Ok(_) => None,
+            Err(Cannot::Unknown(error)) if !matches!(error.failure, SdoFailure::Cancelled) => Some(error),
+            Err(error @ (Cannot::Unknown(_) | Cannot::Bus(_) | Cannot::Interrupted)) => {
+                return Err(unsure(error.into()));
+            }
+            Err(error) => return Err(error.into()),
         };
         let after = samples::take(master, device, &channel.signal.name, count).map_err(unsure)?;
-        // Last, so that a device that has restarted meanwhile shows the offset of before.
+        // Last: a device that restarted in between then shows the old offset.
         let offsets = channel::offsets(master, device, channel).map_err(unsure)?;
         let is_offset_proof = match error {
             None => None,
             Some(_) if self.moved(&offsets).is_some() => Some(true),
-            Some(_) if self.shows_it(&after) && self.is_zero(&after) => Some(false),
+            Some(_) if self.has_moved(&after) && self.is_zero(&after) => Some(false),
             Some(error) => {
                 let seen = AutozeroEffect::NoChangeSeen { offset: offset.map(|(object, _)| object), signal: signal() };
                 return Err(Failure::from(error).with(node, sent).with(node, seen));
@@ -208,14 +205,14 @@ impl<'a> Procedure<'a> {
         Ok(Written { offsets, after, is_offset_proof })
     }
 
-    /// The offset that is another one now, as it was and as it is.
+    /// The offset that has changed, before and after.
     fn moved<'b>(&'b self, now: &'b [Offset]) -> Option<(&'b Offset, &'b Offset)> {
         let pairs = self.offsets.iter().filter_map(|old| Some((old, now.iter().find(|new| new.object == old.object)?)));
         pairs.into_iter().find(|(old, new)| old.value != new.value)
     }
 
-    /// How far from zero a reading may be afterwards: as far as readings may be apart; where that is not known, half
-    /// as far as before.
+    /// The largest reading that is accepted as zero afterwards: the allowed variation of the readings; if that is
+    /// unknown, half of the reading before.
     fn tolerance(&self) -> f64 {
         let before = self.before.mean().unwrap_or(0.0).abs();
         self.limits.map_or(before / 2.0, |limits| limits.spread).max(self.before.spread())
@@ -225,15 +222,14 @@ impl<'a> Procedure<'a> {
         samples.mean().is_some_and(|mean| mean.abs() <= self.tolerance())
     }
 
-    /// Whether the reading shows that the signature acted: it has come nearer to zero than its unrest explains. Where
-    /// an offset is known to be moved, that alone counts.
-    fn shows_it(&self, after: &Samples) -> bool {
+    /// Whether the reading proves that the signature acted: it is nearer to zero by more than its variation. Not used
+    /// if the description names the object of the offset.
+    fn has_moved(&self, after: &Samples) -> bool {
         let means = self.before.mean().zip(after.mean()).filter(|_| !self.channel.is_described);
         means.is_some_and(|(before, after)| after.abs() + self.before.spread() < before.abs())
     }
 
-    /// Whether there was nothing to be moved: the reading was zero before, up to its unrest and the last digit of the
-    /// offset.
+    /// Whether the reading was zero before, within its variation and the last digit of the offset.
     fn was_zero(&self) -> bool {
         let digit = match self.offsets.first().map(|offset| offset.number) {
             Some(Number::Decimal { digits, .. }) => 10f64.powi(-i32::from(digits)),
@@ -251,7 +247,7 @@ impl<'a> Procedure<'a> {
         if written.after.booted {
             return fail(AutozeroFailure::RestartedAfter);
         }
-        let has_acted = self.moved(&written.offsets).is_some() || self.shows_it(&written.after) || self.was_zero();
+        let has_acted = self.moved(&written.offsets).is_some() || self.has_moved(&written.after) || self.was_zero();
         if has_acted && self.is_zero(&written.after) {
             return Ok(());
         }
@@ -264,12 +260,12 @@ impl<'a> Procedure<'a> {
         fail(AutozeroFailure::NotZero { signal: self.channel.signal.name.clone(), reading, has_acted, offset })
     }
 
-    /// Stores, if that was asked for, and looks whether what was stored is this zero: a device that restarts just
-    /// before stores the old one.
+    /// Stores the zero if requested, and checks that the stored offset is the new one: a device that restarts just
+    /// before the store keeps the old one.
     fn keep(
         &self,
         master: &mut Master<'_>,
-        plan: Option<Plan>,
+        plan: Option<StorePlan>,
         written: &Written,
         report: &mut Zeroed,
     ) -> Result<(), Failure> {
@@ -287,8 +283,8 @@ impl<'a> Procedure<'a> {
             return Err(Failure::at(node, AutozeroFailure::OtherOffsetStored));
         }
         report.stored = true;
-        report.notes.push(Note::of_node(node, AutozeroFact::Stored { groups: done.groups() }));
-        report.notes.extend(done.notes.into_iter().map(|text| Note::of_node(node, Fact::Text(text))));
+        report.notes.push(Note::of_node(node, AutozeroFact::Stored { groups: done.groups }));
+        report.notes.extend(done.notes);
         Ok(())
     }
 
@@ -332,7 +328,7 @@ impl<'a> Procedure<'a> {
     }
 }
 
-/// The group of settings that keeps the offset: the application's where the device has that by itself.
+/// The group of settings with the offset: the application settings, if the device can store them separately.
 fn group(master: &mut Master<'_>, device: &Node, channel: &Channel, stores: bool) -> Result<Group, Failure> {
     let described = device.model.iter().flat_map(|model| &model.description.objects);
     let entry = described
@@ -354,7 +350,7 @@ fn unit_text(unit: Option<Unit>) -> String {
     unit.map(|unit| unit.to_string()).unwrap_or_default()
 }
 
-/// Digits behind the point that tell something: a hundredth of a percent of the range, else those of the device.
+/// The significant decimals: 0.01 % of the measuring range, else the digits of the device.
 fn decimals(range: Option<f64>, digits: Option<u8>) -> usize {
     let steps = range.map(|range| range / 1e4).filter(|step| *step > 0.0);
     let needed = steps.and_then(|step| (0..=9).find(|&decimals| 10f64.powi(-decimals) <= step * 1.000_001));

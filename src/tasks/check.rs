@@ -64,11 +64,14 @@ impl CheckReport {
         }
     }
 
-    /// Whether a node satisfies an expression, and other nodes failed.
+    /// Whether a node satisfies its expressions, and other nodes have no data.
     pub fn is_partial(&self) -> bool {
-        let has_failed = |node: NodeId| self.failures.iter().any(|failure| failure.node == Some(node));
-        let mut satisfied = self.verdicts.iter().filter(|verdict| verdict.outcome == Outcome::Ok);
-        !self.failures.is_empty() && satisfied.any(|verdict| verdict.node.is_some_and(|node| !has_failed(node)))
+        let of = |outcome| self.verdicts.iter().filter(move |verdict| verdict.outcome == outcome);
+        let lacks_data = |node| {
+            of(Outcome::NoData).any(|verdict| verdict.node == Some(node))
+                || self.failures.iter().any(|failure| failure.node == Some(node))
+        };
+        of(Outcome::Ok).any(|verdict| verdict.node.is_some_and(|node| !lacks_data(node)))
     }
 
     /// The number of verdicts with this outcome.
@@ -316,9 +319,9 @@ impl<'a> Checker<'a> {
 }
 
 impl Observer for Checker<'_> {
-    fn failed(&mut self, failures: &[Failure]) -> Result<(), Failure> {
+    fn failed(&mut self, failures: &[Failure]) {
         self.failed = failures.iter().filter_map(|failure| failure.node).collect();
-        self.observer.failed(failures)
+        self.observer.failed(failures);
     }
 
     fn begin(&mut self, nodes: &[Node]) -> Result<(), Failure> {

@@ -92,19 +92,6 @@ pub enum Cause {
     Detect(detect::DetectFailure),
     /// A channel was not set to zero.
     Autozero(autozero::AutozeroFailure),
-    /// Text of a task that has no typed causes yet.
-    Text(Box<TextCause>),
-}
-
-/// A cause as text, until every task has typed causes.
-#[derive(Clone, Debug)]
-pub struct TextCause {
-    /// Which kind.
-    pub kind: Kind,
-    /// What happened, in one line, without the node in front.
-    pub message: String,
-    /// The code with which the device rejected the request.
-    pub abort: Option<AbortCode>,
 }
 
 impl Cause {
@@ -141,7 +128,6 @@ impl Cause {
             Cause::Lss(cause) => cause.kind(),
             Cause::Detect(cause) => cause.kind(),
             Cause::Autozero(cause) => cause.kind(),
-            Cause::Text(text) => text.kind,
         }
     }
 
@@ -154,7 +140,7 @@ impl Cause {
             },
             Cause::Autozero(cause) => cause.abort(),
             Cause::Pdo(cause) => cause.abort(),
-            Cause::Text(text) => text.abort,
+            Cause::Store(cause) => cause.abort(),
             _ => None,
         }
     }
@@ -240,68 +226,18 @@ impl PartialEq for Failure {
     }
 }
 
-/// What tasks without typed causes use. These functions disappear with [`Cause::Text`].
-impl Failure {
-    /// A failure that concerns no single node, as text.
-    pub fn new(kind: Kind, message: impl Into<String>) -> Failure {
-        Failure::general(Cause::Text(Box::new(TextCause { kind, message: message.into(), abort: None })))
-    }
-
-    /// A failure of one node, as text.
-    pub fn of_node(kind: Kind, node: NodeId, message: impl fmt::Display) -> Failure {
-        Failure { node: Some(node), ..Failure::new(kind, message.to_string()) }
-    }
-
-    /// The same failure with the device's reason, for a cause that is text.
-    #[must_use]
-    pub fn with_abort(mut self, code: Option<AbortCode>) -> Failure {
-        if let Cause::Text(text) = &mut self.cause {
-            text.abort = code;
-        }
-        self
-    }
-
-    /// The same failure with an effect as text.
-    #[must_use]
-    pub fn knowing(self, node: NodeId, known: impl fmt::Display) -> Failure {
-        self.with(node, Effect::Text(known.to_string()))
-    }
-
-    /// The same failure with an effect as text that concerns no single node.
-    #[must_use]
-    pub fn and(mut self, known: impl fmt::Display) -> Failure {
-        self.effects.push(Effect::Text(known.to_string()));
-        self
-    }
-
-    /// The same failure with a hint as text, which replaces the hint of the cause.
-    #[must_use]
-    pub fn hint(mut self, hint: impl Into<String>) -> Failure {
-        self.effects.push(Effect::Hint(hint.into()));
-        self
-    }
-}
-
 /// For logs and tests. People read the text of [`crate::output::failure`].
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let is_named = matches!(&self.cause, Cause::Text(text) if text.message.starts_with("node"));
-        if let Some(node) = self.node.filter(|_| !is_named) {
+        if let Some(node) = self.node {
             write!(f, "node {node}: ")?;
         }
         match &self.cause {
             Cause::Bus(error) => error.fmt(f),
             Cause::Sdo(error) => error.fmt(f),
             Cause::LssService(error) => error.fmt(f),
-            Cause::Text(text) => f.write_str(&text.message),
             cause => fmt::Debug::fmt(cause, f),
-        }?;
-        for effect in &self.effects {
-            if let Effect::Text(text) = effect {
-                write!(f, "; {text}")?;
-            }
         }
-        Ok(())
     }
 }
 

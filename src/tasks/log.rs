@@ -126,13 +126,9 @@ pub enum LogEvent {
 
 /// Takes samples and events. `Break` ends the recording.
 pub trait Observer {
-    /// Nodes whose setup could not be read, before [`Observer::begin`]. A passive recording does not call it.
-    ///
-    /// # Errors
-    /// The recording must not start. By default it does not start without each of the nodes.
-    fn failed(&mut self, failures: &[Failure]) -> Result<(), Failure> {
-        failures.first().map_or(Ok(()), |failure| Err(failure.clone()))
-    }
+    /// Nodes whose setup could not be read, before [`Observer::begin`]. The other nodes are recorded. A passive recording
+    /// does not call it.
+    fn failed(&mut self, _failures: &[Failure]) {}
 
     /// The nodes to be recorded, before anything is changed. A passive recording does not call it.
     ///
@@ -278,7 +274,7 @@ pub fn log(
     Ok(RecordingReport { failed, ..finish(recording, result)? })
 }
 
-/// Reads the setup of the nodes. Returns the nodes, and the failures of the others if the observer accepts them.
+/// Reads the setup of the nodes. Returns the nodes, and the failures of the others.
 fn survey(
     master: &mut Master<'_>,
     options: &LogOptions,
@@ -293,7 +289,7 @@ fn survey(
     }
     match failed.first() {
         Some(first) if nodes.is_empty() => return Err(first.clone()),
-        Some(_) => observer.failed(&failed)?,
+        Some(_) => observer.failed(&failed),
         None => {}
     }
     Ok((nodes, failed))

@@ -6,7 +6,6 @@ pub mod detect;
 pub mod diagnosis;
 pub mod failure;
 pub mod host;
-mod kept;
 pub mod log;
 pub mod lss;
 pub mod nmt;
@@ -17,7 +16,6 @@ pub mod restore;
 pub mod scan;
 pub mod sdo;
 pub mod settings;
-mod signature;
 pub mod store;
 
 pub use failure::{Failure, Kind};

@@ -6,7 +6,9 @@ use super::autozero::{AutozeroEffect, AutozeroFact};
 use super::lss::{LssEffect, LssFact};
 use super::pdo::{PdoEffect, PdoFact};
 use super::settings::{SettingsEffect, SettingsFact};
+use super::store::{StoreEffect, StoreFact};
 use crate::canopen::id::NodeId;
+use crate::canopen::nmt::NmtState;
 
 /// What a task that failed had changed before, or what state it left behind.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,10 +34,31 @@ pub enum Effect {
     Pdo(PdoEffect),
     /// A change of a setting failed.
     Settings(SettingsEffect),
-    /// Text of a task that has no typed effects yet.
-    Text(String),
-    /// The hint of a task that has no typed causes yet.
-    Hint(String),
+    /// The NMT state is not the previous state.
+    State(StateEffect),
+    /// A store or restore failed.
+    Store(StoreEffect),
+}
+
+/// The NMT state after a change, if it is not the previous state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StateEffect {
+    /// The previous state is unknown: the node stays in PRE-OPERATIONAL.
+    Unknown,
+    /// The node did not return to its previous state.
+    Differs {
+        /// The previous state.
+        before: NmtState,
+        /// The present state.
+        now: NmtState,
+    },
+    /// The node was set to its previous state, without confirmation.
+    Unconfirmed {
+        /// The previous state.
+        before: NmtState,
+    },
+    /// The command could not be sent.
+    NotRestored,
 }
 
 /// Something to report that is not the result.
@@ -64,8 +87,10 @@ pub enum Fact {
     Pdo(PdoFact),
     /// A setting was changed or shown.
     Settings(SettingsFact),
-    /// Text of a task that has no typed notes yet.
-    Text(String),
+    /// The NMT state is not the previous state.
+    State(StateEffect),
+    /// Settings were stored or restored.
+    Store(StoreFact),
     /// The state of the node before a reset is unknown; it is in the state in which it boots.
     StateAsBooted,
 }
@@ -77,12 +102,13 @@ impl Fact {
             Fact::Lss(fact) => fact.event.is_warning(),
             Fact::Pdo(fact) => fact.is_warning(),
             Fact::Settings(fact) => fact.is_warning(),
+            Fact::State(_) => true,
             Fact::KeptUntilPowerOff
             | Fact::OperationalAgain
             | Fact::LeftOperational
             | Fact::StateAsBooted
             | Fact::Autozero(_)
-            | Fact::Text(_) => false,
+            | Fact::Store(_) => false,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Reads measured values by SDO, once.
+//! Reads measured values by SDO.
 
 mod failure;
 
@@ -11,102 +11,113 @@ use crate::device::unit::Unit;
 use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
 use crate::measure::decode::{Reading, Wanted, source};
 use crate::measure::layout::Signal;
-use crate::measure::sample::{Sample, Source};
+use crate::measure::sample::{Number, Sample, Source};
 use crate::node::Node;
 use crate::node::Overrides;
 use crate::node::survey::survey_each;
-use crate::tasks::{Failure, Kind};
+use crate::tasks::Failure;
 
-/// One thing to be read of a node: how, and what it is.
+/// A value to read.
 #[derive(Clone, Debug)]
 pub struct Target {
-    /// What the sample is of.
+    /// The source of the samples.
     pub source: Source,
     /// The unit, for conversion.
     pub unit: Option<Unit>,
-    /// The object read.
+    /// The object.
     pub object: ObjectId,
-    /// 6150h, read along.
+    /// The status object (6150h), which is read as well.
     pub status: Option<ObjectId>,
     /// How the bytes become a sample.
     pub reading: Reading,
 }
 
-/// The targets of an instrument: what was asked for, or every signal.
+impl Target {
+    /// A value in another unit.
+    ///
+    /// # Errors
+    /// The units do not convert.
+    pub fn convert(&self, value: Option<Number>, to: Unit) -> Result<Option<f64>, Failure> {
+        let fail = || {
+            let signal = self.source.signal.to_string();
+            Failure::at(self.source.node, ReadFailure::NotConvertible { signal, from: self.unit, to })
+        };
+        let from = self.unit.ok_or_else(fail)?;
+        value.map(|value| from.convert(value.as_f64(), to).ok_or_else(fail)).transpose()
+    }
+}
+
+/// The targets of a node: the requested ones, or every signal.
 ///
 /// # Errors
-/// A signal that the device does not have, with the ones it has.
-pub fn targets(instrument: &Node, wanted: &[Wanted], number: &mut usize) -> Result<Vec<Target>, Failure> {
-    let all: Vec<Wanted> = instrument.signals.iter().map(|signal| Wanted::Signal(signal.name.clone())).collect();
+/// The device does not have a signal or status.
+pub fn targets(node: &Node, wanted: &[Wanted], number: &mut usize) -> Result<Vec<Target>, Failure> {
+    let all: Vec<Wanted> = node.signals.iter().map(|signal| Wanted::Signal(signal.name.clone())).collect();
     let wanted = if wanted.is_empty() { &all } else { wanted };
     if wanted.is_empty() {
-        return Err(Failure::of_node(Kind::Unexpected, instrument.id, "it has no measured value of CiA 404")
-            .hint(format!("read an object as it is: cangauge sdo read {} 0x1000", instrument.id)));
+        return Err(Failure::at(node.id, ReadFailure::NoMeasuredValue));
     }
-    let mut take = || {
+    let mut next_number = || {
         *number += 1;
         *number - 1
     };
     wanted
         .iter()
-        .map(|item| instrument.wanted(item))
+        .map(|item| node.wanted(item))
         .map(|item| {
             Ok(match &item {
                 Wanted::Signal(name) => {
-                    let signal = find(instrument, name)?;
+                    let signal = find(node, name)?;
                     let (object, data_type) = signal.value;
                     Target {
-                        source: source(instrument.id, name, Some(signal)),
+                        source: source(node.id, name, Some(signal)),
                         unit: signal.unit,
                         object,
                         status: signal.status,
-                        reading: Reading::of_signal(signal, data_type, take()),
+                        reading: Reading::of_signal(signal, data_type, next_number()),
                     }
                 }
                 Wanted::Status(name) => {
-                    let object = find(instrument, name)?.status.ok_or_else(|| {
-                        Failure::of_node(Kind::Usage, instrument.id, format!("{name} has no status object"))
-                    })?;
-                    plain(instrument, object, &format!("{name}.status"), take())
+                    let no_status = || Failure::at(node.id, ReadFailure::NoStatus { signal: name.clone() });
+                    let object = find(node, name)?.status.ok_or_else(no_status)?;
+                    plain(node, object, &format!("{name}.status"), next_number())
                 }
                 Wanted::Object(object, Some(stated)) => {
-                    typed(instrument, *object, &item.name(), Reading::plain(Some(*stated), take()))
+                    typed(node, *object, &item.name(), Reading::plain(Some(*stated), next_number()))
                 }
-                Wanted::Object(object, None) => plain(instrument, *object, &item.name(), take()),
+                Wanted::Object(object, None) => plain(node, *object, &item.name(), next_number()),
             })
         })
         .collect()
 }
 
-/// The target for an object by its address.
-fn plain(instrument: &Node, object: ObjectId, name: &str, number: usize) -> Target {
-    let layout = instrument.layout();
+/// The target for an object.
+fn plain(node: &Node, object: ObjectId, name: &str, number: usize) -> Target {
+    let layout = node.layout();
     let reading = Reading::of_object(layout, object, layout.data_type(object), number);
     let signal = layout.signal_of(object).filter(|signal| !signal.is_value(object));
     Target {
-        source: source(instrument.id, name, signal),
+        source: source(node.id, name, signal),
         unit: signal.and_then(|signal| signal.unit),
-        ..typed(instrument, object, name, reading)
+        ..typed(node, object, name, reading)
     }
 }
 
-fn typed(instrument: &Node, object: ObjectId, name: &str, reading: Reading) -> Target {
-    Target { source: source(instrument.id, name, None), unit: None, object, status: None, reading }
+fn typed(node: &Node, object: ObjectId, name: &str, reading: Reading) -> Target {
+    Target { source: source(node.id, name, None), unit: None, object, status: None, reading }
 }
 
-pub(super) fn find<'a>(instrument: &'a Node, name: &str) -> Result<&'a Signal, Failure> {
-    instrument.signals.iter().find(|signal| signal.name == name).ok_or_else(|| {
-        let names: Vec<&str> = instrument.signals.iter().map(|signal| signal.name.as_str()).collect();
-        let message = format!("it has no signal \"{name}\"");
-        let failure = Failure::of_node(Kind::Usage, instrument.id, message);
-        if names.is_empty() { failure } else { failure.hint(format!("it has: {}", names.join(", "))) }
+pub(super) fn find<'a>(node: &'a Node, name: &str) -> Result<&'a Signal, Failure> {
+    node.signals.iter().find(|signal| signal.name == name).ok_or_else(|| {
+        let available = node.signals.iter().map(|signal| signal.name.clone()).collect();
+        Failure::at(node.id, ReadFailure::NoSignal { name: name.to_owned(), available })
     })
 }
 
-/// A sample out of the answers to a target's reads.
+/// The sample of a target from the answers to its [`requests`].
 ///
 /// # Errors
-/// The value's own failure. A status that the device refuses is a device without status.
+/// The value could not be read. If the device rejects the status object, it has no status.
 pub fn sample(
     target: &Target,
     value: Result<Answer, SdoError>,
@@ -121,7 +132,7 @@ pub fn sample(
         failure: SdoFailure::NotANumber,
     };
     let Some(data_type) = target.reading.data_type() else {
-        // Bytes without a stated type stay bytes.
+        // Bytes without a known type stay bytes.
         let bytes = answer.uploaded.as_ref().map(|uploaded| uploaded.bytes.as_slice()).unwrap_or_default();
         let sample = target.reading.sample(answer.at, bytes, None).filter(|_| bytes.len() <= 8);
         return sample.ok_or_else(not_a_number);
@@ -139,7 +150,7 @@ pub fn sample(
     target.reading.sample(answer.at, &bytes, bits).ok_or_else(not_a_number)
 }
 
-/// The value's bytes in the width of its type: an answer may have had more or fewer.
+/// The bytes of a value in the width of its type. The answer may have more or fewer.
 fn wire_bytes(value: &Value, data_type: DataType) -> Vec<u8> {
     let width = data_type.width().unwrap_or(8).min(8);
     match value {
@@ -152,20 +163,19 @@ fn wire_bytes(value: &Value, data_type: DataType) -> Vec<u8> {
     }
 }
 
-/// The requests for a target: its value, and its status.
+/// The requests for a target: value and status.
 pub fn requests(target: &Target) -> Vec<Request> {
     let objects = [Some(target.object), target.status];
     objects.into_iter().flatten().map(|object| Request::read(target.source.node, object)).collect()
 }
 
-/// What was read of one node.
+/// The values of one node.
 pub type Readings = Vec<(Target, Sample)>;
 
-/// Reads measured values of several nodes, side by side. One result a node: its targets with their
-/// samples, or why there is none.
+/// Reads measured values of several nodes in parallel. Each node has its own result.
 ///
 /// # Errors
-/// What stops everything.
+/// Bus errors and Ctrl-C.
 pub fn read(
     master: &mut Master<'_>,
     nodes: &[NodeId],
@@ -180,8 +190,8 @@ pub fn read(
     Ok(planned.into_iter().map(|targets| readings(targets?, &mut answers)).collect())
 }
 
-/// The samples of one node's targets, out of the answers to [`requests`]. All of its answers are taken,
-/// whatever the first ones are: the next node's come behind them.
+/// The samples of one node from the answers to its [`requests`]. Takes all answers of the node, even if the first is an
+/// error: the answers of the next node follow.
 fn readings(
     targets: Vec<Target>,
     answers: &mut dyn Iterator<Item = Result<Answer, SdoError>>,

@@ -187,7 +187,7 @@ fn missing_data_is_no_success() {
         "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: list the nodes that answer: cangauge scan\n"
     );
     // A failed check has priority over missing data.
-    check(&bench, &["5,9", "pressure < 3"]).exit(3);
+    check(&bench, &["5,9", "pressure < 3"]).exit(7);
     let done = check(&bench, &["5,9", "pressure < 1", "|5.pressure - 9.pressure| < 1"]).exit(1);
     let words: Vec<&str> = done.stdout.lines().map(|line| &line[..6]).collect();
     assert_eq!(words, ["FAIL  ", "none  ", "none  "], "{}", done.stdout);
@@ -312,7 +312,7 @@ fn a_replayed_recording_is_checked_completely() {
     assert_eq!(done.stdout.lines().count(), 4);
     replay(&["all", "pressure < 2 bar"]).exit(1);
     // A named node that is not in the recording is no success.
-    let done = replay(&["5,9", "pressure < 2 bar"]).exit(3);
+    let done = replay(&["5,9", "pressure < 2 bar"]).exit(7);
     assert!(
         done.stdout.contains("none  9  pressure < 2 bar  no data: node 9 sent none of its signals\n"),
         "{}",

@@ -1,44 +1,72 @@
-//! `all` never loses a node: node 5 answers 1000h and nothing else.
+//! Commands for several nodes never lose one. Node 1 works, node 5 answers 1000h and nothing else, node 9 is absent.
 
-use super::{Bench, Done};
+use super::Bench;
 
 const BENCH: &str = "[[device]]\nkind = \"mh4\"\nnode = 1\n\
                      [[device]]\nkind = \"mh4\"\nnode = 5\nanswers_only = [\"0x1000\"]\n";
 
-/// Runs a command with `all`: node 1 succeeds, node 5 is named, the exit code is 7.
-#[track_caller]
-fn names_node_5(line: &str) -> Done {
-    names_node_5_in(Bench::described(BENCH).run(line))
-}
+/// Every command for several nodes, as words separated by `;`.
+const COMMANDS: &[&str] = &[
+    "read;NODES;pressure",
+    "store;NODES",
+    "restore;NODES",
+    "check;NODES;pressure < 1000 bar",
+    "check;NODES;pressure < 1000 bar;--for;300ms;--sync;50ms",
+    "log;NODES;--sync;100ms;--count;3",
+    "log;NODES;--poll;100ms;--count;3",
+    "nmt;state;NODES",
+    "nmt;start;NODES",
+    "nmt;preop;NODES",
+    "autozero;NODES;--limit;1000bar;--force;--dry-run",
+];
 
 #[track_caller]
-fn names_node_5_in(done: Done) -> Done {
-    assert_eq!(done.code, Some(7), "{}{}", done.stdout, done.stderr);
-    assert!(done.stderr.contains("cangauge: node 5: "), "{}", done.stderr);
-    done
+fn names(failed: &[u8], nodes: &str, command: &str) {
+    let command = command.replace("NODES", nodes);
+    let done = Bench::described(BENCH).run_words(&command.split(';').collect::<Vec<_>>());
+    assert_eq!(done.code, Some(7), "{command}: {}{}", done.stdout, done.stderr);
+    for node in failed {
+        assert!(done.stderr.contains(&format!("cangauge: node {node}: ")), "{command}: {}", done.stderr);
+    }
+    assert!(!done.stderr.contains("cangauge: node 1: "), "{command}: {}", done.stderr);
+    assert!(done.stdout.contains('1'), "{command}: the result of node 1: {}", done.stdout);
 }
 
 #[test]
-fn read_all_names_a_node_that_answers_in_part() {
-    assert!(names_node_5("read all pressure").stdout.starts_with('1'));
+fn all_names_the_node_that_answers_in_part() {
+    COMMANDS.iter().for_each(|command| names(&[5], "all", command));
 }
 
 #[test]
-fn store_all_names_a_node_that_answers_in_part() {
-    names_node_5("store all");
+fn named_nodes_are_named_if_they_fail() {
+    COMMANDS.iter().for_each(|command| names(&[5, 9], "1,5,9", command));
+}
+
+/// Node 1 sends a TPDO, so that there is something to receive.
+const SENDING: &str = "[[device]]\nkind = \"mh4\"\nnode = 1\nstart = true\n\
+                       set = { \"0x1800:2\" = 254, \"0x1800:5\" = 100 }\n\
+                       [[device]]\nkind = \"mh4\"\nnode = 5\nanswers_only = [\"0x1000\"]\n";
+
+#[test]
+fn pdo_watch_shows_the_others_and_names_the_node_that_fails() {
+    for (nodes, failed) in [("all", &[5][..]), ("1,5,9", &[5, 9])] {
+        let done = Bench::described(SENDING).run(&format!("pdo watch {nodes} --duration 1s")).exit(7);
+        assert!(done.stdout.contains("pressure"), "{}{}", done.stdout, done.stderr);
+        for node in failed {
+            assert!(done.stderr.contains(&format!("cangauge: node {node}: ")), "{}", done.stderr);
+        }
+    }
+    // Nothing received from node 1, and node 9 is absent: both failed alike.
+    let done = Bench::described(BENCH).run("pdo watch 1,9 --duration 1s").exit(3);
+    assert!(done.stderr.contains("no TPDO"), "{}", done.stderr);
 }
 
 #[test]
-fn restore_all_names_a_node_that_answers_in_part() {
-    names_node_5("restore all");
-}
-
-#[test]
-fn check_all_names_a_node_that_answers_in_part() {
-    let words = ["check", "all", "pressure < 1000 bar", "--for", "300ms", "--sync", "50ms"];
-    for length in [3, words.len()] {
-        let done = names_node_5_in(Bench::described(BENCH).run_words(&words[..length]));
-        assert!(done.stdout.contains("ok    1  pressure < 1000 bar"), "{}", done.stdout);
+fn one_node_that_fails_alone_keeps_its_own_exit_code() {
+    for command in COMMANDS.iter().filter(|command| !command.starts_with("nmt")) {
+        let command = command.replace("NODES", "9");
+        let done = Bench::described(BENCH).run_words(&command.split(';').collect::<Vec<_>>());
+        assert_eq!(done.code, Some(3), "{command}: {}{}", done.stdout, done.stderr);
     }
 }
 
@@ -50,36 +78,8 @@ fn failed_expression_decides_over_a_node_that_answers_in_part() {
 }
 
 #[test]
-fn log_all_names_a_node_that_answers_in_part() {
-    let done = names_node_5("log all --sync 100ms --count 3");
-    assert_eq!(done.stdout.lines().count(), 4, "the heading and three values of node 1: {}", done.stdout);
-}
-
-#[test]
-fn nmt_state_all_names_a_node_that_answers_in_part() {
-    let done = names_node_5("nmt state all");
-    assert!(done.stdout.contains('1'), "{}", done.stdout);
-}
-
-#[test]
-fn nmt_start_all_names_a_node_that_answers_in_part() {
-    names_node_5("nmt start all");
-}
-
-#[test]
-fn pdo_watch_all_names_a_node_that_answers_in_part() {
-    let done = Bench::described(BENCH).run("pdo watch all --duration 1s");
-    assert_ne!(done.code, Some(0), "{}{}", done.stdout, done.stderr);
-    assert!(done.stderr.contains("node 5"), "{}", done.stderr);
-}
-
-#[test]
-fn autozero_all_names_a_node_that_answers_in_part() {
-    names_node_5("autozero all --limit 1000bar --force --dry-run");
-}
-
-#[test]
 fn scan_lists_a_node_that_answers_in_part() {
-    let done = names_node_5("scan");
+    let done = Bench::described(BENCH).run("scan").exit(7);
     assert!(done.stdout.lines().any(|line| line.trim_start().starts_with("5 ")), "{}", done.stdout);
+    assert!(done.stderr.contains("cangauge: node 5: "), "{}", done.stderr);
 }

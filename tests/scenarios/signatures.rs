@@ -13,7 +13,7 @@ use cangauge::sim::{Bench, Device, State};
 use cangauge::tasks::Fact;
 use cangauge::tasks::autozero::AutozeroFact;
 use cangauge::tasks::autozero::{Limit, Options, Zeroed, autozero};
-use cangauge::tasks::store::{self, Done, Group, Verified};
+use cangauge::tasks::store::{self, Group, StoreReport, Verified};
 use cangauge::tasks::{Failure, Kind, restore};
 use std::path::Path;
 use std::time::Duration;
@@ -242,7 +242,7 @@ fn zero_reported_as_stored_survives_a_reset() {
 /// OPERATIONAL with a heartbeat. The unit differs from the stored one.
 const RUNS: &str = "start = true\nset = { \"0x1017\" = 100, \"0x6131:1\" = 0xAB0000 }\n";
 
-fn save(bus: &mut FaultyBus, verify: bool) -> Result<Done, Failure> {
+fn save(bus: &mut FaultyBus, verify: bool) -> Result<StoreReport, Failure> {
     with(bus, |master| {
         let device = store::device(master, node(), &Default::default())?;
         store::store(master, &device, Group::All, verify)
@@ -285,7 +285,7 @@ fn settings_reported_as_stored_survive_a_reset() {
                     assert!(bus.look("0x6132:1") == [1] || restarts, "{place}");
                 }
                 Err(failure) => {
-                    let told = ["whether it was stored is not known", "is not proven"];
+                    let told = ["it is unknown whether the settings were stored", "it is not verified"];
                     let told = told.iter().any(|told| ErrorMessage::of(&failure).message.contains(told));
                     assert_eq!(told, bus.count("73617665") == 1, "{place}");
                 }
@@ -294,7 +294,7 @@ fn settings_reported_as_stored_survive_a_reset() {
     }
 }
 
-fn load(bus: &mut FaultyBus) -> Result<Done, Failure> {
+fn load(bus: &mut FaultyBus) -> Result<StoreReport, Failure> {
     with(bus, |master| {
         let device = store::device(master, node(), &Default::default())?;
         restore::restore(master, &device, Group::All, true)
@@ -308,7 +308,7 @@ fn acknowledged_signature_without_effect_is_detected() {
     let at = bus.sent.iter().position(|frame| frame.ends_with("6C6F6164")).expect("\"load\"");
     let failure = load(&mut FaultyBus::of("mh4", RUNS, Some((at, Fault::Pretend)))).expect_err("nothing was restored");
     assert_eq!(failure.kind(), Kind::Unexpected);
-    assert!(ErrorMessage::of(&failure).message.contains("restored and reset, but not as delivered"), "{failure}");
+    assert!(ErrorMessage::of(&failure).message.contains("restored and reset, but not at the defaults"), "{failure}");
     let mut bus = FaultyBus::of("mh4", STILL, None);
     zero(&mut bus, false).expect("zero");
     let at = bus.sent.iter().position(|frame| frame.ends_with("7A65726F")).expect("\"zero\"");
@@ -335,7 +335,7 @@ fn values_reported_as_restored_are_factory_defaults() {
                 assert_eq!(bus.look("0x1017"), [0, 0], "{place}");
             }
             Err(failure) => {
-                let told = ["the defaults is not known", "in force is not proven"];
+                let told = ["whether the next reset sets the defaults", "it is not verified"];
                 let told = told.iter().any(|told| ErrorMessage::of(&failure).message.contains(told));
                 assert_eq!(told, bus.count("6C6F6164") == 1, "{place}");
             }

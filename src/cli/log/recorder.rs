@@ -6,6 +6,7 @@ use crate::bus::{Mono, Stamp};
 use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
 use crate::output::events::{EventText, Events, Weight, event_text};
+use crate::output::failure::ErrorMessage;
 use crate::output::progress::Progress;
 use crate::output::rows::Rows;
 use crate::tasks::Failure;
@@ -35,8 +36,6 @@ pub(super) struct Recorder {
     file: String,
     /// The nodes that no other cangauge may use until the recording runs.
     pub(super) claims: Option<Claims>,
-    /// The user typed `all`: a node that fails does not stop the recording of the others.
-    pub(super) is_all: bool,
     start: Option<Mono>,
     checked: Option<Mono>,
     lost: u64,
@@ -59,7 +58,6 @@ impl Recorder {
             console,
             error: None,
             claims: None,
-            is_all: false,
             file,
             start: None,
             checked: None,
@@ -130,8 +128,10 @@ impl Recorder {
 }
 
 impl Observer for Recorder {
-    fn failed(&mut self, failures: &[Failure]) -> Result<(), Failure> {
-        failures.first().filter(|_| !self.is_all).map_or(Ok(()), |failure| Err(failure.clone()))
+    fn failed(&mut self, failures: &[Failure]) {
+        for failure in failures {
+            self.console.warn(&format!("{}: the node is not recorded", ErrorMessage::of(failure).message));
+        }
     }
 
     fn sources(&mut self, sources: &[Source]) -> Result<(), Failure> {

@@ -5,6 +5,7 @@ use crate::canopen::id::NodeId;
 use crate::output::notes::Told;
 use crate::tasks::Failure;
 use crate::tasks::autozero::{AutozeroEffect, AutozeroFact, AutozeroFailure, Objection, OffsetChange, Quantity, Undo};
+use crate::tasks::store::Group;
 
 /// The message and the hint for a cause.
 pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
@@ -21,7 +22,6 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
         }
         AutozeroFailure::WhichChannel { available } => Words::new("the device has several channels: choose one")
             .hint(format!("--channel with one of {}", list(available))),
-        AutozeroFailure::NoMeasuredValue => Words::new("it has no measured value of CiA 404"),
         AutozeroFailure::NoMeasuredValueOnChannel { channel } => {
             Words::new(format!("it has no measured value on channel {channel}"))
         }
@@ -167,7 +167,7 @@ pub(in crate::output) fn fact(node: Option<NodeId>, fact: &AutozeroFact) -> Told
         AutozeroFact::Undo(undo) => undo_text(&node, undo),
         AutozeroFact::NotStored { group } => Told::new("not-stored", "not stored: lost at power off")
             .command("store it", format!("cangauge store {node} --group {}", group.as_str())),
-        AutozeroFact::Stored { groups } => Told::new("stored", format!("stored: {groups}")),
+        AutozeroFact::Stored { groups } => Told::new("stored", format!("stored: {}", Group::names(groups))),
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{Place, Words};
 use crate::bus::replay::{FileFormat, RecordingError};
 use crate::canopen::lss::Service;
-use crate::tasks::failure::{BusError, ExpressionError, LssError, SdoError, SdoFailure};
+use crate::tasks::failure::{BusError, ExpressionError, LssError, Operation, SdoError, SdoFailure};
 use std::path::Path;
 
 /// The bus failed.
@@ -21,6 +21,7 @@ pub(super) fn bus(error: &BusError) -> Words {
             words.hint("list the interfaces: cangauge bus list; without hardware: --bus sim")
         }
         BusError::ReceiveOnly(_) => words.hint("commands that only listen work on it: log, scan --passive, nmt watch"),
+        BusError::InUse(_) => words.hint("wait until it ends, or end it; to work beside it, add --ignore-lock"),
         BusError::Recording { file, error, .. } => match recording_hint(file, error) {
             Some(hint) => words.hint(hint),
             None => words,
@@ -66,6 +67,15 @@ pub(super) fn sdo(error: &SdoError) -> Words {
         SdoFailure::NoAnswer { started: false, .. } => words.hint("list the nodes that answer: cangauge scan"),
         SdoFailure::Fit(_) => {
             words.hint(format!("show its bytes: cangauge sdo read {} {} --type hex", error.node, error.object))
+        }
+        SdoFailure::Refused(code) if error.operation == Operation::Write && error.object.index == 0x1010 => {
+            match code.0 {
+                0x0606_0000 => words.hint("its non-volatile memory fails: it may be worn out"),
+                0x0800_0021 | 0x0800_0022 => {
+                    words.hint(format!("leave OPERATIONAL first: cangauge nmt preop {}", error.node))
+                }
+                _ => words,
+            }
         }
         SdoFailure::Disturbed => words.hint("stop the other program for a moment, or try again"),
         SdoFailure::NoAnswer { .. }

@@ -16,13 +16,13 @@ pub(super) mod pdo;
 mod read;
 mod scan;
 pub(super) mod settings;
-mod store;
+pub(super) mod store;
 
 use super::json;
 use super::notes::{Told, effect};
 use crate::canopen::id::NodeId;
-use crate::tasks::failure::Cause;
-use crate::tasks::{Effect, Failure, Kind};
+use crate::tasks::failure::{BusError, Cause};
+use crate::tasks::{Failure, Kind};
 use serde::Serialize;
 use std::fmt;
 use std::io::{self, Write};
@@ -183,18 +183,15 @@ impl From<&Failure> for ErrorMessage {
         let mut hint = words.hint;
         let mut effects = Vec::new();
         for item in &failure.effects {
-            if let Effect::Hint(text) = item {
-                hint = Some(text.clone());
-                continue;
-            }
             let told = effect(failure.node, item);
             message = format!("{message}; {}", told.message);
             // A command that undoes an effect or finishes the job is better than the general hint of the cause.
             hint = told.hint().or(hint);
             effects.push(told);
         }
-        // Text of tasks without typed causes may already begin with its node.
-        if let Some(node) = failure.node.filter(|_| !message.starts_with("node")) {
+        // "node 5 is in use by …" names the node itself.
+        let is_named = matches!(&failure.cause, Cause::Bus(error) if matches!(**error, BusError::InUse(_)));
+        if let Some(node) = failure.node.filter(|_| !is_named) {
             message = format!("node {node}: {message}");
         }
         ErrorMessage {
@@ -230,6 +227,5 @@ fn words(failure: &Failure) -> Words {
         Cause::Lss(cause) => lss::words(failure, cause),
         Cause::Detect(cause) => detect::words(cause),
         Cause::Autozero(cause) => autozero::words(failure, cause),
-        Cause::Text(text) => Words::new(text.message.clone()),
     }
 }

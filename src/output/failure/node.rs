@@ -41,7 +41,7 @@ pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
 }
 
 /// A value; bytes in wire order.
-fn shown(value: &Value) -> String {
+pub(super) fn shown(value: &Value) -> String {
     match value {
         Value::Bytes(bytes) => text::wire_bytes(bytes),
         value => value.to_string(),

@@ -6,8 +6,9 @@ use crate::canopen::pdo::{MappingEntry, Transmission};
 use crate::output::notes::Told;
 use crate::tasks::Failure;
 use crate::tasks::pdo::{
-    Incomplete, Occupant, Parameter, PdoEffect, PdoFact, PdoFailure, Settings, StateEffect, StepError, StepWrite,
+    Incomplete, Occupant, Parameter, PdoEffect, PdoFact, PdoFailure, Settings, StepError, StepWrite,
 };
+use crate::tasks::store::Group;
 
 /// The largest number of entries in a list of objects that can be mapped.
 const MAX_LISTED: usize = 16;
@@ -54,7 +55,6 @@ pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> Words {
             let length = if bits % 8 == 0 { format!("{} bytes", bits / 8) } else { format!("{bits} bits") };
             Words::new(format!("the mapping has {length}; a PDO has at most 8 bytes"))
         }
-        PdoFailure::NoStatus { signal } => Words::new(format!("{signal} has no status object")),
         PdoFailure::UnknownName { name, nearest, signals } => {
             let words = Words::new(format!("it has no object or signal \"{name}\""));
             match (nearest.as_slice(), signals.as_slice()) {
@@ -147,7 +147,6 @@ pub(in crate::output) fn effect(node: &str, effect: &PdoEffect) -> Told {
     match effect {
         PdoEffect::Restored { number } => Told::new("restored", format!("{number} has its old mapping and parameters")),
         PdoEffect::Incomplete(incomplete) => incomplete_text(node, incomplete),
-        PdoEffect::State(state) => state_text(node, *state),
         PdoEffect::SetNotStored { number } => {
             Told::new("set-not-stored", format!("{number} has the requested settings, but they are lost at power off"))
         }
@@ -169,34 +168,13 @@ fn incomplete_text(node: &str, incomplete: &Incomplete) -> Told {
     Told::new("incomplete", message).command("when it answers again", command)
 }
 
-fn state_text(node: &str, state: StateEffect) -> Told {
-    match state {
-        StateEffect::Unknown => Told::new(
-            "left-pre-operational",
-            "the node was set to PRE-OPERATIONAL; its previous state is unknown, so it stays there",
-        )
-        .command("start it", format!("cangauge nmt start {node}")),
-        StateEffect::Differs { before, now } => {
-            Told::new("state-differs", format!("the node was {before} before and is {now} now"))
-                .command("show its state", format!("cangauge nmt state {node}"))
-        }
-        StateEffect::Unconfirmed { before } => {
-            Told::new("state-unconfirmed", format!("the node was set to {before} again, without confirmation"))
-        }
-        StateEffect::NotRestored => Told::new("state-not-restored", "the previous NMT state was not restored"),
-    }
-}
-
 /// The text for a note.
-pub(in crate::output) fn fact(node: Option<NodeId>, fact: &PdoFact) -> Told {
+pub(in crate::output) fn fact(fact: &PdoFact) -> Told {
     match fact {
         PdoFact::AlreadySet { number } => {
             Told::new("already-set", format!("{number} has these settings already: nothing was written"))
         }
-        PdoFact::Stored { groups } => {
-            let groups = groups.iter().map(|group| group.as_str()).collect::<Vec<_>>().join("+");
-            Told::new("stored", format!("stored ({groups}), acknowledged"))
-        }
+        PdoFact::Stored { groups } => Told::new("stored", format!("stored ({}), acknowledged", Group::names(groups))),
         PdoFact::MaybeNotMappable { object } => {
             Told::new("maybe-not-mappable", format!("{object} cannot be mapped according to the description"))
         }
@@ -207,7 +185,6 @@ pub(in crate::output) fn fact(node: Option<NodeId>, fact: &PdoFact) -> Told {
             let step = step(error, write.as_ref());
             Told::new("set-despite", format!("{step}; {number} has the requested settings all the same"))
         }
-        PdoFact::State(state) => state_text(&node.map_or_else(|| "NODE".to_owned(), |node| node.to_string()), *state),
         PdoFact::Off { number } => {
             Told::new("off", format!("{number} is off: map signals or set --cob-id to switch it on"))
         }

@@ -10,7 +10,6 @@ use crate::tasks::settings::{QuantityError, SettingsEffect, SettingsFact, Settin
 /// The message and the hint for a cause.
 pub(super) fn words(_failure: &Failure, cause: &SettingsFailure) -> Words {
     match cause {
-        SettingsFailure::NoMeasuredValue => Words::new("it has no measured value of CiA 404"),
         SettingsFailure::WhichSignal { available } => {
             Words::new(format!("name a signal (it has: {})", available.join(", ")))
         }

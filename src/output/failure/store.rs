@@ -1,10 +1,161 @@
-//! Text for causes: settings were not stored or restored.
+//! Text for causes, effects and notes of `store` and `restore`.
 
 use super::Words;
+use super::node::shown;
+use crate::canopen::id::NodeId;
+use crate::output::notes::Told;
 use crate::tasks::Failure;
-use crate::tasks::store::StoreFailure;
+use crate::tasks::store::{Difference, Group, Snapshot, StoreEffect, StoreFact, StoreFailure, Verb};
 
 /// The message and the hint for a cause.
-pub(super) fn words(_failure: &Failure, cause: &StoreFailure) -> Words {
-    match *cause {}
+pub(super) fn words(failure: &Failure, cause: &StoreFailure) -> Words {
+    let object = failure.object.map(|object| object.to_string()).unwrap_or_default();
+    match cause {
+        StoreFailure::NotOnCommand { verb: Verb::Store, bits } if bits & 2 != 0 => Words::new(format!(
+            "the device stores automatically, not on command ({object} reads 0x{bits:08X}): nothing was stored"
+        )),
+        StoreFailure::NotOnCommand { verb, bits } => Words::new(format!(
+            "the device does not {} on command ({object} reads 0x{bits:08X}): nothing was {}",
+            name(*verb),
+            done(*verb)
+        )),
+        StoreFailure::NoGroup { verb, group: Group::All, .. } => {
+            Words::new(format!("the device cannot {} (no {object}): nothing was {}", name(*verb), done(*verb)))
+        }
+        StoreFailure::NoGroup { verb, group, .. } => {
+            let words = Words::new(format!(
+                "the device cannot {} group {} (no {object}): nothing was {}",
+                name(*verb),
+                group.as_str(),
+                done(*verb)
+            ));
+            match failure.node {
+                Some(node) => words.hint(format!("{} everything: cangauge {0} {node}", name(*verb))),
+                None => words,
+            }
+        }
+        StoreFailure::CapabilityUnreadable { verb, code } => {
+            let (name, done) = (name(*verb), done(*verb));
+            Words::new(format!(
+                "it is unknown whether the device can {name} ({object} cannot be read: {code}): nothing was {done}"
+            ))
+        }
+        StoreFailure::NotKept(changed) => {
+            let change = |change: &Difference| {
+                let now = change.found.as_ref().map_or_else(|| "not readable".to_owned(), |now| shown(&now.value()));
+                format!("{} was {} and is {now}", label(&change.expected), shown(&change.expected.value()))
+            };
+            Words::new(format!("settings changed at the reset: {}", list(changed, change)))
+        }
+        StoreFailure::NotDefault(wrong) => {
+            let wrong_value = |wrong: &Difference| {
+                let now = wrong.found.as_ref().map_or_else(|| "not readable".to_owned(), |now| shown(&now.value()));
+                format!("{} is {now} instead of {}", label(&wrong.expected), shown(&wrong.expected.value()))
+            };
+            Words::new(format!("restored and reset, but not at the defaults: {}", list(wrong, wrong_value)))
+        }
+    }
+}
+
+/// The text for an effect.
+pub(in crate::output) fn effect(node: &str, effect: &StoreEffect) -> Told {
+    match effect {
+        StoreEffect::SignatureSent { verb, group } => {
+            let (signature, object) = (verb.signature(), verb.object(*group));
+            let (unknown, verify) = match verb {
+                Verb::Store => ("whether the settings were stored", "--verify"),
+                Verb::Restore => ("whether the next reset sets the defaults", "--reset"),
+            };
+            let message =
+                format!("\"{signature}\" was sent to {object} once and is not repeated; it is unknown {unknown}");
+            let command = format!("cangauge {} {node} --group {} {verify}", name(*verb), group.as_str());
+            Told::new("signature-sent", message).command("repeat and verify", command)
+        }
+        StoreEffect::Answers(true) => Told::new("answers", "the device answers other requests"),
+        StoreEffect::Answers(false) => Told::new("no-answer", "the device does not answer any more"),
+        StoreEffect::Stored(groups) => Told::new("stored", format!("stored: {}", Group::names(groups))),
+        StoreEffect::NotVerified(verb) => {
+            Told::new("not-verified", format!("the device acknowledged the {}, and it is not verified", name(*verb)))
+        }
+    }
+}
+
+/// The text for a note.
+pub(in crate::output) fn fact(node: Option<NodeId>, fact: &StoreFact) -> Told {
+    let node = node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
+    match fact {
+        StoreFact::InsteadOfAll(cob_ids) => {
+            let cob_id = |(object, value): &(_, Option<u64>)| match value {
+                Some(value) => format!("{object} (0x{value:08X})"),
+                None => format!("{object} (not readable)"),
+            };
+            Told::new(
+                "instead-of-all",
+                format!(
+                    "comm and app are stored instead of all, which would reset these to their defaults: {}",
+                    list(cob_ids, cob_id)
+                ),
+            )
+        }
+        StoreFact::OnlyInAll(names) => Told::new(
+            "only-in-all",
+            format!("only group \"all\" stores these; they were not saved: {}", names.join(", ")),
+        ),
+        StoreFact::NotStored(settings) => Told::new(
+            "not-stored",
+            format!(
+                "the device does not store these; they return to their defaults at power off: {}",
+                list(settings, with_value)
+            ),
+        ),
+        StoreFact::AfterReset(group) => {
+            let group = if *group == Group::All { String::new() } else { format!(" --group {}", group.as_str()) };
+            Told::new(
+                "after-reset",
+                "the defaults are used after the next reset; a store before that may keep the old values",
+            )
+            .command("reset and compare", format!("cangauge restore {node}{group} --reset"))
+        }
+        StoreFact::NothingCompared => {
+            Told::new("nothing-compared", "the device was reset; there is no known value to compare")
+        }
+        StoreFact::Unchanged(settings) => Told::new(
+            "unchanged",
+            format!(
+                "the device was reset; these are as before and differ from the usual defaults. They were delivered so, \
+                 or not restored: {}",
+                list(settings, with_value)
+            ),
+        ),
+    }
+}
+
+fn name(verb: Verb) -> &'static str {
+    match verb {
+        Verb::Store => "store",
+        Verb::Restore => "restore",
+    }
+}
+
+fn done(verb: Verb) -> &'static str {
+    match verb {
+        Verb::Store => "stored",
+        Verb::Restore => "restored",
+    }
+}
+
+fn list<T>(items: &[T], text: impl Fn(&T) -> String) -> String {
+    items.iter().map(text).collect::<Vec<_>>().join(", ")
+}
+
+/// Address and name: `0x1017:0 producer-heartbeat-time`.
+fn label(setting: &Snapshot) -> String {
+    match &setting.name {
+        Some(name) => format!("{} {name}", setting.object),
+        None => setting.object.to_string(),
+    }
+}
+
+fn with_value(setting: &Snapshot) -> String {
+    format!("{} ({})", label(setting), shown(&setting.value()))
 }

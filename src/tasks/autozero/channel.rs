@@ -11,6 +11,7 @@ use crate::measure::layout::Signal;
 use crate::measure::sample::Number;
 use crate::node::Node;
 use crate::tasks::Failure;
+use crate::tasks::read::ReadFailure;
 
 /// A channel whose zero can be set.
 #[derive(Clone, Debug)]
@@ -79,7 +80,7 @@ fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
     let signal = match (number, device.signals.as_slice()) {
         (Some(number), _) => signal(device, number)?,
         (None, [only]) => only,
-        (None, []) => return Err(Failure::at(node, AutozeroFailure::NoMeasuredValue)),
+        (None, []) => return Err(Failure::at(node, ReadFailure::NoMeasuredValue)),
         (None, _) => {
             return Err(Failure::at(node, AutozeroFailure::WhichChannel { available: Vec::new() }));
         }

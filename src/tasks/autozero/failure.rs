@@ -45,8 +45,6 @@ pub enum AutozeroFailure {
         /// The channels that have an autozero; empty if they are unknown.
         available: Vec<u8>,
     },
-    /// The device has no measured value of CiA 404.
-    NoMeasuredValue,
     /// The channel has no measured value.
     NoMeasuredValueOnChannel {
         /// The channel.
@@ -118,8 +116,7 @@ impl AutozeroFailure {
             | AutozeroFailure::LimitUnit { .. } => Kind::Usage,
             AutozeroFailure::NoObject { .. } => Kind::Refused,
             AutozeroFailure::Unsafe { .. } => Kind::CheckFailed,
-            AutozeroFailure::NoMeasuredValue
-            | AutozeroFailure::RestartedBefore
+            AutozeroFailure::RestartedBefore
             | AutozeroFailure::RestartedAfter
             | AutozeroFailure::NotZero { .. }
             | AutozeroFailure::OtherOffsetStored => Kind::Unexpected,
@@ -222,10 +219,10 @@ pub enum AutozeroFact {
         /// The group that stores it.
         group: Group,
     },
-    /// The zero is stored, with these groups: `comm+app`.
+    /// The zero is stored.
     Stored {
         /// The groups.
-        groups: String,
+        groups: Vec<Group>,
     },
 }
 

@@ -1,6 +1,6 @@
 //! A change from the old settings to the requested ones, and back if a step fails.
 
-use super::failure::{Incomplete, PdoEffect, PdoFact, PdoFailure, StateEffect, StepError, StepWrite};
+use super::failure::{Incomplete, PdoEffect, PdoFact, PdoFailure, StepError, StepWrite};
 use super::plan;
 use super::session::Session;
 use super::settings::Settings;
@@ -9,7 +9,8 @@ use crate::canopen::pdo::MappingEntry;
 use crate::canopen::sdo::AbortCode;
 use crate::device::description::Remap;
 use crate::master::{SdoError, SdoFailure};
-use crate::tasks::{Failure, Note};
+use crate::tasks::note::StateEffect;
+use crate::tasks::{Effect, Fact, Failure, Note};
 use std::time::Duration;
 
 /// The longest wait for a device that restarts.
@@ -54,13 +55,13 @@ impl Change<'_, '_> {
             self.undo(&error)?;
         }
         if let Some(state) = self.restore_state() {
-            self.note(PdoFact::State(state));
+            self.note(Fact::State(state));
         }
         self.note_consequences();
         Ok(())
     }
 
-    fn note(&mut self, fact: PdoFact) {
+    fn note(&mut self, fact: impl Into<Fact>) {
         self.notes.push(Note::of_node(self.session.node.id, fact));
     }
 
@@ -160,7 +161,7 @@ impl Change<'_, '_> {
                     let state = self.restore_state();
                     let failure = self.failure(error).with(node, PdoEffect::Restored { number });
                     return Err(match state {
-                        Some(state) => failure.with(node, PdoEffect::State(state)),
+                        Some(state) => failure.with(node, Effect::State(state)),
                         None => failure,
                     });
                 }

@@ -3,7 +3,6 @@
 use super::settings::Settings;
 use crate::bus::BusError;
 use crate::canopen::id::{CanId, NodeId};
-use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{MappingEntry, TpdoNumber, Transmission};
 use crate::canopen::sdo::AbortCode;
@@ -75,11 +74,6 @@ pub enum PdoFailure {
     TooLong {
         /// Its length in bits.
         bits: u32,
-    },
-    /// The signal has no status object.
-    NoStatus {
-        /// The signal.
-        signal: String,
     },
     /// The node has no signal and no object with this name.
     UnknownName {
@@ -244,27 +238,6 @@ impl From<SdoError> for StepError {
     }
 }
 
-/// The NMT state after a change, if it is not the previous state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StateEffect {
-    /// The previous state is unknown: the node stays in PRE-OPERATIONAL.
-    Unknown,
-    /// The node did not return to its previous state.
-    Differs {
-        /// The previous state.
-        before: NmtState,
-        /// The present state.
-        now: NmtState,
-    },
-    /// The node was set to its previous state, without confirmation.
-    Unconfirmed {
-        /// The previous state.
-        before: NmtState,
-    },
-    /// The command could not be sent.
-    NotRestored,
-}
-
 /// What a failed change left behind.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PdoEffect {
@@ -275,8 +248,6 @@ pub enum PdoEffect {
     },
     /// The previous settings could not be set again.
     Incomplete(Box<Incomplete>),
-    /// The NMT state is not the previous state.
-    State(StateEffect),
     /// The new settings are set, but not stored.
     SetNotStored {
         /// The TPDO.
@@ -334,8 +305,6 @@ pub enum PdoFact {
         /// The write at which it failed.
         write: Option<StepWrite>,
     },
-    /// The NMT state is not the previous state.
-    State(StateEffect),
     /// The TPDO is off.
     Off {
         /// The TPDO.
@@ -370,7 +339,6 @@ impl PdoFailure {
             PdoFailure::Restricted { .. }
             | PdoFailure::NoIdentifier { .. }
             | PdoFailure::TooLong { .. }
-            | PdoFailure::NoStatus { .. }
             | PdoFailure::UnknownName { .. }
             | PdoFailure::WidthUnknown { .. } => Kind::Usage,
             PdoFailure::Change { error, .. } => error.kind(),
@@ -391,7 +359,7 @@ impl PdoFailure {
 impl PdoFact {
     /// Whether the user should act on it.
     pub fn is_warning(&self) -> bool {
-        matches!(self, PdoFact::ChangedWhileOn { .. } | PdoFact::SetDespite { .. } | PdoFact::State(_))
+        matches!(self, PdoFact::ChangedWhileOn { .. } | PdoFact::SetDespite { .. })
     }
 }
 

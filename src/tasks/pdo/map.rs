@@ -15,7 +15,7 @@ use crate::master::Master;
 use crate::node::{Node, Overrides};
 use crate::tasks::settings::open;
 use crate::tasks::store::{self, Group};
-use crate::tasks::{Fact, Failure, Kind, Note};
+use crate::tasks::{Failure, Kind, Note};
 
 /// The result of [`map`].
 #[derive(Clone, Debug)]
@@ -79,7 +79,7 @@ pub fn map(
     let stored = stored.map_err(|failure| failure.with(node.id, PdoEffect::SetNotStored { number }))?;
     if let Some(done) = &stored {
         notes.push(note(PdoFact::Stored { groups: done.groups.clone() }));
-        notes.extend(done.notes.iter().map(|text| Note::of_node(node.id, Fact::Text(text.clone()))));
+        notes.extend(done.notes.iter().cloned());
     }
     notes.extend(of_change);
     Ok(MapReport { shown: TpdoReport::new(&node, wanted), writes, stored: stored.is_some(), notes })
@@ -87,7 +87,7 @@ pub fn map(
 
 /// What to store to keep the settings of a TPDO: only the communication settings, if the device has a group for them.
 /// Some devices set custom COB-IDs back if everything is stored.
-fn store_plan(master: &mut Master<'_>, node: &Node, number: TpdoNumber) -> Result<store::Plan, Failure> {
+fn store_plan(master: &mut Master<'_>, node: &Node, number: TpdoNumber) -> Result<store::StorePlan, Failure> {
     if node.model.as_deref().is_some_and(|model| !is_stored(model, number)) {
         return Err(Failure::at(node.id, PdoFailure::NotStored { number }));
     }

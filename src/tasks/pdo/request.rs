@@ -12,6 +12,7 @@ use crate::master::Request;
 use crate::measure::layout::{PROCESS_VALUES, Signal};
 use crate::node::Node;
 use crate::node::names::nearest;
+use crate::tasks::read::ReadFailure;
 use crate::tasks::{Failure, Note};
 
 /// The transmission type for the event timer, unless the description has another one.
@@ -158,7 +159,7 @@ fn named(node: &Node, name: &str) -> Result<ObjectId, Failure> {
         return Ok(value_object(node, signal));
     }
     if let Some(signal) = name.strip_suffix(".status").and_then(|name| node.signal(name)) {
-        let no_status = || Failure::at(node.id, PdoFailure::NoStatus { signal: signal.name.clone() });
+        let no_status = || Failure::at(node.id, ReadFailure::NoStatus { signal: signal.name.clone() });
         return signal.status.ok_or_else(no_status);
     }
     match node.entry_by_name(name) {

@@ -1,10 +1,11 @@
 //! Sets a node to PRE-OPERATIONAL for a change, and back to its previous state.
 
-use super::failure::{StateEffect, StepError};
+use super::failure::StepError;
 use super::session::Session;
 use crate::bus::Filters;
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::node::state::{command, state};
+use crate::tasks::note::StateEffect;
 
 /// The NMT state before a node was set to PRE-OPERATIONAL.
 #[derive(Clone, Debug, Default)]

@@ -9,7 +9,7 @@ use crate::master::{Error, Happening, Master};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::sample::{Sample, Source};
 use crate::node::Overrides;
-use crate::node::survey::survey_nodes;
+use crate::node::survey::survey_each;
 use crate::node::wait::{Policy, Until, Waiter, run};
 use crate::tasks::Failure;
 use std::collections::BTreeMap;
@@ -48,23 +48,41 @@ pub enum WatchEvent<'a> {
     },
     /// A node restarted: its mapping may have changed.
     Restarted(NodeId),
+    /// The mapping of a node could not be read: its TPDOs are not shown.
+    Failed(&'a Failure),
     /// No TPDO was received so far.
     NothingYet,
 }
 
 /// Shows the TPDOs of the nodes until the time has passed, or until Ctrl-C or `on_event` ends it. Sends no NMT command.
+/// Returns the failures of the nodes whose mapping could not be read; the other nodes are shown.
 ///
 /// # Errors
-/// A node that does not answer; [`PdoFailure::NothingReceived`]; bus errors, and Ctrl-C before the first TPDO.
+/// [`PdoFailure::NothingReceived`]; bus errors, and Ctrl-C before the first TPDO.
 pub fn watch(
     master: &mut Master<'_>,
     nodes: &[NodeId],
     overrides: &Overrides,
     duration: Option<Duration>,
     on_event: &mut dyn FnMut(&WatchEvent<'_>) -> ControlFlow<()>,
-) -> Result<(), Failure> {
+) -> Result<Vec<Failure>, Failure> {
     master.listen_to(nodes)?;
-    let surveyed = survey_nodes(master, nodes, overrides)?;
+    let (mut surveyed, mut failures) = (Vec::new(), Vec::new());
+    for result in survey_each(master, nodes, overrides)? {
+        match result {
+            Ok(node) => surveyed.push(node),
+            Err(error) => failures.push(Failure::from(error)),
+        }
+    }
+    if surveyed.is_empty() {
+        return Ok(failures);
+    }
+    for failure in &failures {
+        if on_event(&WatchEvent::Failed(failure)).is_break() {
+            return Ok(failures);
+        }
+    }
+    let nodes: Vec<NodeId> = surveyed.iter().map(|node| node.id).collect();
     let mut decoder = Decoder::default();
     let mut numbers: BTreeMap<CanId, TpdoNumber> = BTreeMap::new();
     for node in &surveyed {
@@ -79,11 +97,12 @@ pub fn watch(
     let next = end.min(start + FIRST_TPDO_TIMEOUT);
     let samples = Vec::new();
     let mut watcher = Watcher { nodes, decoder, numbers, samples, end, next, has_received: false, on_event };
-    run(master, Policy::Record, &mut watcher)
+    run(master, Policy::Record, &mut watcher)?;
+    Ok(failures)
 }
 
 struct Watcher<'a> {
-    nodes: &'a [NodeId],
+    nodes: Vec<NodeId>,
     decoder: Decoder,
     numbers: BTreeMap<CanId, TpdoNumber>,
     samples: Vec<Sample>,
@@ -123,7 +142,7 @@ impl Watcher<'_> {
     fn result(&self) -> Result<ControlFlow<()>, Failure> {
         match self.has_received {
             true => Ok(ControlFlow::Break(())),
-            false => Err(Failure::general(PdoFailure::NothingReceived { nodes: self.nodes.to_vec() })),
+            false => Err(Failure::general(PdoFailure::NothingReceived { nodes: self.nodes.clone() })),
         }
     }
 }

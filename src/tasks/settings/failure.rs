@@ -13,8 +13,6 @@ use crate::tasks::note::{Effect, Fact};
 /// A setting could not be shown or changed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SettingsFailure {
-    /// The device has no measured value of CiA 404.
-    NoMeasuredValue,
     /// The device has several signals, and none was named.
     WhichSignal {
         /// The signals of the device.
@@ -214,8 +212,7 @@ impl SettingsFailure {
             | SettingsFailure::LimitsCrossed { .. }
             | SettingsFailure::LimitValue { .. } => Kind::Usage,
             SettingsFailure::NoFilter { .. } => Kind::Refused,
-            SettingsFailure::NoMeasuredValue
-            | SettingsFailure::NoErrorObjects
+            SettingsFailure::NoErrorObjects
             | SettingsFailure::NoErrorHistory
             | SettingsFailure::HistoryNotCleared { .. }
             | SettingsFailure::NoUnit { .. }

@@ -24,6 +24,7 @@ use crate::node::survey::survey_nodes;
 use crate::node::write::write_and_verify;
 use crate::node::{Node, Overrides};
 use crate::tasks::Failure;
+use crate::tasks::read::ReadFailure;
 
 /// A number in the unit of a signal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +52,7 @@ pub fn find_signal<'a>(node: &'a Node, name: Option<&str>) -> Result<&'a Signal,
     match (name, node.signals.as_slice()) {
         (Some(name), _) => super::read::find(node, name),
         (None, [only]) => Ok(only),
-        (None, []) => Err(Failure::at(node.id, SettingsFailure::NoMeasuredValue)),
+        (None, []) => Err(Failure::at(node.id, ReadFailure::NoMeasuredValue)),
         (None, several) => {
             let available = several.iter().map(|signal| signal.name.clone()).collect();
             Err(Failure::at(node.id, SettingsFailure::WhichSignal { available }))

@@ -1,21 +1,123 @@
-//! Causes of failures: settings were not stored or restored.
+//! Causes, effects and notes of `store` and `restore`.
 
+use super::snapshot::Snapshot;
+use super::{Group, Verb};
+use crate::canopen::object::ObjectId;
+use crate::canopen::sdo::AbortCode;
 use crate::tasks::Kind;
 use crate::tasks::failure::Cause;
+use crate::tasks::note::{Effect, Fact};
 
 /// Settings were not stored or restored.
 #[derive(Clone, Debug, PartialEq)]
-pub enum StoreFailure {}
+pub enum StoreFailure {
+    /// 1010h or 1011h says that the device does not carry out the command.
+    NotOnCommand {
+        /// The command.
+        verb: Verb,
+        /// The value of the object.
+        bits: u64,
+    },
+    /// The device has no object for this group.
+    NoGroup {
+        /// The command.
+        verb: Verb,
+        /// The group.
+        group: Group,
+        /// The abort code.
+        code: AbortCode,
+    },
+    /// The device rejects reading its capability.
+    CapabilityUnreadable {
+        /// The command.
+        verb: Verb,
+        /// The abort code.
+        code: AbortCode,
+    },
+    /// After the reset, these settings have other values than before.
+    NotKept(Vec<Difference>),
+    /// After the reset, these settings do not have their defaults.
+    NotDefault(Vec<Difference>),
+}
+
+/// A setting with another value than expected.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// The expected value.
+    pub expected: Snapshot,
+    /// The value that was read; `None` if it could not be read.
+    pub found: Option<Snapshot>,
+}
 
 impl StoreFailure {
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
-        match *self {}
+        match self {
+            StoreFailure::NotOnCommand { .. }
+            | StoreFailure::NoGroup { .. }
+            | StoreFailure::CapabilityUnreadable { .. } => Kind::Refused,
+            StoreFailure::NotKept(_) | StoreFailure::NotDefault(_) => Kind::Unexpected,
+        }
     }
+
+    /// The abort code, if the device rejected a request.
+    pub fn abort(&self) -> Option<AbortCode> {
+        match self {
+            StoreFailure::NoGroup { code, .. } | StoreFailure::CapabilityUnreadable { code, .. } => Some(*code),
+            _ => None,
+        }
+    }
+}
+
+/// What a failed store or restore had done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StoreEffect {
+    /// The signature was sent once. It is unknown whether the device acted on it.
+    SignatureSent {
+        /// The command.
+        verb: Verb,
+        /// The group.
+        group: Group,
+    },
+    /// Whether the device answers other requests after the signature.
+    Answers(bool),
+    /// These groups were stored before.
+    Stored(Vec<Group>),
+    /// The device acknowledged the signature, and its effect was not verified.
+    NotVerified(Verb),
+}
+
+/// What to report about a store or restore.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StoreFact {
+    /// These groups are stored instead of all, which would reset these COB-IDs. A value is `None` if it cannot be read.
+    InsteadOfAll(Vec<(ObjectId, Option<u64>)>),
+    /// Only the group of all settings stores these.
+    OnlyInAll(Vec<String>),
+    /// The device does not store these settings, and they are not at their defaults.
+    NotStored(Vec<Snapshot>),
+    /// The defaults are used after the next reset.
+    AfterReset(Group),
+    /// The device was reset, and no setting could be compared.
+    NothingCompared,
+    /// The settings have the same values as before, and these are not their usual defaults.
+    Unchanged(Vec<Snapshot>),
 }
 
 impl From<StoreFailure> for Cause {
     fn from(cause: StoreFailure) -> Cause {
         Cause::Store(cause)
+    }
+}
+
+impl From<StoreEffect> for Effect {
+    fn from(effect: StoreEffect) -> Effect {
+        Effect::Store(effect)
+    }
+}
+
+impl From<StoreFact> for Fact {
+    fn from(fact: StoreFact) -> Fact {
+        Fact::Store(fact)
     }
 }
