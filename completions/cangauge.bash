@@ -983,7 +983,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__check)
-            opts="-b -t -f -q -v -h -V --for --sync --poll --junit --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --for --sync --poll --junit --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0

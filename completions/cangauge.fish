@@ -488,7 +488,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s V -l version -
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l for -d 'Check all samples of this time' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sync -d 'Send SYNC at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l poll -d 'Read by SDO at this interval' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l junit -d 'Write the verdicts as JUnit XML for CI servers, one test case per expression and node' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l junit -d 'Write the verdicts as JUnit XML for CI servers, one test case per expression and node. An existing file is replaced' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
@@ -504,7 +504,6 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l force -d 'Overwrite an existing file'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s q -l quiet -d 'Print less on stderr'

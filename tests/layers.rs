@@ -33,7 +33,7 @@ const PARTS: &[(&str, &str, &[&str])] = &[
     ("node", "bus", BUS_TRAIT),
     ("tasks", "bus", BUS_TRAIT),
     ("measure", "bus", &["Mono", "Received", "Stamp", "time"]),
-    ("output", "bus", &["Fault", "Mono", "ReceiveBuffer", "Received", "Stamp", "Wall", "replay", "time"]),
+    ("output", "bus", &["Fault", "Mono", "ReceiveBuffer", "Received", "Stamp", "Wall", "file", "replay", "time"]),
     ("output", "canopen", &["emcy", "id", "lss", "nmt", "object", "pdo", "sdo", "value"]),
     ("sim", "canopen", &["frame", "id", "object", "value", "wire_length"]),
     ("cli", "canopen", &["emcy", "id", "lss", "nmt", "object", "pdo", "value"]),
@@ -80,7 +80,7 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("std::io", &["bus", "cli", "output", "sim"]),
     ("std::net", &["bus"]),
     ("std::os", &["bus"]),
-    ("std::process", &["main"]),
+    ("std::process", &["bus", "main"]),
     // output: a slow disk must not keep the program from receiving.
     ("std::thread", &["bus", "output"]),
     ("std::time::Instant", &["bus"]),

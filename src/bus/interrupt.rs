@@ -59,6 +59,16 @@ impl Interrupts {
     }
 }
 
+/// From now on, a write beyond the limit for the size of a file (SIGXFSZ) fails like one to a full disk.
+///
+/// # Errors
+/// The system rejects the handler.
+pub fn survive_file_size_limit() -> io::Result<()> {
+    #[cfg(unix)]
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
+    Ok(())
+}
+
 /// Whether SIGHUP was ignored when the program started, as `nohup` does. Asked once: watching changes the answer.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "the standard library cannot read the action of a signal")]

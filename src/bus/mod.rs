@@ -6,6 +6,7 @@
 pub mod claim;
 mod delegate;
 pub mod faults;
+pub mod file;
 pub mod interrupt;
 pub mod memory;
 #[cfg(unix)]

@@ -2,7 +2,7 @@
 
 use super::args::{BusSpec, Duration, Nodes};
 use super::exit::Several;
-use super::file::OutFile;
+use super::file::ReportFile;
 use super::recording::{print_event, refuse_to_send, sync_interval};
 use super::{Global, descriptions, open};
 use crate::bus::Stamp;
@@ -60,12 +60,10 @@ pub(crate) struct Check {
     /// Read by SDO at this interval
     #[arg(long, value_name = "DUR", requires = "duration")]
     poll: Option<Duration>,
-    /// Write the verdicts as JUnit XML for CI servers, one test case per expression and node
+    /// Write the verdicts as JUnit XML for CI servers, one test case per expression and node. An existing file is
+    /// replaced
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
-    /// Overwrite an existing file
-    #[arg(long)]
-    force: bool,
 }
 
 impl Check {
@@ -77,12 +75,12 @@ impl Check {
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         refuse_to_send(global, self.sync.or(self.poll))?;
         self.validate(global)?;
-        let file = self.junit.as_deref().map(|path| OutFile::create(path, self.force)).transpose()?;
+        let file = self.junit.as_deref().map(|path| ReportFile::create(path, false)).transpose()?;
         let report = match self.measure(global) {
             // A CI server needs the report if nothing was measured, too.
             Err(error) if file.is_some() => {
                 let failure = error.downcast_ref::<Failure>().filter(|failure| failure.kind() != Kind::Usage);
-                if let (Some(failure), Some(mut file)) = (failure, file) {
+                if let (Some(failure), Some(file)) = (failure, file) {
                     let report = CheckReport::not_measured(&self.expressions, failure.clone());
                     file.write(junit::document(&report).as_bytes())?;
                 }
@@ -92,7 +90,7 @@ impl Check {
         };
         let console = global.console();
         report.remarks.iter().for_each(|remark| console.note(&remark_text(remark)));
-        if let Some(mut file) = file {
+        if let Some(file) = file {
             file.write(junit::document(&report).as_bytes())?;
         }
         global.print(&verdict::rows(&report))?;

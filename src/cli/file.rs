@@ -1,12 +1,15 @@
 //! Files that a command writes. They are opened before the bus, so that a wrong name has no effect on it.
 
 use super::exit::FileError;
+use crate::bus::file::{Locked, is_same, lock, wait_for_reader};
 use crate::output::failure::ErrorMessage;
 use crate::output::rows::{ExistingLines, Target, existing_lines};
+use crate::tasks::Kind;
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Seek, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// What happens to an existing file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,23 +34,34 @@ pub(super) struct OutFile {
     keep: u64,
     /// One of our own standard streams: nothing in it is removed.
     is_own_stream: bool,
+    /// How long opening it waited for the reader of a FIFO.
+    pub(super) waited: Duration,
 }
 
 impl OutFile {
     /// Opens a file. With `force` an existing one is overwritten.
     pub(super) fn create(path: &Path, force: bool) -> anyhow::Result<OutFile> {
-        OutFile::open(path, if force { Existing::Overwrite } else { Existing::Refuse })
+        OutFile::open(path, if force { Existing::Overwrite } else { Existing::Refuse }, None)
     }
 
-    /// Opens a file.
-    pub(super) fn open(path: &Path, existing: Existing) -> anyhow::Result<OutFile> {
+    /// Opens a file and locks it. It waits for the reader of a FIFO, not longer than `limit`.
+    pub(super) fn open(path: &Path, existing: Existing, limit: Option<Duration>) -> anyhow::Result<OutFile> {
         let mut options = OpenOptions::new();
+        options.append(true);
+        let out = |file: File, is_new: bool, is_own_stream: bool, waited: Duration| OutFile {
+            path: path.to_owned(),
+            file,
+            is_new,
+            existing,
+            keep: 0,
+            is_own_stream,
+            waited,
+        };
         if is_own_stream(path) {
             // The shell opened it, and it may already contain other data.
-            let file = options.append(true).open(path).map_err(|source| file_error("open", path, source))?;
-            return Ok(OutFile { path: path.to_owned(), file, is_new: false, existing, keep: 0, is_own_stream: true });
+            let file = options.open(path).map_err(|source| file_error("open", path, source))?;
+            return Ok(out(file, false, true, Duration::ZERO));
         }
-        options.write(true);
         let metadata = path.metadata().ok();
         // The target of a dangling link is created.
         let is_dangling_link = metadata.is_none() && path.symlink_metadata().is_ok();
@@ -59,8 +73,12 @@ impl OutFile {
         }
         options.create(is_dangling_link);
         options.read(existing == Existing::Continue && is_regular);
+        let (waited, _reader) = wait_for_reader(path, limit).map_err(|source| no_reader(path, source))?;
         match options.open(path) {
-            Ok(file) => Ok(OutFile { path: path.to_owned(), file, is_new, existing, keep: 0, is_own_stream: false }),
+            Ok(file) => {
+                lock_output(&file, path)?;
+                Ok(out(file, is_new, false, waited))
+            }
             Err(source) if source.kind() == io::ErrorKind::AlreadyExists => {
                 let error = ErrorMessage::usage(format!("{} exists", path.display()));
                 Err(error.hint("overwrite it with --force, or choose another file").into())
@@ -90,16 +108,16 @@ impl OutFile {
     /// The file for a writer that keeps its first `keep` bytes and replaces the rest.
     pub(super) fn target(&self, keep: u64) -> anyhow::Result<Target> {
         let file = self.file.try_clone().map_err(|source| self.error(source))?;
-        Ok(if self.is_own_stream { Target::Stream(Box::new(file)) } else { Target::File { file, keep } })
+        Ok(if self.is_own_stream {
+            Target::Stream(Box::new(file))
+        } else {
+            Target::File { file, path: self.path.clone(), keep }
+        })
     }
 
     /// Writes the whole content, after the bytes that are kept.
     pub(super) fn write(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
-        let emptied = if self.is_regular() {
-            self.file.set_len(self.keep).and_then(|()| self.file.seek(io::SeekFrom::End(0)).map(drop))
-        } else {
-            Ok(())
-        };
+        let emptied = if self.is_regular() { self.file.set_len(self.keep) } else { Ok(()) };
         // Also an object of 0 bytes is content: its file stays.
         self.is_new = false;
         emptied.and_then(|()| self.file.write_all(bytes)).map_err(|source| self.error(source))
@@ -129,6 +147,8 @@ pub(super) struct ReportFile {
     file: File,
     /// The name until the file is complete; `None` for a FIFO, a device and our own standard streams.
     temporary: Option<PathBuf>,
+    /// The report that will be replaced. Its lock keeps other programs from writing it meanwhile.
+    _replaced: Option<File>,
     /// The whole lines of the existing report, if it is continued.
     before: Vec<u8>,
 }
@@ -140,7 +160,13 @@ impl ReportFile {
         let mut options = OpenOptions::new();
         if is_own_stream(path) || !is_regular {
             let file = options.append(true).open(path).map_err(|source| file_error("open", path, source))?;
-            return Ok(ReportFile { path: path.to_owned(), file, temporary: None, before: Vec::new() });
+            return Ok(ReportFile {
+                path: path.to_owned(),
+                file,
+                temporary: None,
+                _replaced: None,
+                before: Vec::new(),
+            });
         }
         // A link is kept, and its target replaced.
         let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
@@ -153,10 +179,21 @@ impl ReportFile {
         let mut name = OsString::from(".");
         name.push(path.file_name().unwrap_or_default());
         name.push(".tmp");
+        let replaced = File::open(&path).ok();
+        replaced.as_ref().map_or(Ok(()), |file| lock_output(file, &path))?;
         let temporary = path.with_file_name(name);
-        let file = options.write(true).create(true).truncate(true).open(&temporary);
-        let file = file.map_err(|source| file_error("create", &path, source))?;
-        Ok(ReportFile { path, file, temporary: Some(temporary), before })
+        options.append(true).create(true);
+        let file = loop {
+            let file = options.open(&temporary).map_err(|source| file_error("create", &path, source))?;
+            lock_output(&file, &path)?;
+            // Another program may have completed its report between the two calls.
+            let is_same = |now: &fs::Metadata| file.metadata().is_ok_and(|own| is_same(&own, now));
+            if cfg!(not(unix)) || temporary.metadata().is_ok_and(|now| is_same(&now)) {
+                break file;
+            }
+        };
+        file.set_len(0).map_err(|source| file_error("create", &path, source))?;
+        Ok(ReportFile { path, file, temporary: Some(temporary), _replaced: replaced, before })
     }
 
     /// Writes the whole report.
@@ -178,6 +215,35 @@ impl Drop for ReportFile {
             // A file that cannot be removed stays under its temporary name.
             let _ = fs::remove_file(temporary);
         }
+    }
+}
+
+/// Locks a file that is written until it is closed.
+pub(super) fn lock_output(file: &File, path: &Path) -> Result<(), ErrorMessage> {
+    lock(file).map_err(|Locked { process, is_own }| {
+        let name = path.display();
+        match process {
+            Some(_) if is_own => ErrorMessage::usage(format!("{name} is used for two outputs"))
+                .hint("each output needs a file of its own"),
+            Some(process) => ErrorMessage::usage(format!("{name} is being written by process {process}"))
+                .hint("choose another file, or end that process"),
+            None => ErrorMessage::usage(format!("{name} is being written by another process"))
+                .hint("choose another file, or end that process"),
+        }
+    })
+}
+
+/// Why a FIFO was not opened.
+fn no_reader(path: &Path, source: io::Error) -> anyhow::Error {
+    let name = path.display();
+    match source.kind() {
+        io::ErrorKind::TimedOut => ErrorMessage::new(Kind::Io, format!("open {name}: no program reads from this FIFO"))
+            .hint(format!("start the reader first: cat {name}"))
+            .into(),
+        io::ErrorKind::Interrupted => {
+            ErrorMessage::new(Kind::Interrupted, format!("interrupted while waiting for a reader of {name}")).into()
+        }
+        _ => file_error("open", path, source),
     }
 }
 

@@ -20,7 +20,7 @@ use crate::tasks::log::{LogOptions, Mode, log};
 use crate::tasks::{Failure, Kind};
 use clap::Args;
 use files::{Files, OpenFiles};
-use finish::{Finished, wait_for_writers};
+use finish::{Ended, Finished, wait_for_writers};
 use recorder::Recorder;
 use std::io::{self, IsTerminal};
 
@@ -96,7 +96,7 @@ impl Log {
         self.check_expectations()?;
         let format = FileFormat::from(global.format);
         self.files.check(format, self.sync.or(self.poll).is_some())?;
-        let mut files = self.files.open(format, self.count)?;
+        let mut files = self.files.open(format, self.count, self.duration.map(|duration| duration.0))?;
         let finished = self.record(global, &mut files)?;
         print_verdicts(&global.console(), &finished.verdicts);
         finished.write_summary(self.files.summary.is_some(), &mut files)?;
@@ -128,7 +128,8 @@ impl Log {
                 (Nodes::All, true) => NodeId::all().collect(),
                 _ => open::nodes(master, global, &self.nodes)?,
             };
-            let options = self.options(master, global, nodes, is_live)?;
+            let mut options = self.options(master, global, nodes, is_live)?;
+            options.duration = options.duration.map(|duration| duration.saturating_sub(files.waited));
             let waits = master.bus().waits();
             let mut recorder =
                 Recorder::new(files.rows(waits)?, files.rows_name(), files.events(waits)?, progress, console);
@@ -149,7 +150,7 @@ impl Log {
         })?;
         let interrupted = report.as_ref().is_ok_and(|report| report.interrupted);
         let is_limited = self.count.is_some() || self.duration.is_some();
-        let (written, unwritten) = wait_for_writers(recorder, interrupted);
+        let Ended { written, unwritten, deleted } = wait_for_writers(recorder, interrupted);
         let is_closed = match unwritten {
             Some(unwritten) if is_limited && unwritten.is_closed_output() => true,
             Some(unwritten) => return Err(unwritten.into_error(&global.console(), files, written.lost)),
@@ -159,7 +160,7 @@ impl Log {
         if let Some(failure) = report.nothing {
             return Err(failure.into());
         }
-        let mut finished = Finished { report, verdicts: Vec::new(), written, is_limited, is_closed };
+        let mut finished = Finished { report, verdicts: Vec::new(), written, deleted, is_limited, is_closed };
         let console = global.console();
         finished.summary().lines().iter().for_each(|line| console.note(line));
         finished.verdicts = verdicts?;

@@ -31,6 +31,7 @@ mod store;
 mod unit;
 
 use crate::bus::claim::{Claim, Claims};
+use crate::bus::interrupt::survive_file_size_limit;
 use crate::canopen::id::NodeId;
 use crate::master::{Master, Timing};
 use crate::output::console::Console;
@@ -40,7 +41,7 @@ use anstream::ColorChoice;
 use args::{BusSpec, Duration, Override};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use descriptions::Named;
-use exit::IntoFailure;
+use exit::{FileError, IntoFailure};
 use std::cell::RefCell;
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
@@ -321,6 +322,8 @@ impl Global {
 /// # Errors
 /// Why the command failed; [`exit::report`] turns it into text and an exit code.
 pub fn run(cli: &Cli) -> anyhow::Result<()> {
+    let failed = |source| FileError { what: "watch for the file size limit".to_owned(), source };
+    survive_file_size_limit().map_err(failed)?;
     let global = Global { claim: cli.command.claim(), only_reads: cli.command.only_reads(), ..cli.global.clone() };
     cli.command.run(&global)
 }

@@ -3,6 +3,7 @@
 use super::Global;
 use super::args::{BusSpec, Nodes};
 use super::exit::{FileError, IntoFailure};
+use super::file::lock_output;
 use crate::bus::claim::{ClaimError, Claims, IfHeld, Part};
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
@@ -56,17 +57,6 @@ pub(super) fn claim(global: &Global, spec: &BusSpec) -> Result<Claims, Failure> 
 
 /// Opens this bus, whatever the options name; an interface that is down too, where that is wanted.
 pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyhow::Result<Box<dyn Bus>> {
-    // Before the bus: a trace that cannot be written is found before anything is sent.
-    let trace: Option<(Box<dyn Write>, String)> = match &global.trace {
-        None => None,
-        Some(path) if path == Path::new("-") => Some((Box::new(io::stderr()), "stderr".to_owned())),
-        Some(path) => {
-            let name = path.display().to_string();
-            let what = format!("write trace {name}");
-            let file = File::create(path).map_err(|source| FileError { what, source })?;
-            Some((Box::new(file), name))
-        }
-    };
     let bus: Box<dyn Bus> = match spec {
         BusSpec::Sim(bench) => Box::new(simulated(bench.as_deref())?),
         BusSpec::Replay(file) => {
@@ -80,10 +70,28 @@ pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyho
         }
         BusSpec::SocketCan(name) => socketcan(name, even_down)?,
     };
-    Ok(match trace {
-        Some((out, name)) => Box::new(Traced::new(bus, out, &name)),
+    // After the bus: without one, an existing trace keeps its content. Nothing was sent yet.
+    Ok(match &global.trace {
+        Some(path) => {
+            let (out, name) = trace_output(path)?;
+            Box::new(Traced::new(bus, out, &name))
+        }
         None => bus,
     })
+}
+
+fn trace_output(path: &Path) -> anyhow::Result<(Box<dyn Write>, String)> {
+    if path == Path::new("-") {
+        return Ok((Box::new(io::stderr()), "stderr".to_owned()));
+    }
+    let name = path.display().to_string();
+    let failed = |source| FileError { what: format!("write trace {name}"), source };
+    let file = File::options().append(true).create(true).open(path).map_err(failed)?;
+    lock_output(&file, path)?;
+    if file.metadata().is_ok_and(|metadata| metadata.is_file()) {
+        file.set_len(0).map_err(failed)?;
+    }
+    Ok((Box::new(file), name))
 }
 
 fn simulated(spec: Option<&str>) -> anyhow::Result<MemoryBus> {

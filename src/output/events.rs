@@ -2,7 +2,7 @@
 
 mod text;
 
-use super::rows::{Dialect, LineWriter, TimeForm, Times, push_number, push_seconds, push_text, push_texts};
+use super::rows::{Dialect, FileChange, LineWriter, TimeForm, Times, push_number, push_seconds, push_text, push_texts};
 use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
 use std::io;
@@ -43,20 +43,31 @@ impl EventText {
     }
 }
 
+/// The text for what another program did to a file.
+pub fn file_change_text(change: &FileChange) -> String {
+    match change {
+        FileChange::Shortened(path) => {
+            format!("another program truncated {}: the rows continue after a new header", path.display())
+        }
+        FileChange::Moved(path) => format!("{} was moved: the rows continue in the moved file", path.display()),
+        FileChange::Deleted(path) => format!("{} was deleted: its rows are lost", path.display()),
+    }
+}
+
 /// Writes events as CSV.
 #[derive(Debug)]
 pub struct Events {
     writer: LineWriter,
     dialect: Dialect,
     times: Times,
-    /// Whether the header must still be written.
-    needs_header: bool,
+    /// Until the first event: whether the file already has its header.
+    header: Option<bool>,
 }
 
 impl Events {
     /// Events for `writer`. With `continues` the file already has its header.
     pub fn new(writer: LineWriter, dialect: Dialect, time: TimeForm, continues: bool) -> Events {
-        Events { writer, dialect, times: Times::new(time), needs_header: !continues }
+        Events { writer, dialect, times: Times::new(time), header: Some(continues) }
     }
 
     /// The header, without line end and byte order mark.
@@ -71,11 +82,10 @@ impl Events {
     /// # Errors
     /// The file cannot be written.
     pub fn write_header(&mut self) -> io::Result<()> {
-        if !std::mem::take(&mut self.needs_header) {
-            return self.writer.check();
-        }
+        let Some(is_present) = self.header.take() else { return self.writer.check() };
         let mark = if self.dialect.bom { "\u{feff}" } else { "" };
-        self.writer.put_header(format!("{mark}{}\n", Events::header(self.dialect)).into_bytes())
+        let header = format!("{mark}{}\n", Events::header(self.dialect)).into_bytes();
+        if is_present { self.writer.keep_header(header) } else { self.writer.put_header(header) }
     }
 
     /// Writes an event at once. `elapsed` is the time since the first row.
@@ -110,6 +120,11 @@ impl Events {
     /// The file cannot be written.
     pub fn finish(&mut self, give_up: &mut dyn FnMut() -> bool) -> io::Result<()> {
         self.writer.finish(give_up)
+    }
+
+    /// What other programs did to the file since the last call.
+    pub fn take_changes(&mut self) -> Vec<FileChange> {
+        self.writer.take_changes()
     }
 
     /// Events that were lost.

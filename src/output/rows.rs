@@ -31,7 +31,7 @@ pub use setup::{Layout, Setup};
 use sink::RowSink;
 use std::io;
 use std::time::Duration;
-pub use target::Target;
+pub use target::{FileChange, Target};
 use wide::Wide;
 
 /// Turns samples into rows, one per value or one per cycle, and writes them.
@@ -146,6 +146,11 @@ impl Rows {
     /// Rows that came faster than they could be written, or that could not be written.
     pub fn lost(&self) -> u64 {
         self.sink.lost()
+    }
+
+    /// What other programs did to the files since the last call.
+    pub fn take_changes(&mut self) -> Vec<FileChange> {
+        self.sink.take_changes()
     }
 
     /// Rows that came faster than they could be written.

@@ -235,11 +235,11 @@ fn junit_reports() {
     assert!(report.contains("<testcase classname=\"cangauge.node-5\" name=\"pressure &lt; 1 bar\""), "{report}");
     assert!(report.contains("message=\"1.25 bar\">pressure &lt; 1 bar: 1.25 bar</failure>"), "{report}");
     assert_eq!(report.matches("<testcase ").count(), 2);
-    // An existing file is not overwritten.
+    // An existing report is replaced, but not without a result.
     fs::write(bench.path("report.xml"), "old").expect("written");
-    check(&bench, &words).refuses("report.xml exists");
+    check(&bench, &["5", "presure < 1", "--junit", "report.xml"]).exit(2);
     assert_eq!(bench.text("report.xml"), "old");
-    check(&bench, &[&words[..], &["--force"]].concat()).exit(1);
+    check(&bench, &words).exit(1);
     assert_eq!(bench.text("report.xml"), report.replace(timestamp(&report), timestamp(&bench.text("report.xml"))));
     // No answer: an error for each expression. Wrong arguments: no file.
     check(&bench, &["9", "pressure < 1", "--junit", "silent.xml", "--for", "1s"]).exit(3);

@@ -100,3 +100,94 @@ fn rows_are_handed_over_within_a_second() {
     // However busy the machine is: a block of rows takes a minute.
     assert!(begun.elapsed() < std::time::Duration::from_secs(30), "{:?}", begun.elapsed());
 }
+
+/// Holds the lock of a file, as a recording does.
+fn locked(path: std::path::PathBuf) -> fs::File {
+    let file = fs::File::options().append(true).create(true).open(path).expect("a file");
+    file.try_lock().expect("locked");
+    file
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn file_has_one_writer() {
+    let bench = Bench::of("mh4@1");
+    let own = std::process::id();
+    let locks = ["run.csv", "events.csv", ".summary.json.tmp", "data.bin", "old.json", "run-0002.csv"]
+        .map(|name| locked(bench.path(name)));
+    for (line, name) in [
+        ("log 1 --sync 10ms --count 5 -o run.csv --append", "run.csv"),
+        ("log 1 --sync 10ms --count 5 -o run.csv --force", "run.csv"),
+        ("log 1 --sync 10ms --count 5 -o a.csv --events events.csv --append", "events.csv"),
+        ("log 1 --sync 10ms --count 5 --summary summary.json", "summary.json"),
+        ("check 1 pressure<100 --junit old.json", "old.json"),
+        ("log 1 --sync 10ms --count 5 -o run.csv --rotate 1s --append", "run-0002.csv"),
+        ("log 1 --sync 10ms --count 5 -o run.csv --rotate 1s --force", "run-0002.csv"),
+        ("sdo read 1 0x1008 --output data.bin --force", "data.bin"),
+    ] {
+        let path = bench.path(name);
+        let name = if name.starts_with("old") { path.display().to_string() } else { name.to_owned() };
+        bench.run(line).refuses(&format!("{name} is being written by process {own}"));
+    }
+    let mut command = bench.command(&["--bus", "sim", "--trace", "run.csv", "read", "1"]);
+    let done = bench.finish(&mut command).exit(2);
+    assert!(done.stderr.contains("run.csv is being written by process"), "{}", done.stderr);
+    drop(locks);
+    bench.run("log 1 --sync 10ms --count 5 -o run.csv --append").exit(0);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn two_links_to_one_file_are_one_file() {
+    let bench = Bench::of("mh4@1");
+    fs::write(bench.path("run.csv"), "").expect("written");
+    std::os::unix::fs::symlink("run.csv", bench.path("soft.csv")).expect("a link");
+    fs::hard_link(bench.path("run.csv"), bench.path("hard.csv")).expect("a link");
+    let log = "log 1 --sync 10ms --count 5 -o run.csv --force";
+    for (option, name) in [("--events", "soft.csv"), ("--events", "hard.csv"), ("--summary", "soft.csv")] {
+        let done = bench.run(&format!("{log} {option} {name}")).exit(2);
+        assert!(done.stderr.contains(".csv is used for two outputs\n"), "{}", done.stderr);
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn trace_is_opened_with_the_bus() {
+    let bench = Bench::of("mh4@1");
+    fs::write(bench.path("old.log"), "old").expect("written");
+    let mut command = bench.command(&["--bus", "no-such-can", "--trace", "old.log", "read", "1"]);
+    bench.finish(&mut command).exit(5);
+    let mut command = bench.command(&["--bus", "sim:no-such-bench.toml", "--trace", "old.log", "read", "1"]);
+    bench.finish(&mut command).exit(8);
+    assert_eq!(bench.text("old.log"), "old");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn limit_for_the_size_of_files_is_a_full_disk() {
+    let bench = Bench::of("mh4@1");
+    let line = format!(
+        "ulimit -f 8; exec {} -b {} log 1 --sync 10ms --duration 1h -o run.csv",
+        env!("CARGO_BIN_EXE_cangauge"),
+        bench.bus
+    );
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", &line]).current_dir(bench.folder.path());
+    let done = bench.finish(&mut shell).exit(8);
+    assert!(done.stderr.contains("cangauge: write run.csv: File too large"), "{}", done.stderr);
+    assert!(bench.text("run.csv").ends_with('\n'), "whole lines");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn fifo_without_a_reader_is_waited_for_within_the_duration() {
+    let bench = Bench::of("mh4@1");
+    let made = std::process::Command::new("mkfifo").arg(bench.path("fifo")).status().expect("mkfifo");
+    assert!(made.success());
+    for output in ["-o fifo", "-o run.csv --force --events fifo"] {
+        let begun = std::time::Instant::now();
+        let done = bench.run(&format!("log 1 --sync 10ms --duration 300ms {output}"));
+        done.fails(8, "cangauge: open fifo: no program reads from this FIFO\nhint: start the reader first: cat fifo\n");
+        assert!(begun.elapsed() >= std::time::Duration::from_millis(300));
+    }
+}

@@ -1,7 +1,7 @@
 //! The output files of `cangauge log`, and their format.
 
 use super::super::exit::FileError;
-use super::super::file::{Existing, OutFile, ReportFile};
+use super::super::file::{Existing, OutFile, ReportFile, lock_output};
 use crate::output::events::Events;
 use crate::output::failure::ErrorMessage;
 use crate::output::rows::{
@@ -11,10 +11,11 @@ use crate::output::rows::{
 use crate::tasks::Failure;
 use crate::tasks::log::LogFailure;
 use clap::{Args, ValueEnum};
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::Duration;
 
 /// The output options.
 #[derive(Debug, Args)]
@@ -104,7 +105,7 @@ impl FromStr for Decimal {
 struct RotationArg(Rotation);
 
 /// The shortest time of a file.
-const MIN_FILE_TIME: std::time::Duration = std::time::Duration::from_secs(1);
+const MIN_FILE_TIME: Duration = Duration::from_secs(1);
 
 /// The smallest size of a file, in bytes.
 const MIN_FILE_SIZE: u64 = 1000;
@@ -148,6 +149,8 @@ pub(super) struct OpenFiles {
     keep: u64,
     /// What the existing file of events contains.
     existing_events: Option<ExistingLines>,
+    /// How long opening waited for readers of FIFOs.
+    pub(super) waited: Duration,
 }
 
 impl Files {
@@ -176,6 +179,7 @@ impl Files {
         let files = [&self.output, &self.events, &self.summary].into_iter().flatten();
         let files: Vec<&PathBuf> = files.filter(|path| path.as_path() != Path::new("-")).collect();
         for (at, path) in files.iter().enumerate() {
+            // Two links to one file are found by its lock.
             if files[..at].contains(path) {
                 return refuse(
                     &format!("{} is used for two outputs", path.display()),
@@ -207,8 +211,13 @@ impl Files {
         }
     }
 
-    /// Opens all files, before the bus is opened.
-    pub(super) fn open(&self, format: FileFormat, count: Option<u64>) -> anyhow::Result<OpenFiles> {
+    /// Opens all files, before the bus is opened. Waits for readers of FIFOs, not longer than `limit`.
+    pub(super) fn open(
+        &self,
+        format: FileFormat,
+        count: Option<u64>,
+        limit: Option<Duration>,
+    ) -> anyhow::Result<OpenFiles> {
         let setup = Setup {
             format,
             layout: if self.is_wide() { Layout::Wide } else { Layout::Long },
@@ -218,13 +227,21 @@ impl Files {
             max_rows: count.filter(|_| self.is_wide()),
             ..Setup::default()
         };
-        let open = |path: &PathBuf| OutFile::open(path, self.existing());
-        let mut opened =
-            OpenFiles { rows: None, events: None, summary: None, series: None, setup, keep: 0, existing_events: None };
+        let mut opened = OpenFiles {
+            rows: None,
+            events: None,
+            summary: None,
+            series: None,
+            setup,
+            keep: 0,
+            existing_events: None,
+            waited: Duration::ZERO,
+        };
         match &self.output {
             Some(base) if self.rotate.is_some() => self.open_first(base, &mut opened)?,
             Some(path) => {
-                let mut file = open(path)?;
+                let mut file = OutFile::open(path, self.existing(), limit)?;
+                opened.waited = file.waited;
                 if let Some(kept) = file.existing_lines()? {
                     opened.keep = kept.length;
                     opened.setup.continues = true;
@@ -241,19 +258,25 @@ impl Files {
         if let (false, Some(file)) = (self.is_wide(), &opened.rows) {
             opened.setup.check_long().map_err(|mismatch| header_mismatch(file.path(), mismatch))?;
         }
-        opened.events = self.events.as_ref().map(open).transpose()?;
-        if let Some(file) = &mut opened.events {
-            opened.existing_events = file.existing_lines()?;
-            let expected = Events::header(self.dialect());
-            if let Some(kept) = opened.existing_events.as_ref().filter(|kept| kept.header != expected) {
-                return Err(
-                    header_mismatch(file.path(), HeaderMismatch { found: kept.header.clone(), expected }).into()
-                );
-            }
-        }
+        self.open_events(&mut opened, limit)?;
         let summary = self.summary.as_ref().filter(|path| path.as_path() != Path::new("-"));
         opened.summary = summary.map(|path| ReportFile::create(path, self.append)).transpose()?;
         Ok(opened)
+    }
+
+    /// Opens the file for events. `limit` is the time for all readers of FIFOs.
+    fn open_events(&self, opened: &mut OpenFiles, limit: Option<Duration>) -> anyhow::Result<()> {
+        let Some(path) = &self.events else { return Ok(()) };
+        let left = limit.map(|limit| limit.saturating_sub(opened.waited));
+        let mut file = OutFile::open(path, self.existing(), left)?;
+        opened.waited += file.waited;
+        opened.existing_events = file.existing_lines()?;
+        let expected = Events::header(self.dialect());
+        if let Some(kept) = opened.existing_events.as_ref().filter(|kept| kept.header != expected) {
+            return Err(header_mismatch(path, HeaderMismatch { found: kept.header.clone(), expected }).into());
+        }
+        opened.events = Some(file);
+        Ok(())
     }
 
     /// Opens the first file of a series.
@@ -262,6 +285,10 @@ impl Files {
             .map_err(|source| FileError { what: format!("create {}", Series::name(base, 1).display()), source })?;
         let mut first = 1;
         let mut last_file = None;
+        if let (Some(last), Existing::Overwrite) = (numbers.last(), self.existing()) {
+            let path = Series::name(base, *last);
+            File::open(&path).map_or(Ok(()), |file| lock_output(&file, &path))?;
+        }
         match (numbers.last(), self.existing()) {
             (Some(_), Existing::Refuse) => {
                 let name = Series::name(base, *numbers.first().unwrap_or(&1));
@@ -273,12 +300,13 @@ impl Files {
             (Some(last), Existing::Continue) => {
                 let path = Series::name(base, *last);
                 let read = |path: &Path| -> io::Result<_> {
-                    let mut file = OpenOptions::new().read(true).write(true).open(path)?;
+                    let mut file = OpenOptions::new().read(true).append(true).open(path)?;
                     let kept = existing_lines(&mut file)?;
                     Ok((file, kept))
                 };
                 let (file, kept) =
                     read(&path).map_err(|source| FileError { what: format!("read {}", path.display()), source })?;
+                lock_output(&file, &path)?;
                 first = last.saturating_add(1);
                 opened.setup.existing_header = kept.as_ref().map(|kept| kept.header.clone());
                 last_file = Some((file, kept.map_or(0, |kept| kept.length)));
@@ -286,7 +314,7 @@ impl Files {
             _ => {}
         }
         let existing = if self.force { Existing::Overwrite } else { Existing::Refuse };
-        opened.rows = Some(OutFile::open(&Series::name(base, first), existing)?);
+        opened.rows = Some(OutFile::open(&Series::name(base, first), existing, None)?);
         opened.setup.has_series = true;
         let series = Series::new(base, first.saturating_add(1), self.force);
         opened.series = Some(match last_file {
@@ -338,7 +366,6 @@ fn header_mismatch(path: &Path, mismatch: HeaderMismatch) -> Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::Duration;
 
     #[test]
     fn rotations() {

@@ -17,8 +17,16 @@ use std::io::{self, Write};
 /// How long Ctrl-C waits for a blocked output, in tenths of a second.
 const FLUSH_TIMEOUT: u32 = 20;
 
+/// How writing ended.
+pub(super) struct Ended {
+    pub(super) written: Written,
+    pub(super) unwritten: Option<Unwritten>,
+    /// The files that another program deleted.
+    pub(super) deleted: Vec<String>,
+}
+
 /// Waits until everything is written, or until the user does not want to wait any longer.
-pub(super) fn wait_for_writers(mut recorder: Recorder, interrupted: bool) -> (Written, Option<Unwritten>) {
+pub(super) fn wait_for_writers(mut recorder: Recorder, interrupted: bool) -> Ended {
     let mut interrupts = Interrupts::new().ok();
     let mut waited = 0;
     let mut give_up = || {
@@ -33,8 +41,9 @@ pub(super) fn wait_for_writers(mut recorder: Recorder, interrupted: bool) -> (Wr
         events_lost: recorder.events.as_ref().map_or(0, Events::lost),
         left_out: recorder.rows.left_out(),
     };
-    let error = recorder.error.or(rows.err().map(Unwritten::Rows)).or(events.err().map(Unwritten::Events));
-    (written, error)
+    recorder.take_changes().iter().for_each(|text| recorder.console.warn(text));
+    let unwritten = recorder.error.or(rows.err().map(Unwritten::Rows)).or(events.err().map(Unwritten::Events));
+    Ended { written, unwritten, deleted: recorder.deleted }
 }
 
 impl Unwritten {
@@ -64,6 +73,8 @@ pub(super) struct Finished {
     pub(super) report: RecordingReport,
     pub(super) verdicts: Vec<Verdict>,
     pub(super) written: Written,
+    /// The files that another program deleted.
+    pub(super) deleted: Vec<String>,
     /// Whether --count or --duration was given.
     pub(super) is_limited: bool,
     /// Whether the reader closed the output.
@@ -101,7 +112,8 @@ impl Finished {
             Some(unmet) if unmet.kind() == Kind::CheckFailed => (Some(unmet), None),
             unmet => (None, unmet),
         };
-        let own = [self.ended_early(), self.too_slow(files), self.lost_nodes()];
+        let deleted = self.deleted.first().map(|file| LogFailure::FileDeleted { file: file.clone() });
+        let own = [self.ended_early(), self.too_slow(files), deleted, self.lost_nodes()];
         let mut failures: Vec<Failure> = failed.into_iter().collect();
         failures.extend(own.into_iter().flatten().map(Failure::general));
         let nodes = self.report.failed.clone();

@@ -5,10 +5,10 @@ use crate::bus::claim::Claims;
 use crate::bus::{Mono, Stamp};
 use crate::measure::sample::{Sample, Source};
 use crate::output::console::Console;
-use crate::output::events::{EventText, Events, Weight, event_text};
+use crate::output::events::{EventText, Events, Weight, event_text, file_change_text};
 use crate::output::failure::ErrorMessage;
 use crate::output::progress::Progress;
-use crate::output::rows::Rows;
+use crate::output::rows::{FileChange, Rows};
 use crate::tasks::Failure;
 use crate::tasks::log::{LogEvent, LogFailure, Observer};
 use std::io;
@@ -39,6 +39,8 @@ pub(super) struct Recorder {
     start: Option<Mono>,
     checked: Option<Mono>,
     lost: u64,
+    /// The files that another program deleted.
+    pub(super) deleted: Vec<String>,
     is_losing: bool,
     column_changes: u64,
 }
@@ -62,6 +64,7 @@ impl Recorder {
             start: None,
             checked: None,
             lost: 0,
+            deleted: Vec::new(),
             is_losing: false,
             column_changes: 0,
         }
@@ -97,7 +100,19 @@ impl Recorder {
         self.proceed(result)
     }
 
-    /// Reports changed columns, and when rows start and stop being lost.
+    /// What other programs did to the files since the last call, as text.
+    pub(super) fn take_changes(&mut self) -> Vec<String> {
+        let mut changes = self.rows.take_changes();
+        changes.extend(self.events.as_mut().map(Events::take_changes).unwrap_or_default());
+        for change in &changes {
+            if let FileChange::Deleted(path) = change {
+                self.deleted.push(path.display().to_string());
+            }
+        }
+        changes.iter().map(file_change_text).collect()
+    }
+
+    /// Reports changed files and columns, and when rows start and stop being lost.
     fn check_rows(&mut self, at: Stamp) {
         if self.checked.is_some_and(|checked| at.mono.since(checked) < CHECK_INTERVAL) {
             return;
@@ -105,6 +120,9 @@ impl Recorder {
         self.checked = Some(at.mono);
         if let Some(Err(error)) = self.events.as_mut().map(Events::write_header) {
             self.error.get_or_insert(Unwritten::Events(error));
+        }
+        for text in self.take_changes() {
+            self.warn("file", text, at);
         }
         let changes = self.rows.column_changes();
         if changes > std::mem::replace(&mut self.column_changes, changes) {

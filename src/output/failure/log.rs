@@ -49,11 +49,7 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
             nothing_received(*within, nodes, *has_traffic, interface.as_deref())
         }
         LogFailure::NoMeasurements { within, nodes } => no_measurements(*within, nodes),
-        LogFailure::NodesLost { nodes, .. } => {
-            let names: Vec<String> = nodes.iter().map(|node| node.to_string()).collect();
-            let word = if nodes.len() == 1 { "node" } else { "nodes" };
-            Words::new(format!("{word} {} lost: no measurements at the end", names.join(", ")))
-        }
+        LogFailure::NodesLost { nodes, .. } => Words::new(nodes_lost(nodes)),
         LogFailure::OtherColumns { file, found, expected } => {
             Words::new(format!("{file} has other columns: \"{found}\", not \"{expected}\""))
                 .hint("choose another file, or overwrite it with --force")
@@ -65,8 +61,17 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
         LogFailure::RowsLost { rows, output } => {
             Words::new(format!("{} lost: {output} could not keep up", count(*rows)))
         }
+        LogFailure::FileDeleted { file } => {
+            Words::new(format!("{file} was deleted while it was written: its rows are lost"))
+        }
         LogFailure::EventsLost { output } => Words::new(format!("events lost: {output} could not keep up")),
     }
+}
+
+fn nodes_lost(nodes: &[NodeId]) -> String {
+    let names: Vec<String> = nodes.iter().map(|node| node.to_string()).collect();
+    let word = if nodes.len() == 1 { "node" } else { "nodes" };
+    format!("{word} {} lost: no measurements at the end", names.join(", "))
 }
 
 fn count(rows: u64) -> String {

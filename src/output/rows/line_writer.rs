@@ -2,7 +2,7 @@
 //! reception of frames.
 
 use super::series::Series;
-use super::target::{Target, TargetWriter, WriteFailure};
+use super::target::{FileChange, HeaderPlace, Target, TargetWriter, WriteFailure};
 use std::collections::VecDeque;
 use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -17,8 +17,8 @@ const GIVE_UP_INTERVAL: Duration = Duration::from_millis(100);
 /// Something to be written.
 #[derive(Debug)]
 enum Job {
-    /// The lines before the first row: of the next file of the series, or in the current file.
-    Header { new_file: bool, bytes: Vec<u8> },
+    /// The lines before the first row.
+    Header { place: HeaderPlace, bytes: Vec<u8> },
     /// This many rows.
     Rows { bytes: Vec<u8>, rows: u64 },
 }
@@ -30,6 +30,11 @@ impl Job {
         }
     }
 
+    /// What it counts in the queue. Also an empty job is waited for.
+    fn cost(&self) -> usize {
+        self.bytes().len() + 1
+    }
+
     fn rows(&self) -> u64 {
         match self {
             Job::Header { .. } => 0,
@@ -39,7 +44,8 @@ impl Job {
 
     fn run(&self, writer: &mut TargetWriter) -> Result<(), WriteFailure> {
         match self {
-            Job::Header { new_file, bytes } => writer.header(*new_file, bytes),
+            Job::Header { place, bytes } => writer.header(*place, bytes),
+            Job::Rows { bytes, .. } if bytes.is_empty() => writer.check_file().map_err(|error| (error, 0)),
             Job::Rows { bytes, rows } => writer.rows(bytes, *rows),
         }
     }
@@ -67,11 +73,12 @@ struct Queue {
 #[derive(Debug, Default)]
 struct QueueState {
     jobs: VecDeque<Job>,
-    /// Bytes in the jobs, and in the job being written.
+    /// Cost of the jobs, and of the job being written.
     bytes: usize,
     /// Rows in them.
     rows: u64,
     error: Option<io::Error>,
+    changes: Vec<FileChange>,
     has_failed: bool,
     /// Rows that could not be written.
     lost: u64,
@@ -105,7 +112,8 @@ impl Queue {
             };
             let mut state = self.lock();
             // `finish` may have given up and counted these rows as lost.
-            state.bytes = state.bytes.saturating_sub(job.bytes().len());
+            state.bytes = state.bytes.saturating_sub(job.cost());
+            state.changes.append(&mut writer.take_changes());
             state.rows = state.rows.saturating_sub(job.rows());
             if let Err((error, lost)) = result {
                 state.has_failed = true;
@@ -138,12 +146,18 @@ impl LineWriter {
 
     /// Takes the header of the next file of the series. A header is never lost.
     pub(super) fn start_file(&mut self, bytes: Vec<u8>) -> io::Result<()> {
-        self.put(Job::Header { new_file: true, bytes })
+        self.put(Job::Header { place: HeaderPlace::NextFile, bytes })
+    }
+
+    /// Takes the header that the file already has or gets with its first row. The file gets it again if another program
+    /// truncates it.
+    pub(in crate::output) fn keep_header(&mut self, bytes: Vec<u8>) -> io::Result<()> {
+        self.put(Job::Header { place: HeaderPlace::Present, bytes })
     }
 
     /// Takes lines that stand before rows in the current file. They are never lost.
     pub(in crate::output) fn put_header(&mut self, bytes: Vec<u8>) -> io::Result<()> {
-        self.put(Job::Header { new_file: false, bytes })
+        self.put(Job::Header { place: HeaderPlace::CurrentFile, bytes })
     }
 
     /// Takes this many rows and empties the block.
@@ -179,13 +193,13 @@ impl LineWriter {
             }),
             Inner::Queued { queue, capacity, overflowed, lost } => {
                 let mut state = queue.lock();
-                let is_full = state.bytes > 0 && state.bytes + job.bytes().len() > *capacity;
+                let is_full = state.bytes > 0 && state.bytes + job.cost() > *capacity;
                 if state.has_failed {
                     *lost += job.rows();
                 } else if is_full && matches!(job, Job::Rows { .. }) {
                     *overflowed += job.rows();
                 } else {
-                    state.bytes += job.bytes().len();
+                    state.bytes += job.cost();
                     state.rows += job.rows();
                     state.jobs.push_back(job);
                     queue.changed.notify_all();
@@ -206,6 +220,8 @@ impl LineWriter {
     /// Waits until everything is written. If nothing is written for 100 ms, asks `give_up`; if that returns true,
     /// the remaining rows are lost.
     pub(in crate::output) fn finish(&mut self, give_up: &mut dyn FnMut() -> bool) -> io::Result<()> {
+        // Also what happened after the last row.
+        self.put(Job::Rows { bytes: Vec::new(), rows: 0 })?;
         let Inner::Queued { queue, lost, .. } = &mut self.0 else { return Ok(()) };
         let mut state = queue.lock();
         state.is_closed = true;
@@ -222,6 +238,14 @@ impl LineWriter {
             }
         }
         state.error.take().map_or(Ok(()), Err)
+    }
+
+    /// What other programs did to the files since the last call.
+    pub fn take_changes(&mut self) -> Vec<FileChange> {
+        match &mut self.0 {
+            Inner::Direct { writer, .. } => writer.take_changes(),
+            Inner::Queued { queue, .. } => std::mem::take(&mut queue.lock().changes),
+        }
     }
 
     /// Rows that came too fast or could not be written.
@@ -314,11 +338,11 @@ mod tests {
     #[test]
     fn blocked_target_loses_rows_beyond_the_capacity_but_no_header() {
         let (target, go, written) = gate();
-        let mut writer = LineWriter::queued(target, None, 12).expect("a thread");
+        let mut writer = LineWriter::queued(target, None, 15).expect("a thread");
         for text in ["aaa\n", "bbb\n", "ccc\n", "ddd\neee\n"] {
             put(&mut writer, text).expect("nothing fails");
         }
-        assert_eq!(writer.lost(), 2, "12 bytes wait");
+        assert_eq!(writer.lost(), 2, "12 bytes in three blocks wait");
         writer.put_header(b"head\n".to_vec()).expect("nothing fails");
         assert_eq!(writer.lost(), 2);
         (0..4).for_each(|_| go.send(()).expect("it writes"));

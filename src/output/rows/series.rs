@@ -1,5 +1,6 @@
 //! The files of one recording: `run-0001.csv`, `run-0002.csv` and so on.
 
+use crate::bus::file::lock;
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -60,21 +61,18 @@ impl Series {
         Ok(numbers)
     }
 
-    /// Creates the next file.
-    pub(super) fn create(&mut self) -> io::Result<File> {
+    /// Creates the next file and locks it. The number of a file that another program writes is skipped.
+    pub(super) fn create(&mut self) -> io::Result<(PathBuf, File)> {
         loop {
             let path = Series::name(&self.base, self.next);
             self.next += 1;
             let mut options = OpenOptions::new();
-            options.write(true);
-            let file = if self.force {
-                options.create(true).truncate(true).open(path)
-            } else {
-                options.create_new(true).open(path)
-            };
-            match file {
+            options.append(true).create(self.force).create_new(!self.force);
+            match options.open(&path) {
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists && self.next < u32::MAX => {}
-                file => return file,
+                Ok(file) if lock(&file).is_err() => {}
+                Ok(file) => return file.set_len(0).map(|()| (path, file)),
+                Err(error) => return Err(error),
             }
         }
     }
@@ -104,7 +102,10 @@ mod tests {
         let created: Vec<bool> = (0..2).map(|_| series.create().is_ok()).collect();
         assert_eq!((created, Series::existing(&base).expect("read")), (vec![true, true], vec![1, 2, 3, 10]));
         assert_eq!(fs::read_to_string(folder.path().join("run-0002.csv")).expect("read"), "run-0002.csv");
-        Series::new(&base, 2, true).create().expect("overwritten");
+        let first = Series::new(&base, 2, true).create().expect("overwritten");
         assert_eq!(fs::read_to_string(folder.path().join("run-0002.csv")).expect("read"), "");
+        // A file that is being written is not overwritten.
+        let (second, _file) = Series::new(&base, 2, true).create().expect("overwritten");
+        assert_eq!((first.0, second), (Series::name(&base, 2), Series::name(&base, 3)));
     }
 }

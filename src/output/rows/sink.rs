@@ -7,6 +7,7 @@ use super::line_writer::LineWriter;
 use super::rotation::CurrentFile;
 use super::row::{Columns, Row, Values};
 use super::setup::Setup;
+use super::target::FileChange;
 use crate::bus::{Mono, Stamp};
 use crate::output::elapsed::Elapsed;
 use std::io;
@@ -86,11 +87,13 @@ impl RowSink {
     /// Makes sure that a row of this time has a file with a header.
     fn prepare_file(&mut self, elapsed: Duration, columns: Columns<'_>) -> io::Result<()> {
         if self.rows == 0 {
+            let header = self.format.header(columns);
             if !self.setup.continues {
-                self.block.extend(self.format.header(columns));
+                self.block.extend_from_slice(&header);
                 self.file.start(self.block.len());
             }
             self.file.set_end(elapsed);
+            return self.writer.keep_header(header);
         } else if self.file.is_over(elapsed) {
             if let Err(error) = self.flush().and_then(|()| self.start_file(columns)) {
                 self.rows_without_file += 1;
@@ -154,6 +157,11 @@ impl RowSink {
     /// Rows that could not be written or came too fast.
     pub(super) fn lost(&self) -> u64 {
         self.writer.lost() + self.rows_without_file
+    }
+
+    /// What other programs did to the files since the last call.
+    pub(super) fn take_changes(&mut self) -> Vec<FileChange> {
+        self.writer.take_changes()
     }
 
     /// Rows that came too fast.

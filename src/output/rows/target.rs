@@ -1,16 +1,20 @@
 //! Where lines are written: a file, a series of files, or a stream. A failure leaves whole lines only.
 
 use super::series::Series;
+use crate::bus::file::{NameChange, name_change};
 use std::fs::File;
-use std::io::{self, Seek, Write};
+use std::io::{self, Write};
+use std::path::PathBuf;
 
 /// Where lines are written.
 #[derive(Debug)]
 pub enum Target {
     /// A file. A regular file keeps its first `keep` bytes; the first line replaces the rest.
     File {
-        /// Open for writing.
+        /// Open for appending.
         file: File,
+        /// Its name.
+        path: PathBuf,
         /// How many of its bytes are kept.
         keep: u64,
     },
@@ -23,6 +27,28 @@ pub trait Stream: Write + std::fmt::Debug + Send {}
 
 impl<T: Write + std::fmt::Debug + Send> Stream for T {}
 
+/// What another program did to a file while it was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FileChange {
+    /// The file became shorter. It gets its header again.
+    Shortened(PathBuf),
+    /// The file was moved. The rows follow it.
+    Moved(PathBuf),
+    /// The file was deleted, and its rows with it.
+    Deleted(PathBuf),
+}
+
+/// Where the lines before the first row of a file go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum HeaderPlace {
+    /// They start the next file of the series.
+    NextFile,
+    /// They go to the current file, now.
+    CurrentFile,
+    /// The current file has them, or gets them together with the first row.
+    Present,
+}
+
 /// What failed, and how many rows were lost with it.
 pub(super) type WriteFailure = (io::Error, u64);
 
@@ -32,26 +58,52 @@ pub(super) struct TargetWriter {
     target: Target,
     series: Option<Series>,
     is_prepared: bool,
+    /// The lines before the first row.
+    header: Vec<u8>,
+    /// The length of a regular file after the last write.
+    length: u64,
+    name_change: Option<NameChange>,
+    changes: Vec<FileChange>,
 }
 
 impl TargetWriter {
     pub(super) fn new(target: Target, series: Option<Series>) -> TargetWriter {
-        TargetWriter { target, series, is_prepared: false }
+        TargetWriter {
+            target,
+            series,
+            is_prepared: false,
+            header: Vec::new(),
+            length: 0,
+            name_change: None,
+            changes: Vec::new(),
+        }
     }
 
-    /// Writes the lines before the first row. With `new_file` they start the next file of the series.
-    pub(super) fn header(&mut self, new_file: bool, bytes: &[u8]) -> Result<(), WriteFailure> {
+    /// Takes the lines before the first row.
+    pub(super) fn header(&mut self, place: HeaderPlace, bytes: &[u8]) -> Result<(), WriteFailure> {
+        self.header = bytes.to_vec();
+        if place == HeaderPlace::Present {
+            return Ok(());
+        }
         self.prepare().map_err(|error| (error, 0))?;
-        if let (true, Some(series)) = (new_file, &mut self.series) {
-            let file = series.create().map_err(|error| (error, 0))?;
-            self.target = Target::File { file, keep: 0 };
+        if let (HeaderPlace::NextFile, Some(series)) = (place, &mut self.series) {
+            let (path, file) = series.create().map_err(|error| (error, 0))?;
+            self.target = Target::File { file, path, keep: 0 };
+            (self.length, self.name_change) = (0, None);
         }
         self.rows(bytes, 0)
+    }
+
+    /// What other programs did to the files since the last call.
+    pub(super) fn take_changes(&mut self) -> Vec<FileChange> {
+        std::mem::take(&mut self.changes)
     }
 
     /// Writes whole lines. After a failure the file ends with a whole line.
     pub(super) fn rows(&mut self, bytes: &[u8], rows: u64) -> Result<(), WriteFailure> {
         self.prepare().map_err(|error| (error, rows))?;
+        self.check_file().map_err(|error| (error, rows))?;
+        self.length += bytes.len() as u64;
         write_lines(&mut self.target, bytes).map_err(|(error, kept)| {
             let lines = bytes[kept..].iter().filter(|&&byte| byte == b'\n').count() as u64;
             (error, lines.min(rows))
@@ -66,11 +118,40 @@ impl TargetWriter {
         if let Some(series) = &mut self.series {
             series.repair_last()?;
         }
-        if let Target::File { file, keep } = &mut self.target
+        if let Target::File { file, keep, .. } = &mut self.target
             && file.metadata()?.is_file()
         {
             file.set_len(*keep)?;
-            file.seek(io::SeekFrom::End(0))?;
+            self.length = *keep;
+        }
+        Ok(())
+    }
+
+    /// Finds out what other programs did to the file since the last write. A file that became shorter gets its header
+    /// again.
+    pub(super) fn check_file(&mut self) -> io::Result<()> {
+        let Target::File { file, path, .. } = &self.target else { return Ok(()) };
+        let metadata = file.metadata()?;
+        if !self.is_prepared || !metadata.is_file() {
+            return Ok(());
+        }
+        let change = name_change(&metadata, path);
+        if change != std::mem::replace(&mut self.name_change, change) {
+            let report = change.map(|change| match change {
+                NameChange::Moved => FileChange::Moved(path.clone()),
+                NameChange::Deleted => FileChange::Deleted(path.clone()),
+            });
+            self.changes.extend(report);
+        }
+        let is_shorter = metadata.len() < self.length;
+        self.length = metadata.len();
+        if is_shorter {
+            self.changes.push(FileChange::Shortened(path.clone()));
+            // After a rest, an empty line separates the two tables.
+            let separator: &[u8] = if self.length > 0 && !self.header.is_empty() { b"\n" } else { b"" };
+            let lines = [separator, &self.header].concat();
+            self.length += lines.len() as u64;
+            write_lines(&mut self.target, &lines).map_err(|(error, _)| error)?;
         }
         Ok(())
     }
@@ -121,10 +202,54 @@ mod tests {
     fn a_partial_row_is_removed() {
         let mut file = tempfile::tempfile().expect("a file");
         file.write_all(b"head\naaa\nbb").expect("written");
-        let mut target = Target::File { file: file.try_clone().expect("a file"), keep: 0 };
+        let mut target = Target::File { file: file.try_clone().expect("a file"), path: PathBuf::new(), keep: 0 };
         assert_eq!(cut_partial_line(&mut target, b"aaa\nbbb\n", 6), 4);
         assert_eq!(file.metadata().expect("a file").len(), 9, "header and the first row");
         assert_eq!(cut_partial_line(&mut target, b"ccc\n", 0), 0);
         assert_eq!(file.metadata().expect("a file").len(), 9);
+    }
+
+    fn writer(path: &std::path::Path) -> TargetWriter {
+        let file = File::options().append(true).create(true).open(path).expect("a file");
+        TargetWriter::new(Target::File { file, path: path.to_owned(), keep: 0 }, None)
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn file_that_became_shorter_gets_its_header_again() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("run.csv");
+        let mut writer = writer(&path);
+        writer.header(HeaderPlace::Present, b"head\n").expect("taken");
+        writer.rows(b"head\naaa\nbbb\n", 2).expect("written");
+        let file = File::options().write(true).open(&path).expect("a file");
+        file.set_len(0).expect("truncated");
+        writer.rows(b"ccc\n", 1).expect("written");
+        assert_eq!(std::fs::read_to_string(&path).expect("read"), "head\nccc\n");
+        file.set_len(7).expect("truncated");
+        writer.rows(b"ddd\n", 1).expect("written");
+        assert_eq!(std::fs::read_to_string(&path).expect("read"), "head\ncc\nhead\nddd\n");
+        assert_eq!(writer.take_changes(), vec![FileChange::Shortened(path.clone()); 2]);
+        // A file that became longer is continued at its end.
+        std::fs::write(&path, "a much longer text of another program\n").expect("written");
+        writer.rows(b"eee\n", 1).expect("written");
+        assert_eq!(std::fs::read_to_string(&path).expect("read"), "a much longer text of another program\neee\n");
+        assert_eq!(writer.take_changes(), []);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn moved_and_deleted_file_is_reported_once() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [path, old] = ["run.csv", "run.old"].map(|name| folder.path().join(name));
+        let mut writer = writer(&path);
+        writer.rows(b"aaa\n", 1).expect("written");
+        std::fs::rename(&path, &old).expect("moved");
+        writer.rows(b"bbb\n", 1).expect("written");
+        writer.rows(b"ccc\n", 1).expect("written");
+        assert_eq!(std::fs::read_to_string(&old).expect("read"), "aaa\nbbb\nccc\n");
+        std::fs::remove_file(&old).expect("deleted");
+        writer.check_file().expect("no error");
+        assert_eq!(writer.take_changes(), [FileChange::Moved(path.clone()), FileChange::Deleted(path)]);
     }
 }

@@ -146,7 +146,8 @@ fn rotated(rotation: Rotation, count: u64) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let base = folder.path().join("run.csv");
     let file = fs::File::create(Series::name(&base, 1)).expect("created");
-    let writer = LineWriter::direct(Target::File { file, keep: 0 }, Some(Series::new(&base, 2, false)));
+    let writer =
+        LineWriter::direct(Target::File { file, path: base.clone(), keep: 0 }, Some(Series::new(&base, 2, false)));
     let mut rows = Rows::new(writer, Setup { rotation: Some(rotation), has_series: true, ..Setup::default() });
     for number in 0..count {
         let row = sample(number * 250_000, Some(Number::Decimal { mantissa: number.into(), digits: 0 }), None, &[]);
@@ -194,7 +195,8 @@ fn continued_file_keeps_its_whole_lines() {
     let existing = existing_lines(&mut file).expect("read").expect("lines");
     let setup = Setup { existing_header: Some(existing.header), continues: true, ..Setup::default() };
     assert_eq!(setup.check_long(), Ok(()));
-    let mut rows = Rows::new(LineWriter::direct(Target::File { file, keep: existing.length }, None), setup);
+    let mut rows =
+        Rows::new(LineWriter::direct(Target::File { file, path: path.clone(), keep: existing.length }, None), setup);
     assert_eq!(fs::read_to_string(&path).expect("read").len(), 48 + 1 + 4 + 3, "nothing before the first row");
     rows.put(None, &[three()[1].0.clone()], &[source("pressure", "bar")]).expect("written");
     rows.finish(&mut || false).expect("written");

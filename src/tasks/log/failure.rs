@@ -89,6 +89,11 @@ pub enum LogFailure {
         /// The name of the file or stream.
         output: String,
     },
+    /// Another program deleted the file while it was written.
+    FileDeleted {
+        /// The name of the file.
+        file: String,
+    },
     /// The output of the events could not keep up.
     EventsLost {
         /// The name of the file or stream.
@@ -112,7 +117,10 @@ impl LogFailure {
             | LogFailure::NoMeasurements { .. }
             | LogFailure::NodesLost { all: true, .. } => Kind::NoAnswer,
             LogFailure::NodesLost { all: false, .. } => Kind::Partial,
-            LogFailure::OutputClosed { .. } | LogFailure::RowsLost { .. } | LogFailure::EventsLost { .. } => Kind::Io,
+            LogFailure::OutputClosed { .. }
+            | LogFailure::RowsLost { .. }
+            | LogFailure::EventsLost { .. }
+            | LogFailure::FileDeleted { .. } => Kind::Io,
             LogFailure::EndedEarly { .. } => Kind::Interrupted,
         }
     }

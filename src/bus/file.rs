@@ -1,0 +1,181 @@
+//! Facts about open files that only the operating system knows: who writes them, whether they still have their name,
+//! whether a FIFO has a reader.
+
+use super::interrupt::Interrupts;
+use std::fs::{File, Metadata, TryLockError};
+use std::io;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Another open file of the same inode has the lock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Locked {
+    /// The process that has it, if known.
+    pub process: Option<u32>,
+    /// Whether this process has it.
+    pub is_own: bool,
+}
+
+/// Locks a regular file until it is closed: one file, one writer. Other files are not locked.
+///
+/// # Errors
+/// Another process, or this one under another name, is writing the file.
+pub fn lock(file: &File) -> Result<(), Locked> {
+    if !file.metadata().is_ok_and(|metadata| metadata.is_file()) {
+        return Ok(());
+    }
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            let process = holder(file);
+            Err(Locked { process, is_own: process == Some(std::process::id()) })
+        }
+        // Some network file systems have no locks.
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
+    }
+}
+
+/// The process that has the lock, from `/proc/locks`; `None` if that does not show exactly one.
+fn holder(file: &File) -> Option<u32> {
+    let (_, inode) = identity(&file.metadata().ok()?)?;
+    let locks = std::fs::read_to_string("/proc/locks").ok()?;
+    let mut holders = locks.lines().filter_map(|line| holder_in(line, inode));
+    holders.next().filter(|_| holders.next().is_none())
+}
+
+/// The process in a line of `/proc/locks`: `1: FLOCK  ADVISORY  WRITE 4711 fd:01:1234 0 EOF`. A line with `->` waits.
+fn holder_in(line: &str, inode: u64) -> Option<u32> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let [_, "FLOCK", _, _, process, place, ..] = words.as_slice() else { return None };
+    let found: u64 = place.rsplit(':').next()?.parse().ok()?;
+    // 0 is a process of another namespace.
+    process.parse().ok().filter(|&process| found == inode && process != 0)
+}
+
+/// What happened to the name of an open file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NameChange {
+    /// The file has another name now.
+    Moved,
+    /// The file has no name any more.
+    Deleted,
+}
+
+/// What happened to the name of an open file, from its metadata; `None` if `path` is still its name.
+pub fn name_change(metadata: &Metadata, path: &Path) -> Option<NameChange> {
+    let found = path.metadata().ok().and_then(|metadata| identity(&metadata));
+    match identity(metadata) {
+        Some(_) if links(metadata) == 0 => Some(NameChange::Deleted),
+        Some(own) => (found != Some(own)).then_some(NameChange::Moved),
+        None => None,
+    }
+}
+
+/// Whether two files are the same one.
+pub fn is_same(one: &Metadata, other: &Metadata) -> bool {
+    identity(one).is_some_and(|one| identity(other) == Some(one))
+}
+
+/// Device and inode.
+#[cfg(unix)]
+fn identity(metadata: &Metadata) -> Option<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt;
+    Some((metadata.dev(), metadata.ino()))
+}
+
+#[cfg(unix)]
+fn links(metadata: &Metadata) -> u64 {
+    std::os::unix::fs::MetadataExt::nlink(metadata)
+}
+
+#[cfg(not(unix))]
+fn identity(_: &Metadata) -> Option<(u64, u64)> {
+    None
+}
+
+#[cfg(not(unix))]
+fn links(_: &Metadata) -> u64 {
+    1
+}
+
+/// How often a FIFO is asked for a reader.
+const READER_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Waits until a program reads from a FIFO, because opening it would block. Returns the waiting time, and a file that
+/// keeps the FIFO open until the caller has opened it. Another file is not waited for.
+///
+/// # Errors
+/// [`io::ErrorKind::TimedOut`] after `limit`, [`io::ErrorKind::Interrupted`] after a signal.
+#[cfg(unix)]
+pub fn wait_for_reader(path: &Path, limit: Option<Duration>) -> io::Result<(Duration, Option<File>)> {
+    use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+    if !path.metadata().is_ok_and(|metadata| metadata.file_type().is_fifo()) {
+        return Ok((Duration::ZERO, None));
+    }
+    let (start, mut interrupts) = (Instant::now(), Interrupts::new()?);
+    loop {
+        let opened = File::options().write(true).custom_flags(libc::O_NONBLOCK).open(path);
+        match opened {
+            Err(error) if error.raw_os_error() == Some(libc::ENXIO) => {}
+            opened => return Ok((start.elapsed(), Some(opened?))),
+        }
+        let left = limit.map_or(READER_INTERVAL, |limit| limit.saturating_sub(start.elapsed()));
+        if left.is_zero() {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        if interrupts.wait_for(left.min(READER_INTERVAL)) {
+            return Err(io::ErrorKind::Interrupted.into());
+        }
+    }
+}
+
+/// Opening blocks without a reader on other systems.
+///
+/// # Errors
+/// None.
+#[cfg(not(unix))]
+pub fn wait_for_reader(_: &Path, _: Option<Duration>) -> io::Result<(Duration, Option<File>)> {
+    Ok((Duration::ZERO, None))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn file_has_one_writer() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("run.csv");
+        let first = File::create(&path).expect("created");
+        let second = File::open(&path).expect("opened");
+        assert_eq!(lock(&first), Ok(()));
+        let process = cfg!(target_os = "linux").then(std::process::id);
+        assert_eq!(lock(&second), Err(Locked { process, is_own: process.is_some() }));
+        drop(first);
+        assert_eq!(lock(&second), Ok(()));
+        assert_eq!(lock(&File::open("/dev/null").expect("a device")), Ok(()));
+    }
+
+    #[test]
+    fn lines_of_proc_locks() {
+        let line = "1: FLOCK  ADVISORY  WRITE 4711 fd:01:1234 0 EOF";
+        assert_eq!((holder_in(line, 1234), holder_in(line, 123)), (Some(4711), None));
+        assert_eq!(holder_in("1: -> FLOCK  ADVISORY  WRITE 4712 fd:01:1234 0 EOF", 1234), None);
+        assert_eq!(holder_in("2: POSIX  ADVISORY  WRITE 4711 fd:01:1234 0 EOF", 1234), None);
+        assert_eq!(holder_in("1: FLOCK  ADVISORY  WRITE 0 fd:01:1234 0 EOF", 1234), None);
+    }
+
+    #[test]
+    fn a_lost_name_is_found() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [path, other] = ["run.csv", "old.csv"].map(|name| folder.path().join(name));
+        let file = File::create(&path).expect("created");
+        let change = || name_change(&file.metadata().expect("metadata"), &path);
+        assert_eq!(change(), None);
+        std::fs::rename(&path, &other).expect("moved");
+        assert_eq!(change(), Some(NameChange::Moved));
+        File::create(&path).expect("a new one");
+        assert_eq!(change(), Some(NameChange::Moved), "another file has the name");
+        std::fs::remove_file(&other).expect("deleted");
+        assert_eq!(change(), Some(NameChange::Deleted));
+    }
+}
