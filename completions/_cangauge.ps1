@@ -337,7 +337,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--quiet', '--quiet', [CompletionResultType]::ParameterName, 'Print less on stderr')
             [CompletionResult]::new('-v', '-v', [CompletionResultType]::ParameterName, 'Print more on stderr')
             [CompletionResult]::new('--verbose', '--verbose', [CompletionResultType]::ParameterName, 'Print more on stderr')
-            [CompletionResult]::new('--probe', '--probe', [CompletionResultType]::ParameterName, 'If the state is unknown: set the heartbeat time (1017h) briefly and restore it')
+            [CompletionResult]::new('--probe', '--probe', [CompletionResultType]::ParameterName, 'If the state is unknown, switch the heartbeat on for a moment (1017h)')
             [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
@@ -458,7 +458,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
-            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects: the value is never scaled; several objects print "OBJECT VALUE" lines')
+            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects and print their unscaled values')
             [CompletionResult]::new('write', 'write', [CompletionResultType]::ParameterValue, 'Write an object, or several OBJECT=VALUE')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
@@ -525,7 +525,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;sdo;help' {
-            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects: the value is never scaled; several objects print "OBJECT VALUE" lines')
+            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects and print their unscaled values')
             [CompletionResult]::new('write', 'write', [CompletionResultType]::ParameterValue, 'Write an object, or several OBJECT=VALUE')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
@@ -641,9 +641,9 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('scan', 'scan', [CompletionResultType]::ParameterValue, 'List devices with a node-ID (found by SDO) and without one (found by fastscan)')
             [CompletionResult]::new('inquire', 'inquire', [CompletionResultType]::ParameterValue, 'Read the identity and node-ID of a device by LSS')
             [CompletionResult]::new('set-id', 'set-id', [CompletionResultType]::ParameterValue, 'Set the node-ID of a device: check that it is free, configure, store, reset, confirm')
-            [CompletionResult]::new('set-bitrate', 'set-bitrate', [CompletionResultType]::ParameterValue, 'Set the bit rate of a device, by its own bit rate table')
+            [CompletionResult]::new('set-bitrate', 'set-bitrate', [CompletionResultType]::ParameterValue, 'Set the bit rate of a device')
             [CompletionResult]::new('set', 'set', [CompletionResultType]::ParameterValue, 'Set the node-ID and bit rate of a device, with one store and one reset')
-            [CompletionResult]::new('activate', 'activate', [CompletionResultType]::ParameterValue, 'Activate a configured bit rate. The device is silent for the delay, changes, and is silent for it again')
+            [CompletionResult]::new('activate', 'activate', [CompletionResultType]::ParameterValue, 'Activate the configured bit rate. The device is silent for DELAY before the change, and for DELAY after it')
             [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Store node-ID and bit rate in non-volatile memory')
             [CompletionResult]::new('identify', 'identify', [CompletionResultType]::ParameterValue, 'Check whether devices have an identity in a range. Exit code 3 if none answers')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
@@ -870,9 +870,9 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('scan', 'scan', [CompletionResultType]::ParameterValue, 'List devices with a node-ID (found by SDO) and without one (found by fastscan)')
             [CompletionResult]::new('inquire', 'inquire', [CompletionResultType]::ParameterValue, 'Read the identity and node-ID of a device by LSS')
             [CompletionResult]::new('set-id', 'set-id', [CompletionResultType]::ParameterValue, 'Set the node-ID of a device: check that it is free, configure, store, reset, confirm')
-            [CompletionResult]::new('set-bitrate', 'set-bitrate', [CompletionResultType]::ParameterValue, 'Set the bit rate of a device, by its own bit rate table')
+            [CompletionResult]::new('set-bitrate', 'set-bitrate', [CompletionResultType]::ParameterValue, 'Set the bit rate of a device')
             [CompletionResult]::new('set', 'set', [CompletionResultType]::ParameterValue, 'Set the node-ID and bit rate of a device, with one store and one reset')
-            [CompletionResult]::new('activate', 'activate', [CompletionResultType]::ParameterValue, 'Activate a configured bit rate. The device is silent for the delay, changes, and is silent for it again')
+            [CompletionResult]::new('activate', 'activate', [CompletionResultType]::ParameterValue, 'Activate the configured bit rate. The device is silent for DELAY before the change, and for DELAY after it')
             [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Store node-ID and bit rate in non-volatile memory')
             [CompletionResult]::new('identify', 'identify', [CompletionResultType]::ParameterValue, 'Check whether devices have an identity in a range. Exit code 3 if none answers')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
@@ -1269,7 +1269,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('-V', '-V ', [CompletionResultType]::ParameterName, 'Print version')
             [CompletionResult]::new('--version', '--version', [CompletionResultType]::ParameterName, 'Print version')
             [CompletionResult]::new('show', 'show', [CompletionResultType]::ParameterValue, 'Show the settings of TPDOs')
-            [CompletionResult]::new('map', 'map', [CompletionResultType]::ParameterValue, 'Set the mapping of a TPDO, and when it is sent')
+            [CompletionResult]::new('map', 'map', [CompletionResultType]::ParameterValue, 'Set the mapping and the transmission of a TPDO')
             [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Show received TPDOs, decoded, until Ctrl-C')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
@@ -1358,7 +1358,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
         }
         'cangauge;pdo;help' {
             [CompletionResult]::new('show', 'show', [CompletionResultType]::ParameterValue, 'Show the settings of TPDOs')
-            [CompletionResult]::new('map', 'map', [CompletionResultType]::ParameterValue, 'Set the mapping of a TPDO, and when it is sent')
+            [CompletionResult]::new('map', 'map', [CompletionResultType]::ParameterValue, 'Set the mapping and the transmission of a TPDO')
             [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Show received TPDOs, decoded, until Ctrl-C')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
@@ -1438,7 +1438,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;store' {
-            [CompletionResult]::new('--group', '--group', [CompletionResultType]::ParameterName, 'Which settings: everything, communication (1000h to 1FFFh), or application (6000h to 9FFFh)')
+            [CompletionResult]::new('--group', '--group', [CompletionResultType]::ParameterName, 'Settings: all, communication (1000h to 1FFFh), or application (6000h to 9FFFh)')
             [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]')
             [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]')
             [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
@@ -1465,7 +1465,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;restore' {
-            [CompletionResult]::new('--group', '--group', [CompletionResultType]::ParameterName, 'Which settings: everything, communication (1000h to 1FFFh), or application (6000h to 9FFFh)')
+            [CompletionResult]::new('--group', '--group', [CompletionResultType]::ParameterName, 'Settings: all, communication (1000h to 1FFFh), or application (6000h to 9FFFh)')
             [CompletionResult]::new('-b', '-b', [CompletionResultType]::ParameterName, 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]')
             [CompletionResult]::new('--bus', '--bus', [CompletionResultType]::ParameterName, 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]')
             [CompletionResult]::new('-t', '-t', [CompletionResultType]::ParameterName, 'Longest wait for one answer [default: 500ms; scan: 200ms]')
@@ -1727,7 +1727,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             break
         }
         'cangauge;help;sdo' {
-            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects: the value is never scaled; several objects print "OBJECT VALUE" lines')
+            [CompletionResult]::new('read', 'read', [CompletionResultType]::ParameterValue, 'Read objects and print their unscaled values')
             [CompletionResult]::new('write', 'write', [CompletionResultType]::ParameterValue, 'Write an object, or several OBJECT=VALUE')
             break
         }
@@ -1747,9 +1747,9 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
             [CompletionResult]::new('scan', 'scan', [CompletionResultType]::ParameterValue, 'List devices with a node-ID (found by SDO) and without one (found by fastscan)')
             [CompletionResult]::new('inquire', 'inquire', [CompletionResultType]::ParameterValue, 'Read the identity and node-ID of a device by LSS')
             [CompletionResult]::new('set-id', 'set-id', [CompletionResultType]::ParameterValue, 'Set the node-ID of a device: check that it is free, configure, store, reset, confirm')
-            [CompletionResult]::new('set-bitrate', 'set-bitrate', [CompletionResultType]::ParameterValue, 'Set the bit rate of a device, by its own bit rate table')
+            [CompletionResult]::new('set-bitrate', 'set-bitrate', [CompletionResultType]::ParameterValue, 'Set the bit rate of a device')
             [CompletionResult]::new('set', 'set', [CompletionResultType]::ParameterValue, 'Set the node-ID and bit rate of a device, with one store and one reset')
-            [CompletionResult]::new('activate', 'activate', [CompletionResultType]::ParameterValue, 'Activate a configured bit rate. The device is silent for the delay, changes, and is silent for it again')
+            [CompletionResult]::new('activate', 'activate', [CompletionResultType]::ParameterValue, 'Activate the configured bit rate. The device is silent for DELAY before the change, and for DELAY after it')
             [CompletionResult]::new('store', 'store', [CompletionResultType]::ParameterValue, 'Store node-ID and bit rate in non-volatile memory')
             [CompletionResult]::new('identify', 'identify', [CompletionResultType]::ParameterValue, 'Check whether devices have an identity in a range. Exit code 3 if none answers')
             break
@@ -1817,7 +1817,7 @@ Register-ArgumentCompleter -Native -CommandName 'cangauge' -ScriptBlock {
         }
         'cangauge;help;pdo' {
             [CompletionResult]::new('show', 'show', [CompletionResultType]::ParameterValue, 'Show the settings of TPDOs')
-            [CompletionResult]::new('map', 'map', [CompletionResultType]::ParameterValue, 'Set the mapping of a TPDO, and when it is sent')
+            [CompletionResult]::new('map', 'map', [CompletionResultType]::ParameterValue, 'Set the mapping and the transmission of a TPDO')
             [CompletionResult]::new('watch', 'watch', [CompletionResultType]::ParameterValue, 'Show received TPDOs, decoded, until Ctrl-C')
             break
         }

@@ -95,7 +95,7 @@ pub struct Stamp {
 }
 
 /// A duration as text for users: `500 ms`, `5 s`, `2.5 s`, `1h 30m`.
-pub fn spoken(length: Duration) -> String {
+pub fn format_duration(length: Duration) -> String {
     let milliseconds = length.as_millis();
     if length >= Duration::from_secs(60) {
         humantime::format_duration(Duration::from_secs(length.as_secs())).to_string()
@@ -138,7 +138,7 @@ mod tests {
             (Duration::from_micros(80), "80 us"),
             (Duration::from_secs(5400), "1h 30m"),
         ] {
-            assert_eq!(spoken(length), words);
+            assert_eq!(format_duration(length), words);
         }
     }
 }

@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn text_that_is_no_frame() {
+    fn invalid_text_is_rejected() {
         for text in
             ["", "123", "12#00", "800#", "20000000#", "123#0", "123#001122334455667788", "123#R9", "123#+1", "1é#"]
         {

@@ -1,5 +1,4 @@
-//! What people type: nodes, signals, objects, durations. Everything is checked here, before a bus is
-//! opened.
+//! Types of arguments: nodes, signals, objects, durations. Arguments are checked here, before a bus is opened.
 
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -31,15 +30,15 @@ impl FromStr for Duration {
 
 /// A bit rate in bit/s: `250k`, `1M`, `125000`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rate(pub u32);
+pub struct BitRate(pub u32);
 
 /// The bit rates of classic CAN, in bit/s.
 const RATES: std::ops::RangeInclusive<u32> = 1_000..=1_000_000;
 
-impl FromStr for Rate {
+impl FromStr for BitRate {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Rate, String> {
+    fn from_str(text: &str) -> Result<BitRate, String> {
         let (number, factor) = match text.strip_suffix(['k', 'K']) {
             Some(number) => (number, 1_000),
             None => text.strip_suffix('M').map_or((text, 1), |number| (number, 1_000_000)),
@@ -47,8 +46,8 @@ impl FromStr for Rate {
         let digits = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
         let rate = number.parse::<u32>().ok().filter(|_| digits).and_then(|number| number.checked_mul(factor));
         match rate.filter(|rate| RATES.contains(rate)) {
-            Some(rate) => Ok(Rate(rate)),
-            None => Err(format!("\"{text}\" is not a bit rate of CAN (250k, 1M, 125000)")),
+            Some(rate) => Ok(BitRate(rate)),
+            None => Err(format!("\"{text}\" is not a CAN bit rate (250k, 1M, 125000)")),
         }
     }
 }
@@ -56,14 +55,14 @@ impl FromStr for Rate {
 /// Which nodes: `5`, `0x7f`, `1-16`, `1,5,0x10-0x1f`, `all`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Nodes {
-    /// Everybody.
+    /// All nodes on the bus.
     All,
-    /// These, in ascending order.
+    /// These nodes, in ascending order.
     These(Vec<NodeId>),
 }
 
 impl Nodes {
-    /// These nodes for oneself.
+    /// Claims these nodes.
     pub(super) fn claim(&self) -> Claim {
         match self {
             Nodes::All => Claim::every_node(),
@@ -84,12 +83,12 @@ impl FromStr for Nodes {
             let (first, last) = part.split_once('-').unwrap_or((part, part));
             let node = |text: &str| {
                 text.parse::<NodeId>().map_err(|_| {
-                    format!("\"{text}\" is not a node-ID: they go from 1 to 127 (5, 0x7f, 1-16, 1,5, all)")
+                    format!("\"{text}\" is not a valid node-ID (1 to 127; examples: 5, 0x7f, 1-16, 1,5, all)")
                 })
             };
             let (first, last) = (node(first)?, node(last)?);
             if first > last {
-                return Err(format!("\"{part}\" counts backwards: {last}-{first}"));
+                return Err(format!("\"{part}\" is in the wrong order: {last}-{first}"));
             }
             nodes.extend(NodeId::all().filter(|node| (first..=last).contains(node)));
         }
@@ -119,7 +118,7 @@ impl FromStr for SignalArg {
                 _ => (text, None),
             };
             if let Some(stated) = stated.filter(|stated| !stated.is_number()) {
-                return Err(format!("\"{text}\": {stated} is not a type of numbers (i16, u32, r32)"));
+                return Err(format!("\"{text}\": {stated} is not a number type (i16, u32, r32)"));
             }
             match object.parse::<ObjectId>() {
                 Ok(object) => return Ok(SignalArg(Wanted::Object(object, stated))),
@@ -139,7 +138,7 @@ fn is_name(text: &str) -> bool {
         && text.chars().all(|character| character.is_ascii_alphanumeric() || character == '-' || character == '_')
 }
 
-/// Whether a text that is not an address was meant as one: `12345`, `6130:300`.
+/// Whether a text looks like an address although it is not valid: `12345`, `6130:300`.
 fn is_like_address(text: &str) -> bool {
     let is_part = |character: char| character.is_ascii_hexdigit() || "xXhH:.".contains(character);
     text.starts_with(|first: char| first.is_ascii_digit()) && text.chars().all(is_part)
@@ -182,7 +181,7 @@ impl fmt::Display for ObjectArg {
 pub enum BusSpec {
     /// A SocketCAN interface.
     SocketCan(String),
-    /// The simulated bus: what stands behind `sim:`, or nothing.
+    /// The simulated bus, with the text after `sim:`.
     Sim(Option<String>),
     /// A candump log.
     Replay(String),
@@ -229,7 +228,9 @@ impl FromStr for InterfaceName {
     fn from_str(text: &str) -> Result<InterfaceName, String> {
         match text.parse()? {
             BusSpec::SocketCan(name) => Ok(InterfaceName(name)),
-            BusSpec::Sim(_) | BusSpec::Replay(_) => Err(format!("\"{text}\" is no interface of this machine (can0)")),
+            BusSpec::Sim(_) | BusSpec::Replay(_) => {
+                Err(format!("\"{text}\" is not a CAN interface of this computer (can0)"))
+            }
         }
     }
 }
@@ -239,7 +240,7 @@ fn interface(name: &str) -> Result<BusSpec, String> {
     if fits {
         Ok(BusSpec::SocketCan(name.to_owned()))
     } else {
-        Err(format!("\"{name}\" is not a name of an interface"))
+        Err(format!("\"{name}\" is not the name of an interface"))
     }
 }
 
@@ -312,7 +313,7 @@ mod tests {
 
     #[test]
     fn bit_rates() {
-        let rate = |text: &str| text.parse::<Rate>().ok().map(|rate| rate.0);
+        let rate = |text: &str| text.parse::<BitRate>().ok().map(|rate| rate.0);
         assert_eq!(rate("250k"), Some(250_000));
         assert_eq!(rate("1M"), Some(1_000_000));
         assert_eq!(rate("125000"), Some(125_000));

@@ -2,7 +2,7 @@
 
 mod host;
 
-use super::args::{BusSpec, Duration, InterfaceName, Rate};
+use super::args::{BitRate, BusSpec, Duration, InterfaceName};
 use super::exit::IntoFailure;
 use super::{Global, open};
 use crate::bus::claim::Claim;
@@ -48,7 +48,7 @@ struct Up {
     /// Interface: can0
     interface: InterfaceName,
     /// Bit rate: 250k, 1M, 125000 [default: the present one; a virtual interface has none]
-    rate: Option<Rate>,
+    rate: Option<BitRate>,
     /// Listen only: send no frame, no acknowledge and no error flag
     #[arg(long, requires = "rate")]
     listen_only: bool,

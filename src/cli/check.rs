@@ -31,10 +31,11 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Expressions (quote each of them; all must be satisfied):
   'pressure in 9.95..10.05 bar'      both ends belong to the range
-  'temperature < 60'                 a number without unit is in the device's current unit
-  '|5.pressure - 6.pressure| < 0.1'  signals of two nodes; a signal without node is checked
+  'temperature < 60 degC'            a number without unit is in the present unit of the device
+  '|5.pressure - 6.pressure| < 0.1 bar'
+                                     signals of two nodes; a signal without node is checked
                                      for each of NODES
-  'noise(pressure) < 0.01'           functions of all samples: mean, min, max, noise (standard
+  'noise(pressure) < 0.01 bar'       functions of all samples: mean, min, max, noise (standard
                                      deviation), rate (1/s), gap (longest interval, s), count,
                                      invalid (number of invalid samples, which then do not fail)
   < <= > >= == != in, + - * /, | |, ( ), and, or, not; pressure.status, 0x6130:1

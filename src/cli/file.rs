@@ -11,10 +11,10 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// What happens to an existing file.
+/// How an existing file is treated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Existing {
-    /// It is an error.
+    /// An existing file is an error.
     Refuse,
     /// Its content is replaced.
     Overwrite,
@@ -118,7 +118,7 @@ impl OutFile {
     /// Writes the whole content, after the bytes that are kept.
     pub(super) fn write(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
         let emptied = if self.is_regular() { self.file.set_len(self.keep) } else { Ok(()) };
-        // Also an object of 0 bytes is content: its file stays.
+        // An object of 0 bytes is content: the file stays.
         self.is_new = false;
         emptied.and_then(|()| self.file.write_all(bytes)).map_err(|source| self.error(source))
     }

@@ -10,7 +10,7 @@ use clap::Args;
 /// Show everything about a device on one page
 ///
 /// Identity, versions, bit rate, NMT state (if its heartbeat shows it), monitoring, errors, signals with unit, range and
-/// status, their settings, TPDOs, objects of the manufacturer, and which settings 1010h stores. Missing objects are
+/// status, their settings, TPDOs, manufacturer-specific objects, and the settings that 1010h stores. Missing objects are
 /// omitted.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b sim info 1\n  cangauge -b sim info 127 --format json")]

@@ -32,11 +32,13 @@ use std::io::{self, IsTerminal};
 #[command(after_help = "\
 Columns: time (UTC), elapsed_s, node, signal, value, unit, status (ok, invalid, overload-high,
 overload-low; empty if the device reports none), raw (bytes in wire order).
-Layout wide: time, elapsed_s, then 5.pressure [bar] and 5.pressure.status for each signal. Each cycle
-is a row with the time of its first value. Cells without data are empty. New columns start a new file.
+Layout wide: time, elapsed_s, then 5.pressure [bar] and 5.pressure.status for each signal.
+Each cycle is a row with the time of its first value. Cells without data are empty. If a mapping or
+a unit changes, the new columns start a new file.
 
 If the output is slow, 12 MiB of rows wait for it. Further rows are lost and counted (exit code 8).
-With --count or --duration, a recording that ends earlier exits with 130 (Ctrl-C) or 8 (output closed).
+With --count or --duration, a recording that ends earlier exits with 130 (Ctrl-C) or 8 (output
+closed).
 
 Examples:
   cangauge -b sim log 1 --sync 100ms --count 20

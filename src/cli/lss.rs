@@ -43,7 +43,7 @@ enum Action {
     SetId(assign::SetId),
     SetBitrate(assign::SetBitrate),
     Set(assign::Set),
-    /// Activate a configured bit rate. The device is silent for the delay, changes, and is silent for it again
+    /// Activate the configured bit rate. The device is silent for DELAY before the change, and for DELAY after it
     Activate(Activate),
     /// Store node-ID and bit rate in non-volatile memory
     Store(StoreArgs),
@@ -192,7 +192,7 @@ impl Activate {
         with_descriptions(global, |master, named, notify| {
             activate(master, target, delay_ms, named, self.force, notify)
         })?;
-        let silent = crate::bus::time::spoken(2 * self.delay.0);
+        let silent = crate::bus::time::format_duration(2 * self.delay.0);
         global.console().note(&format!(
             "sent; devices do not acknowledge it. The new bit rate is active in {silent}: set the host to it"
         ));

@@ -12,7 +12,7 @@ use crate::node::survey::identify_each;
 use crate::output::failure::ErrorMessage;
 use crate::output::nmt::left_heartbeat;
 use crate::output::notes;
-use crate::tasks::nmt::{NmtFailure, Proof, Seen, Starts, StateReport, command, probe, startup, states, watch};
+use crate::tasks::nmt::{NmtFailure, Proof, Starts, StateEvent, StateReport, command, probe, startup, states, watch};
 use crate::tasks::{Fact, Failure, Note};
 use clap::{Args, Subcommand, ValueEnum};
 use std::ops::ControlFlow;
@@ -67,14 +67,14 @@ struct Targets {
 struct StateArgs {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
-    /// If the state is unknown: set the heartbeat time (1017h) briefly and restore it
+    /// If the state is unknown, switch the heartbeat on for a moment (1017h)
     #[arg(long)]
     probe: bool,
 }
 
 #[derive(Debug, Args)]
 struct WatchArgs {
-    /// Which nodes: 5, 0x7f, 1-16, 1,5; for named nodes 1017h is read, else it is learned
+    /// Nodes: 5, 0x7f, 1-16, 1,5. The heartbeat interval of named nodes is read (1017h); of others it is measured
     #[arg(default_value = "all")]
     nodes: Nodes,
     /// End after this time
@@ -218,11 +218,11 @@ impl WatchArgs {
             Nodes::All => (NodeId::all().collect(), false),
             Nodes::These(nodes) => (nodes.clone(), true),
         };
-        let mut rows = global.stream::<Seen>()?;
+        let mut rows = global.stream::<StateEvent>()?;
         let mut failed = None;
         global.with_master(|master| {
             let until = self.duration.map(|duration| master.now() + duration.0);
-            let mut on_change = |seen: &Seen| match rows.push(seen) {
+            let mut on_change = |event: &StateEvent| match rows.push(event) {
                 Ok(()) => ControlFlow::Continue(()),
                 Err(error) => {
                     failed = Some(error);

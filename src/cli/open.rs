@@ -1,4 +1,4 @@
-//! Opens every bus, and finds the descriptions and nodes that the options name.
+//! Opens the bus, and finds the nodes that the options name.
 
 use super::Global;
 use super::args::{BusSpec, Nodes};
@@ -26,17 +26,17 @@ use std::time::Duration;
 /// The longest wait for another program that uses the same nodes.
 const CLAIM_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// The bus that the options name, or the only one there is.
+/// The bus that the options name, or else the only CAN interface that is up.
 pub(super) fn spec(global: &Global) -> Result<BusSpec, ErrorMessage> {
     global.bus.clone().map_or_else(only_interface, Ok)
 }
 
-/// Opens the bus that the options name, or the only one there is.
+/// Opens the bus that the options name, or else the only CAN interface that is up.
 pub(super) fn open(global: &Global) -> anyhow::Result<Box<dyn Bus>> {
     open_as(global, &spec(global)?, false)
 }
 
-/// Claims what the command needs for itself. A simulated bus and a recording belong to this process anyway.
+/// Claims the nodes that the command uses. Only a CAN interface is shared with other processes.
 pub(super) fn claim(global: &Global, spec: &BusSpec) -> Result<Claims, Failure> {
     let BusSpec::SocketCan(bus) = spec else { return Ok(Claims::default()) };
     let (if_held, consequence) = if global.ignore_lock {
@@ -44,7 +44,7 @@ pub(super) fn claim(global: &Global, spec: &BusSpec) -> Result<Claims, Failure> 
     } else {
         (IfHeld::Wait(CLAIM_TIMEOUT), "waiting for it to end")
     };
-    let mut report = |what: &ClaimError| global.console().note(&format!("{what}; {consequence}"));
+    let mut report = |error: &ClaimError| global.console().note(&format!("{error}; {consequence}"));
     Claims::take(bus, &global.claim, if_held, &mut report).map_err(|error| match error {
         ClaimError::InUse(part, _) => {
             let node = if let Part::Node(node) = part { Some(node) } else { None };
@@ -55,7 +55,7 @@ pub(super) fn claim(global: &Global, spec: &BusSpec) -> Result<Claims, Failure> 
     })
 }
 
-/// Opens this bus, whatever the options name; an interface that is down too, where that is wanted.
+/// Opens this bus. With `even_down`, also an interface that is down.
 pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyhow::Result<Box<dyn Bus>> {
     let bus: Box<dyn Bus> = match spec {
         BusSpec::Sim(bench) => Box::new(simulated(bench.as_deref())?),
@@ -104,7 +104,7 @@ pub(super) fn bench(spec: &str) -> anyhow::Result<Bench> {
     Bench::parse(spec).map_err(bench_error)
 }
 
-/// What is wrong with a bench, in the contract's kinds.
+/// The error of a bench file, with its kind.
 pub(super) fn bench_error(error: BenchError) -> anyhow::Error {
     match error {
         BenchError::Usage(message) => ErrorMessage::usage(message).into(),
@@ -144,23 +144,23 @@ fn only_interface() -> Result<BusSpec, ErrorMessage> {
     let list: Vec<String> =
         all.iter().map(|(name, up)| format!("{name} ({})", if *up { "up" } else { "down" })).collect();
     let message = match (all.is_empty(), up.is_empty()) {
-        (true, _) => "which bus? There is no CAN interface here".to_owned(),
-        (false, true) => format!("which bus? No CAN interface is up: {}", list.join(", ")),
-        (false, false) => format!("which bus? There are several CAN interfaces: {}", list.join(", ")),
+        (true, _) => "this computer has no CAN interface".to_owned(),
+        (false, true) => format!("no CAN interface is up: {}", list.join(", ")),
+        (false, false) => format!("several CAN interfaces are up: {}", list.join(", ")),
     };
     let example =
         up.first().or(all.iter().map(|(name, _)| name).collect::<Vec<_>>().first()).map(|name| name.to_string());
     let hint = match example {
-        Some(name) => format!("name one: --bus {name}, or without hardware: --bus sim"),
+        Some(name) => format!("choose one: --bus {name}; without hardware: --bus sim"),
         None => "without hardware: --bus sim".to_owned(),
     };
     Err(ErrorMessage::usage(message).hint(hint))
 }
 
-/// The nodes that the user named, or for `all` those of [`all`].
+/// The nodes that the user named; for `all`, those that [`all`] finds.
 ///
 /// # Errors
-/// No node for `all`; bus errors and Ctrl-C.
+/// `all` finds no node; bus errors and Ctrl-C.
 pub(super) fn nodes(master: &mut Master<'_>, global: &Global, nodes: &Nodes) -> anyhow::Result<Vec<NodeId>> {
     match nodes {
         Nodes::These(nodes) => Ok(nodes.clone()),
@@ -171,7 +171,7 @@ pub(super) fn nodes(master: &mut Master<'_>, global: &Global, nodes: &Nodes) -> 
     }
 }
 
-/// The nodes that `all` means, see [`targets`]; may be empty.
+/// The nodes for `all`, see [`targets`]. The list may be empty.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C.

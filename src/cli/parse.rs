@@ -1,36 +1,34 @@
-//! From the words of the command line to [`Cli`], at little cost.
+//! Parses the command line fast.
 //!
-//! A script starts the program for every single value, so its start counts. Most of it was the tree of all
-//! commands with all their arguments and the global options copied to each. Hence the arguments of a command
-//! are made up when it is chosen (`defer`), and only the one that is named is made up at all.
+//! Scripts start the program once for each value, so its start-up time matters. Building the arguments of all commands
+//! takes most of it. Therefore only the command that the user named is built.
 
 use super::{ARGUMENTS, Cli, Global, program};
 use clap::{Args, Command, FromArgMatches};
 use std::ffi::OsString;
 
-/// Parses the words of a command line; the first is the program's name.
+/// Parses a command line. The first word is the name of the program.
 ///
 /// # Errors
-/// What is wrong with them, or help or version that were asked for.
+/// Wrong arguments. Requests for help or version are errors too.
 pub fn parse(words: Vec<OsString>) -> Result<Cli, clap::Error> {
-    if let Some(mut narrowed) = narrowed(&words) {
-        let matches = narrowed.try_get_matches_from_mut(&words);
-        // The program ends soon: taking the tree to pieces would cost as much as some of its building.
-        std::mem::forget(narrowed);
+    if let Some(mut program) = single_command(&words) {
+        let matches = program.try_get_matches_from_mut(&words);
+        // The process ends soon: freeing the memory takes time and gains nothing.
+        std::mem::forget(program);
         if let Ok(mut matches) = matches {
             let cli = Cli::from_arg_matches_mut(&mut matches);
             std::mem::forget(matches);
             return cli;
         }
     }
-    // What is not well is told by the whole tree: it knows the nearest command, and the usage of all.
+    // Errors come from the complete program: it knows similar commands and the usage of all.
     program().try_get_matches_from(words).and_then(|mut matches| Cli::from_arg_matches_mut(&mut matches))
 }
 
-/// The same program with only the command that the first word names that names any. What it accepts, the whole
-/// program accepts alike: where that word is the value of an option, the true command is not known here, and
-/// the whole tree is asked.
-fn narrowed(words: &[OsString]) -> Option<Command> {
+/// The program with one command only: the first word that is the name of a command selects it. If this word is in fact the
+/// value of an option, parsing fails, and the complete program parses the words again.
+fn single_command(words: &[OsString]) -> Option<Command> {
     let named = |word: &OsString| ARGUMENTS.iter().find(|(names, _)| names.iter().any(|name| word == name));
     let (names, arguments) = words.iter().skip(1).find_map(named)?;
     let (name, aliases) = names.split_first()?;
@@ -51,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn the_narrowed_program_understands_the_same() {
+    fn program_with_one_command_parses_the_same() {
         for line in [
             "cangauge -b sim scan",
             "cangauge scan -b sim -f json",
@@ -63,13 +61,13 @@ mod tests {
         ] {
             let whole = program().try_get_matches_from(words(line)).unwrap();
             let whole = Cli::from_arg_matches(&whole).unwrap();
-            let narrowed = parse(words(line)).unwrap();
-            assert_eq!(format!("{narrowed:?}"), format!("{whole:?}"), "{line}");
+            let fast = parse(words(line)).unwrap();
+            assert_eq!(format!("{fast:?}"), format!("{whole:?}"), "{line}");
         }
     }
 
     #[test]
-    fn every_command_can_be_made_up_without_the_others() {
+    fn every_command_can_be_built_alone() {
         let mut root = program();
         root.build();
         let named: Vec<&str> = root.get_subcommands().map(Command::get_name).filter(|&name| name != "help").collect();
@@ -84,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_and_help_come_from_the_whole_program() {
+    fn errors_and_help_come_from_the_complete_program() {
         for line in [
             "cangauge",
             "cangauge scna",
@@ -95,8 +93,8 @@ mod tests {
             "cangauge -V",
         ] {
             let whole = program().try_get_matches_from(words(line)).unwrap_err();
-            let told = parse(words(line)).unwrap_err();
-            assert_eq!(told.to_string(), whole.to_string(), "{line}");
+            let error = parse(words(line)).unwrap_err();
+            assert_eq!(error.to_string(), whole.to_string(), "{line}");
         }
     }
 }

@@ -33,7 +33,7 @@ pub(crate) struct Pdo {
 enum Action {
     /// Show the settings of TPDOs
     Show(ShowArgs),
-    /// Set the mapping of a TPDO, and when it is sent
+    /// Set the mapping and the transmission of a TPDO
     Map(MapArgs),
     /// Show received TPDOs, decoded, until Ctrl-C
     Watch(WatchArgs),

@@ -39,7 +39,7 @@ pub(crate) struct Sdo {
 #[derive(Debug, Subcommand)]
 #[command(defer = true)]
 enum Action {
-    /// Read objects: the value is never scaled; several objects print "OBJECT VALUE" lines
+    /// Read objects and print their unscaled values
     Read(ReadArgs),
     /// Write an object, or several OBJECT=VALUE
     Write(WriteArgs),
@@ -49,7 +49,7 @@ enum Action {
 struct ReadArgs {
     /// Which node: 5, 0x7f
     node: NodeId,
-    /// Which objects
+    /// Objects. A single object prints its value, several print lines "OBJECT VALUE"
     #[arg(required = true)]
     objects: Vec<ObjectArg>,
     /// Decode the bytes as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex

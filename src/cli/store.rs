@@ -15,8 +15,8 @@ use clap::{Args, ValueEnum};
 ///
 /// The capability of the device is read first. "save" is sent once and never repeated; the time-out is at least 3 s. If
 /// storing everything would reset custom COB-IDs (MH-4), comm and app are stored instead. Settings that the device does
-/// not keep are named. After a restore, reset the device before storing: until then it works with its old settings, and
-/// storing keeps those.
+/// not store are listed. After a restore, reset the device before you store: until the reset it has its old settings,
+/// and would store those.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim store 1\n  cangauge -b sim store 1 --group app --verify\n  cangauge -b sim store 1,127 --format json"
@@ -24,7 +24,7 @@ use clap::{Args, ValueEnum};
 pub(crate) struct Store {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
-    /// Which settings: everything, communication (1000h to 1FFFh), or application (6000h to 9FFFh)
+    /// Settings: all, communication (1000h to 1FFFh), or application (6000h to 9FFFh)
     #[arg(long, default_value = "all")]
     group: GroupArg,
     /// Reset the node, read the stored settings again, and compare
@@ -43,7 +43,7 @@ pub(crate) struct Store {
 pub(crate) struct Restore {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
-    /// Which settings: everything, communication (1000h to 1FFFh), or application (6000h to 9FFFh)
+    /// Settings: all, communication (1000h to 1FFFh), or application (6000h to 9FFFh)
     #[arg(long, default_value = "all")]
     group: GroupArg,
     /// Reset the node, and compare with its description

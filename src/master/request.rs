@@ -3,7 +3,7 @@
 use super::machine::Machine;
 use super::transfer::{Blocks, TransferKind};
 use crate::bus::Stamp;
-use crate::bus::time::spoken;
+use crate::bus::time::format_duration;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -156,7 +156,7 @@ pub enum SdoFailure {
     #[error("refused by the device ({0})")]
     Refused(AbortCode),
     /// The device did not answer in time.
-    #[error("no answer within {}{}", spoken(*.waited), if *.started { " in the middle of the transfer" } else { "" })]
+    #[error("no answer within {}{}", format_duration(*.waited), if *.started { " in the middle of the transfer" } else { "" })]
     NoAnswer {
         /// The longest wait for one answer.
         waited: Duration,

@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn integer_at_its_end_stays_if_the_range_is_unknown_or_the_value_is_no_signal() {
+    fn integer_at_the_end_of_its_type_is_kept_if_the_range_is_unknown_or_it_is_not_a_signal() {
         let reading = Reading::of_signal(&signal(Some(0), UNKNOWN), Some(I16), 0);
         let found = reading.sample(Stamp::default(), &[0xff, 0x7f], None).expect("a number");
         assert_eq!((found.value.is_some(), found.doubt), (true, Some(Doubt::EndOfType)));

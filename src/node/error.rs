@@ -1,4 +1,4 @@
-//! What can go wrong with a node, as types. The texts are in `output`.
+//! Errors in the communication with a node, as types. The texts are in `output`.
 
 use crate::bus::BusError;
 use crate::canopen::id::NodeId;

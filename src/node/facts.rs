@@ -1,4 +1,4 @@
-//! What is known of one node.
+//! The facts that are known about one node.
 
 use super::Overrides;
 use crate::canopen::id::{CanId, NodeId};

@@ -10,7 +10,7 @@ use crate::device::catalog::{Model, recognise};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// What is known of nodes from SDO traffic.
+/// Facts about nodes from the SDO traffic of other masters.
 #[derive(Default)]
 pub struct Overheard {
     known: BTreeMap<(NodeId, ObjectId), Vec<u8>>,

@@ -1,7 +1,7 @@
 //! Reads what is needed to understand a device's measurements: identity, TPDOs, units, digits.
 //!
-//! Many nodes are read side by side, in the same steps. What they are read with is an [`Ask`]: the master, which
-//! waits for the answers, or a [`BackgroundSurvey`], which does not.
+//! Many nodes are read in parallel, in the same steps. They are read with an [`Ask`]: the master, which waits for the
+//! answers, or a [`BackgroundSurvey`], which does not wait.
 
 mod background;
 
@@ -29,21 +29,21 @@ const U32: DataType = DataType::Unsigned(4);
 /// TPDOs looked for on a device without a description. JUMO's temperature probe sends TPDO5.
 const TPDOS_TRIED: u16 = 8;
 
-/// The description to use for a node, where the user named one.
+/// The descriptions that the user named, by node.
 pub type Overrides = BTreeMap<NodeId, Arc<Model>>;
 
-/// What a survey reads with.
+/// Reads objects for a survey.
 pub trait Ask {
-    /// Why no more can be asked at the moment.
+    /// Why the survey cannot go on.
     type Stop: From<Error>;
 
-    /// Reads objects, and returns what became of each, in their order.
+    /// Reads objects, and returns one result for each, in the same order.
     ///
     /// # Errors
-    /// What stops everything. What one device does is in its result.
+    /// Only what stops the whole survey. The failure of one device is in its result.
     fn ask(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, Self::Stop>;
 
-    /// Learns how a node's SDO server deviates from the standard.
+    /// Sets how a node's SDO server deviates from the standard.
     fn set_quirks(&mut self, node: NodeId, quirks: &[Quirk]);
 }
 
@@ -68,7 +68,7 @@ fn small<T: TryFrom<u64>>(value: Option<&Value>) -> Option<T> {
     number(value).and_then(|number| T::try_from(number).ok())
 }
 
-/// Reads the identity of nodes that are there. The name (1008h) is read only if `has_name` says so.
+/// Reads the identity of nodes. The name (1008h) is read only if `has_name` says so.
 fn identities<A: Ask>(
     master: &mut A,
     nodes: &[NodeId],
@@ -108,7 +108,7 @@ fn identities<A: Ask>(
     Ok(identities)
 }
 
-/// Reads vendor, product and revision (1018h:1 to 3) of nodes. What a node does not answer is `None`.
+/// Reads vendor, product and revision (1018h:1 to 3) of nodes. A number that a node does not have is `None`.
 ///
 /// # Errors
 /// Bus errors and Ctrl-C.
@@ -124,24 +124,24 @@ pub fn revisions(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<N
 /// Reads everything of the nodes: identity, signals with unit and digits, TPDOs.
 ///
 /// # Errors
-/// A node that does not answer, and what stops everything.
+/// A node does not answer, or the survey cannot go on.
 pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Node>, A::Stop> {
-    let mut instruments = identify(master, nodes, overrides)?;
-    read_services(master, &mut instruments)?;
-    read_tpdos(master, &mut instruments)?;
-    find_signals(master, &mut instruments)?;
-    read_units(master, &mut instruments)?;
-    read_ranges(master, &mut instruments)?;
-    Ok(instruments)
+    let mut found = identify(master, nodes, overrides)?;
+    read_services(master, &mut found)?;
+    read_tpdos(master, &mut found)?;
+    find_signals(master, &mut found)?;
+    read_units(master, &mut found)?;
+    read_ranges(master, &mut found)?;
+    Ok(found)
 }
 
-/// Reads identities and finds the descriptions that they fit. The name (1008h) only serves for this: it is not read if the
-/// user named the description of this device.
+/// Reads identities and finds the descriptions that fit. The name (1008h) is read only for this purpose: not if the user
+/// named the description of this device.
 ///
 /// # Errors
-/// A node that does not answer, and what stops everything.
+/// A node does not answer, or the survey cannot go on.
 pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides) -> Result<Vec<Node>, A::Stop> {
-    // A device whose reads need a quirk can only be read once the user has named its description.
+    // Some devices can be read only with their quirks: those of the descriptions that the user named are set first.
     for (node, model) in overrides {
         master.set_quirks(*node, &model.description.quirks);
     }
@@ -164,10 +164,10 @@ pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides)
             Err(error) => return Err(Error::Sdo(error).into()),
         }
     }
-    let mut instruments: Vec<Node> = nodes.iter().map(|&node| Node::new(node)).collect();
-    for ((instrument, identity), traits) in instruments.iter_mut().zip(identities).zip(&traits) {
-        let given = overrides.get(&instrument.id).cloned();
-        instrument.model = match given {
+    let mut found: Vec<Node> = nodes.iter().map(|&node| Node::new(node)).collect();
+    for ((node, identity), traits) in found.iter_mut().zip(identities).zip(&traits) {
+        let given = overrides.get(&node.id).cloned();
+        node.model = match given {
             // Names come from the EDS of another device, types and units from the description of this one.
             Some(model) if model.description.signals.is_empty() && !identity.fits(&model) => {
                 let own = recognise(traits).map(|own| Arc::new(own.with_eds(&model)));
@@ -175,70 +175,68 @@ pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides)
             }
             given => given.or_else(|| recognise(traits)),
         };
-        instrument.identity = identity;
-        instrument.is_identified = true;
-        if let Some(model) = &instrument.model {
-            master.set_quirks(instrument.id, &model.description.quirks);
+        node.identity = identity;
+        node.is_identified = true;
+        if let Some(model) = &node.model {
+            master.set_quirks(node.id, &model.description.quirks);
         }
     }
-    Ok(instruments)
+    Ok(found)
 }
 
-fn read_services<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
+fn read_services<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let objects = [
         (ObjectId::new(0x1017, 0), U16),
         (ObjectId::new(0x1014, 0), U32),
         (ObjectId::new(0x1005, 0), U32),
         (ObjectId::new(0x1019, 0), U8),
     ];
-    let items: Vec<Item> = instruments
+    let items: Vec<Item> = nodes
         .iter()
         .flat_map(|node| objects[..3].iter().map(|&(object, data_type)| (node.id, object, data_type)))
         .collect();
     let values = read_known(master, &items)?;
-    // A description that lists the SYNC object and not 1019h says that the device has no SYNC counter.
+    // If a description lists the SYNC object but not 1019h, the device has no SYNC counter.
     let may_count = |node: &Node| match &node.model {
         Some(model) => model.dictionary.has_index(0x1019) || !model.dictionary.has_index(0x1005),
         None => true,
     };
-    let counting: Vec<usize> = (0..instruments.len()).filter(|&at| may_count(&instruments[at])).collect();
-    let items: Vec<Item> = counting.iter().map(|&at| (instruments[at].id, objects[3].0, objects[3].1)).collect();
+    let counting: Vec<usize> = (0..nodes.len()).filter(|&at| may_count(&nodes[at])).collect();
+    let items: Vec<Item> = counting.iter().map(|&at| (nodes[at].id, objects[3].0, objects[3].1)).collect();
     for (&at, value) in counting.iter().zip(read_known(master, &items)?) {
-        instruments[at].sync_overflow = small(value.as_ref()).filter(|overflow| (2..=240).contains(overflow));
+        nodes[at].sync_overflow = small(value.as_ref()).filter(|overflow| (2..=240).contains(overflow));
     }
-    for (instrument, values) in instruments.iter_mut().zip(values.chunks(3)) {
-        instrument.heartbeat_ms = small(values[0].as_ref());
+    for (node, values) in nodes.iter_mut().zip(values.chunks(3)) {
+        node.heartbeat_ms = small(values[0].as_ref());
         if let Some(word) = small(values[1].as_ref()).map(CobId).filter(|word| word.is_valid()) {
-            instrument.emergency = word.can_id();
+            node.emergency = word.can_id();
         }
         if let Some(word) = small(values[2].as_ref()).map(CobId) {
-            instrument.sync = word.can_id();
+            node.sync = word.can_id();
         }
     }
     Ok(())
 }
 
-fn read_tpdos<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
-    let numbers = |instrument: &Node| -> Vec<TpdoNumber> {
+fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
+    let numbers = |node: &Node| -> Vec<TpdoNumber> {
         let has = |number: &TpdoNumber| {
-            let dictionary = instrument.model.as_ref().map(|model| &model.dictionary);
+            let dictionary = node.model.as_ref().map(|model| &model.dictionary);
             dictionary.is_some_and(|dictionary| dictionary.has_index(number.communication(0).index))
         };
         let described: Vec<TpdoNumber> = (1..=512).filter_map(TpdoNumber::new).filter(has).collect();
         if described.is_empty() {
-            // No description, or one without TPDOs: the device knows.
+            // Without a description, or with one without TPDOs, the device is asked.
             return (1..=TPDOS_TRIED).filter_map(TpdoNumber::new).collect();
         }
         described
     };
-    let wanted: Vec<(usize, TpdoNumber)> = instruments
+    let wanted: Vec<(usize, TpdoNumber)> = nodes
         .iter()
         .enumerate()
-        .flat_map(|(at, instrument)| numbers(instrument).into_iter().map(move |number| (at, number)))
+        .flat_map(|(at, node)| numbers(node).into_iter().map(move |number| (at, number)))
         .collect();
-    let node = |at: usize, instruments: &[Node]| instruments[at].id;
-    let items: Vec<Item> =
-        wanted.iter().map(|&(at, number)| (node(at, instruments), number.communication(1), U32)).collect();
+    let items: Vec<Item> = wanted.iter().map(|&(at, number)| (nodes[at].id, number.communication(1), U32)).collect();
     let cob_ids = read_known(master, &items)?;
     let found: Vec<(usize, TpdoNumber, CobId)> = wanted
         .iter()
@@ -248,7 +246,7 @@ fn read_tpdos<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A:
     let items: Vec<Item> = found
         .iter()
         .flat_map(|&(at, number, _)| {
-            let node = node(at, instruments);
+            let node = nodes[at].id;
             [(node, number.communication(2), U8), (node, number.communication(5), U16), (node, number.mapping(0), U8)]
         })
         .collect();
@@ -260,7 +258,7 @@ fn read_tpdos<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A:
         .iter()
         .zip(&counts)
         .flat_map(|(&(at, number, _), &count)| {
-            let node = node(at, instruments);
+            let node = nodes[at].id;
             entries(count).map(move |sub| (node, number.mapping(sub), U32))
         })
         .collect();
@@ -270,7 +268,7 @@ fn read_tpdos<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A:
             .map(|_| words.next().flatten())
             .map(|word| small(word.as_ref()).map(MappingEntry::from_word))
             .collect();
-        instruments[at].tpdos.push(Tpdo {
+        nodes[at].tpdos.push(Tpdo {
             number,
             cob_id,
             transmission: small(values[0].as_ref()).map(Transmission::from_code),
@@ -281,31 +279,31 @@ fn read_tpdos<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A:
     Ok(())
 }
 
-/// The signals of a description, or those that the objects of CiA 404 tell.
-fn find_signals<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
+/// Finds the signals: those of the description, else those of the CiA 404 objects.
+fn find_signals<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let mut unknown = Vec::new();
-    for (at, instrument) in instruments.iter_mut().enumerate() {
-        match instrument.model.clone().filter(|model| !model.description.signals.is_empty()) {
+    for (at, node) in nodes.iter_mut().enumerate() {
+        match node.model.clone().filter(|model| !model.description.signals.is_empty()) {
             Some(model) => {
                 let signals = model.description.signals.iter();
-                instrument.signals = signals.map(|entry| described(instrument, entry)).collect();
+                node.signals = signals.map(|entry| described(node, entry)).collect();
             }
             None => unknown.push(at),
         }
     }
     let items: Vec<Item> = unknown
         .iter()
-        .flat_map(|&at| PROCESS_VALUES.map(|(index, _)| (instruments[at].id, ObjectId::new(index, 0), U8)))
+        .flat_map(|&at| PROCESS_VALUES.map(|(index, _)| (nodes[at].id, ObjectId::new(index, 0), U8)))
         .collect();
     let counts = read_known(master, &items)?;
     for (&at, counts) in unknown.iter().zip(counts.chunks(PROCESS_VALUES.len())) {
         let channels = |value: &Option<Value>| small::<u8>(value.as_ref()).unwrap_or(0).min(199);
         let family = PROCESS_VALUES.iter().zip(counts).find(|(_, count)| channels(count) > 0);
-        let instrument = &mut instruments[at];
+        let node = &mut nodes[at];
         let mut known: Vec<u8> = match family {
             Some((_, count)) => (1..=channels(count)).collect(),
-            // Sub-index 0 may be missing; what is mapped is there.
-            None => instrument
+            // Sub-index 0 may be missing; an object that is mapped exists.
+            None => node
                 .tpdos
                 .iter()
                 .flat_map(|tpdo| &tpdo.mapping)
@@ -316,12 +314,12 @@ fn find_signals<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), 
         known.sort_unstable();
         known.dedup();
         let (index, _) = family.map_or(PROCESS_VALUES[0], |(&family, _)| family);
-        instrument.signals = known
+        node.signals = known
             .into_iter()
             .map(|channel| Signal {
                 name: format!("ch{channel}"),
                 channel,
-                value: (ObjectId::new(index, channel), instrument.layout().data_type(ObjectId::new(index, channel))),
+                value: (ObjectId::new(index, channel), node.layout().data_type(ObjectId::new(index, channel))),
                 also: Vec::new(),
                 status: Some(ObjectId::new(0x6150, channel)),
                 marker: false,
@@ -334,11 +332,11 @@ fn find_signals<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), 
     Ok(())
 }
 
-fn described(instrument: &Node, entry: &SignalEntry) -> Signal {
+fn described(node: &Node, entry: &SignalEntry) -> Signal {
     Signal {
         name: entry.name.clone(),
         channel: entry.channel,
-        value: (entry.value, instrument.layout().data_type(entry.value)),
+        value: (entry.value, node.layout().data_type(entry.value)),
         also: entry.also.clone(),
         status: entry.status,
         marker: entry.marker,
@@ -348,20 +346,20 @@ fn described(instrument: &Node, entry: &SignalEntry) -> Signal {
     }
 }
 
-fn read_units<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
-    let items: Vec<Item> = instruments
+fn read_units<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
+    let items: Vec<Item> = nodes
         .iter()
-        .flat_map(|instrument| {
-            instrument.signals.iter().flat_map(|signal| {
+        .flat_map(|node| {
+            node.signals.iter().flat_map(|signal| {
                 [
-                    (instrument.id, ObjectId::new(0x6131, signal.channel), U32),
-                    (instrument.id, ObjectId::new(0x6132, signal.channel), U8),
+                    (node.id, ObjectId::new(0x6131, signal.channel), U32),
+                    (node.id, ObjectId::new(0x6132, signal.channel), U8),
                 ]
             })
         })
         .collect();
     let mut values = read_known(master, &items)?.into_iter();
-    for signal in instruments.iter_mut().flat_map(|instrument| &mut instrument.signals) {
+    for signal in nodes.iter_mut().flat_map(|node| &mut node.signals) {
         signal.unit = values
             .next()
             .flatten()
@@ -372,7 +370,7 @@ fn read_units<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A:
         signal.digits =
             values.next().flatten().as_ref().and_then(Value::as_u64).and_then(|digits| u8::try_from(digits).ok());
     }
-    for node in instruments {
+    for node in nodes {
         for at in 0..node.signals.len() {
             if node.signals[at].unit.is_none() {
                 node.signals[at].unit = node.fixed_unit(node.signals[at].value.0);
@@ -382,13 +380,13 @@ fn read_units<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A:
     Ok(())
 }
 
-/// Reads the measuring ranges (6148h, 6149h) where a value depends on them: an integer that may be too narrow, and a
+/// Reads the measuring ranges (6148h, 6149h) if a value depends on them: an integer that may be too narrow, and a
 /// described signal without a status.
-fn read_ranges<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A::Stop> {
+fn read_ranges<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
     // Node, signal, and its two ends.
     type Range = (usize, usize, [(ObjectId, DataType); 2]);
     let mut wanted: Vec<Range> = Vec::new();
-    for (at, node) in instruments.iter().enumerate() {
+    for (at, node) in nodes.iter().enumerate() {
         for (number, signal) in node.signals.iter().enumerate() {
             if !needs_range(node, signal) {
                 continue;
@@ -409,13 +407,13 @@ fn read_ranges<A: Ask>(master: &mut A, instruments: &mut [Node]) -> Result<(), A
     let items: Vec<Item> = wanted
         .iter()
         .flat_map(|(at, _, objects)| {
-            let node = instruments[*at].id;
+            let node = nodes[*at].id;
             objects.map(|(object, data_type)| (node, object, data_type))
         })
         .collect();
     let values = read_known(master, &items)?;
     for (&(at, number, _), ends) in wanted.iter().zip(values.chunks(2)) {
-        let signal = &mut instruments[at].signals[number];
+        let signal = &mut nodes[at].signals[number];
         let digits = signal.digits.unwrap_or(0);
         let number = |value: &Option<Value>| Number::from_value(value.as_ref()?, digits).map(Number::as_f64);
         if let [start, end] = ends
@@ -440,10 +438,10 @@ fn needs_range(node: &Node, signal: &Signal) -> bool {
         || mapped.any(|entry| signal.is_value(entry.object) && is_narrow(node.mapped_type(entry.object, entry.bits)))
 }
 
-/// Reads the identity of a node whose description was not looked for yet.
+/// Reads the identity of a node that is not identified yet.
 ///
 /// # Errors
-/// A node that does not answer; bus errors and Ctrl-C.
+/// The node does not answer; bus errors and Ctrl-C.
 pub fn identify_late(master: &mut Master<'_>, node: &mut Node) -> Result<(), Error> {
     if node.is_identified {
         return Ok(());

@@ -1,6 +1,6 @@
 //! The report of `autozero`.
 
-use super::notes::Told;
+use super::notes::NoteText;
 use super::report::{Cell, Column, Report};
 use crate::canopen::id::NodeId;
 use crate::tasks::autozero::Zeroed;
@@ -44,7 +44,7 @@ impl Report for ZeroReport<'_> {
             zeroed.offset_before.into(),
             zeroed.offset.into(),
             zeroed.stored.into(),
-            Cell::List(notes.iter().map(Told::cell).collect()),
+            Cell::List(notes.iter().map(NoteText::cell).collect()),
         ]
     }
 

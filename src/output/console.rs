@@ -7,18 +7,18 @@ use anstyle::{AnsiColor, Style};
 use indicatif::MultiProgress;
 use std::io::{self, Write};
 
-/// How much is said, and how it looks.
+/// How much is printed, and in which form.
 #[derive(Clone, Debug)]
 pub struct Console {
     /// Errors only.
     pub quiet: bool,
-    /// How often `-v` was given.
+    /// The number of `-v` options.
     pub verbose: u8,
     /// Errors as JSON.
     pub json: bool,
-    /// When to colour.
+    /// Whether to use colour.
     pub color: ColorChoice,
-    /// The progress display that lines must not tear.
+    /// The progress display, which lines must not break.
     pub progress: Option<MultiProgress>,
 }
 
@@ -26,7 +26,7 @@ impl Console {
     fn line(&self, style: Style, head: &str, rest: &str) {
         let write = || {
             let mut err = anstream::AutoStream::new(io::stderr(), self.color);
-            // Nowhere is left to report a stderr that is gone.
+            // If stderr is closed, the error cannot be reported anywhere.
             let _ = writeln!(err, "{style}{head}{style:#}{}", text::safe(rest));
         };
         match &self.progress {
@@ -35,28 +35,28 @@ impl Console {
         }
     }
 
-    /// Something worth knowing; silent with `-q`.
+    /// Prints a note, except with `-q`.
     pub fn note(&self, message: &str) {
         if !self.quiet {
             self.line(Style::new(), "", message);
         }
     }
 
-    /// Something more, with `-v`.
+    /// Prints a detail, only with `-v`.
     pub fn detail(&self, message: &str) {
         if self.verbose > 0 {
             self.line(Style::new().dimmed(), "", message);
         }
     }
 
-    /// Something that is not as it should be, and does not end the command.
+    /// Prints a warning: something is wrong, but the command goes on.
     pub fn warn(&self, message: &str) {
         if !self.quiet {
             self.line(AnsiColor::Yellow.on_default(), "warning: ", message);
         }
     }
 
-    /// A failure with its hint; as JSON on one line.
+    /// Prints an error with its hint; with `json`, as one line of JSON.
     pub fn fail(&self, failure: &ErrorMessage, exit: u8) {
         if self.json {
             let mut out = Vec::new();
@@ -67,7 +67,7 @@ impl Console {
         }
         self.line(AnsiColor::Red.on_default().bold(), "cangauge: ", &failure.message);
         if let Some(place) = &failure.place {
-            // What is not shown as it is takes more room.
+            // An escaped character is longer than the character.
             let before = text::safe(&place.before).chars().count();
             self.line(Style::new(), "  ", &place.text);
             self.line(AnsiColor::Red.on_default().bold(), &format!("  {}^", " ".repeat(before)), "");

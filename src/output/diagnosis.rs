@@ -1,6 +1,6 @@
 //! Text for the reasons why a node sends no measurements, and what to do about them.
 
-use crate::bus::time::spoken;
+use crate::bus::time::format_duration;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::NmtState;
 use crate::canopen::pdo::TpdoNumber;
@@ -81,7 +81,7 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String
             format!("the event timer of {number} is longer ({communication:04X}h:5 is {timer} ms)")
         }
         TpdoCause::InhibitTime(inhibit) => {
-            let inhibit = spoken(Duration::from_micros(100) * u32::from(inhibit));
+            let inhibit = format_duration(Duration::from_micros(100) * u32::from(inhibit));
             format!("the inhibit time of {number} is longer ({communication:04X}h:3 is {inhibit}){also}")
         }
         TpdoCause::ChannelOff(mode) => format!("its channel is off ({mode} is 0)"),

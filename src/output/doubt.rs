@@ -9,13 +9,13 @@ pub fn doubt(node: NodeId, signal: &str, doubt: Doubt) -> String {
     match doubt {
         Doubt::UnknownType => format!("node {node}: {}; {}", unknown_type(signal), type_remedy(node, signal)),
         Doubt::ImpossibleDigits(digits) => {
-            format!("node {node}: {signal}: no value: it has {digits} decimal digits (6132h); possible are 0 to 9")
+            format!("node {node}: {signal}: no value: 6132h is {digits}; valid are 0 to 9 decimal digits")
         }
-        Doubt::UnknownDigits => format!(
-            "node {node}: {signal}: the decimal digits (6132h) are unknown: the value is the integer as it was sent"
-        ),
+        Doubt::UnknownDigits => {
+            format!("node {node}: {signal}: the decimal digits (6132h) are unknown: the value is the unscaled integer")
+        }
         Doubt::LooksLikeInteger => format!(
-            "node {node}: {signal}: no value: the REAL32 is next to zero; the object seems to be an integer; name the \
+            "node {node}: {signal}: no value: the REAL32 is almost 0, so the object is probably an integer; name the \
              device: --device dps (or --eds FILE)"
         ),
         Doubt::EndOfType => format!(
@@ -28,7 +28,7 @@ pub fn doubt(node: NodeId, signal: &str, doubt: Doubt) -> String {
 /// The message for an object without a known type.
 pub fn unknown_type(signal: &str) -> String {
     match signal.split_once('/') {
-        Some((object, stated)) => format!("{object} has another width than {stated}: no value"),
+        Some((object, stated)) => format!("the width of {object} is not that of {stated}: no value"),
         None => format!("the type of {signal} is unknown: no value"),
     }
 }

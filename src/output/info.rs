@@ -1,4 +1,4 @@
-//! The info page as aligned text, for people and for paper.
+//! The page of `cangauge info` as aligned text.
 
 use super::table::{self, Align};
 use crate::measure::sample::Status;
@@ -6,13 +6,13 @@ use crate::tasks::settings::errors::Errors;
 use crate::tasks::settings::info::{Channel, Info, Setting};
 use std::io::{self, Write};
 
-/// How wide the page is.
+/// The width of the page in characters.
 const WIDTH: usize = 100;
 
-/// So many signals stand side by side; of more the values are gathered.
+/// The largest number of signals with a column each. The settings of more signals are grouped by value.
 const COLUMNS: usize = 3;
 
-/// Two columns below a heading.
+/// The rows below a heading.
 type Rows = Vec<Vec<String>>;
 
 fn section(out: &mut dyn Write, heading: &str, rows: &Rows) -> io::Result<()> {
@@ -35,10 +35,9 @@ fn row(label: &str, text: impl Into<String>) -> Vec<String> {
 
 /// The page as text.
 pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
-    let instrument = &info.node;
-    let described = instrument.model.as_ref().map(|model| &model.description);
-    let title = described.map_or("not a device that is known", |description| description.title.as_str());
-    writeln!(out, "node {}: {title}", instrument.id)?;
+    let described = info.node.model.as_ref().map(|model| &model.description);
+    let title = described.map_or("unknown device", |description| description.title.as_str());
+    writeln!(out, "node {}: {title}", info.node.id)?;
     section(out, "identity", &identity(info))?;
     let mut rows: Rows = Vec::new();
     rows.extend(info.bit_rate.map(|rate| row("bit rate", format!("{} kbit/s", f64::from(rate) / 1000.0))));
@@ -48,20 +47,20 @@ pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
     section(out, "communication", &rows)?;
     section(out, "errors", &info.errors.as_ref().map(errors).unwrap_or_default())?;
     section(out, "signals", &info.channels.iter().map(signal).collect())?;
-    section(out, "settings of the signals", &settings(&info.channels))?;
+    section(out, "signal settings", &settings(&info.channels))?;
     section(out, "TPDOs", &tpdos(info))?;
     let mut rows: Rows = Vec::new();
     rows.extend(info.calibrated.as_ref().map(|date| row("calibrated", date)));
     rows.extend(info.produced.as_ref().map(|date| row("produced", date)));
     rows.extend(info.own.iter().map(|setting| row(&full_name(setting), &setting.text)));
-    section(out, "of the manufacturer", &rows)?;
+    section(out, "manufacturer-specific", &rows)?;
     section(out, "stored by 1010h", &store(info))
 }
 
-/// The NMT state, or how it is found out.
+/// The NMT state, or the command that finds it.
 fn state(info: &Info) -> String {
-    let ask = || format!("no heartbeat tells it: cangauge nmt state {} (--probe)", info.node.id);
-    info.state.map_or_else(ask, |state| format!("{state}, by its heartbeat"))
+    let unknown = || format!("unknown (no heartbeat): cangauge nmt state {} --probe", info.node.id);
+    info.state.map_or_else(unknown, |state| format!("{state} (heartbeat)"))
 }
 
 fn identity(info: &Info) -> Rows {
@@ -85,12 +84,12 @@ fn identity(info: &Info) -> Rows {
     rows
 }
 
-/// Register and history in two columns.
+/// Error register and error history.
 pub fn errors(errors: &Errors) -> Vec<Vec<String>> {
     let mut rows: Rows = Vec::new();
     rows.extend(errors.register.map(|bits| row("register", format!("0x{bits:02X} {}", errors.register_text))));
     rows.push(match errors.count {
-        None => row("history", "none is kept"),
+        None => row("history", "not supported"),
         Some(0) => row("history", "empty"),
         Some(1) => row("history", "1 error"),
         Some(count) => row("history", format!("{count} errors, newest first")),
@@ -107,12 +106,12 @@ fn signal(channel: &Channel) -> Vec<String> {
     let sample = channel.sample.as_ref();
     let number = sample.and_then(|sample| sample.value);
     let value = number.map_or_else(|| "-".to_owned(), |number| format!("{number} {unit}").trim_end().to_owned());
-    let status = sample.and_then(|sample| sample.status).map_or("(tells no status)", Status::as_str);
+    let status = sample.and_then(|sample| sample.status).map_or("(no status)", Status::as_str);
     let range = channel.range.map(|(start, end)| format!("range {} to {end}", start.number)).unwrap_or_default();
     vec![channel.signal.name.clone(), value, status.to_owned(), range]
 }
 
-/// Side by side where there are few signals; gathered by value where there are many.
+/// The settings of all signals: one column for each signal, or grouped by value if there are many signals.
 fn settings(channels: &[Channel]) -> Rows {
     let mut names: Vec<&str> = Vec::new();
     for setting in channels.iter().flat_map(|channel| &channel.settings) {
@@ -120,12 +119,12 @@ fn settings(channels: &[Channel]) -> Rows {
             names.push(&setting.name);
         }
     }
-    let of = |channel: &Channel, name: &str| {
+    let setting = |channel: &Channel, name: &str| {
         channel.settings.iter().find(|setting| setting.name == name).map(|setting| setting.text.clone())
     };
     if channels.len() <= COLUMNS {
         let cells = |name: &&str| {
-            let texts = channels.iter().map(|channel| of(channel, name).unwrap_or_else(|| "-".to_owned()));
+            let texts = channels.iter().map(|channel| setting(channel, name).unwrap_or_else(|| "-".to_owned()));
             std::iter::once((*name).to_owned()).chain(texts).collect()
         };
         let head = std::iter::once(String::new()).chain(channels.iter().map(|channel| channel.signal.name.clone()));
@@ -133,10 +132,10 @@ fn settings(channels: &[Channel]) -> Rows {
         let head: Vec<String> = head.collect();
         return if channels.len() > 1 && !rows.is_empty() { std::iter::once(head).chain(rows).collect() } else { rows };
     }
-    let gathered = |name: &&str| {
+    let grouped = |name: &&str| {
         let mut groups: Vec<(String, Vec<&str>)> = Vec::new();
         for channel in channels {
-            let text = of(channel, name).unwrap_or_else(|| "-".to_owned());
+            let text = setting(channel, name).unwrap_or_else(|| "-".to_owned());
             match groups.iter_mut().find(|(known, _)| *known == text) {
                 Some((_, members)) => members.push(&channel.signal.name),
                 None => groups.push((text, vec![&channel.signal.name])),
@@ -152,13 +151,12 @@ fn settings(channels: &[Channel]) -> Rows {
         };
         row(name, text)
     };
-    names.iter().map(gathered).collect()
+    names.iter().map(grouped).collect()
 }
 
 fn tpdos(info: &Info) -> Rows {
-    let instrument = &info.node;
     let mut rows: Rows = Vec::new();
-    for (tpdo, inhibit) in instrument.tpdos.iter().zip(&info.inhibit_100us) {
+    for (tpdo, inhibit) in info.node.tpdos.iter().zip(&info.inhibit_100us) {
         let id = tpdo.cob_id.can_id().number();
         let valid = if tpdo.cob_id.is_valid() { "" } else { " off" };
         let kind = tpdo.transmission.map(|kind| kind.to_string()).unwrap_or_default();
@@ -172,17 +170,18 @@ fn tpdos(info: &Info) -> Rows {
         terms.extend(inhibit.map(|inhibit| format!("inhibit {}.{} ms", inhibit / 10, inhibit % 10)));
         let mapping = tpdo.mapping.iter().map(|entry| mapped(info, entry.object.to_string(), entry.bits));
         let mapping: Vec<String> = mapping.collect();
-        let carried = if mapping.is_empty() { "nothing mapped".to_owned() } else { mapping.join(", ") };
-        rows.push(vec![tpdo.number.to_string(), format!("0x{id:X}{valid}"), terms.join(", "), carried]);
+        let content = if mapping.is_empty() { "nothing mapped".to_owned() } else { mapping.join(", ") };
+        rows.push(vec![tpdo.number.to_string(), format!("0x{id:X}{valid}"), terms.join(", "), content]);
     }
     rows
 }
 
-/// A mapped object by the name of its signal.
+/// A mapped object, with the name of its signal.
 fn mapped(info: &Info, object: String, bits: u8) -> String {
     name_of(info, &object).map_or_else(|| format!("{object}/{bits}"), |name| format!("{name} {object}/{bits}"))
 }
 
+/// The name of the signal whose value or status an object is.
 pub(super) fn name_of(info: &Info, object: &str) -> Option<String> {
     info.node.signals.iter().find_map(|signal| {
         let mut values = info.node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object);
@@ -204,23 +203,23 @@ fn store(info: &Info) -> Rows {
             1 => "all",
             2 => "communication",
             3 => "application",
-            _ => "of the manufacturer",
+            _ => "manufacturer-specific",
         };
         let how = match capability & 0b11 {
             0b01 => "on command",
-            0b10 => "by itself",
-            0b11 => "on command and by itself",
-            _ => "not",
+            0b10 => "automatically",
+            0b11 => "on command and automatically",
+            _ => "not stored",
         };
         rows.push(row(&format!("group {sub}"), format!("{group}: {how}")));
     }
     if store.kept.is_empty() && store.lost.is_empty() {
         if !rows.is_empty() {
-            rows.push(row("kept", "not known"));
+            rows.push(row("stored", "unknown"));
         }
         return rows;
     }
-    for (label, names) in [("kept", &store.kept), ("not kept", &store.lost)] {
+    for (label, names) in [("stored", &store.kept), ("not stored", &store.lost)] {
         for (at, names) in wrapped(names).into_iter().enumerate() {
             rows.push(row(if at == 0 { label } else { "" }, names));
         }
@@ -228,7 +227,7 @@ fn store(info: &Info) -> Rows {
     rows
 }
 
-/// Names with commas, in lines that fit the page.
+/// Names separated by commas, in lines that fit the page.
 fn wrapped(names: &[String]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for name in names {
@@ -248,7 +247,7 @@ fn wrapped(names: &[String]) -> Vec<String> {
     lines
 }
 
-/// The name with the sub-index where it is not 0.
+/// The name, with the sub-index if it is not 0.
 fn full_name(setting: &Setting) -> String {
     if setting.object.sub == 0 { setting.name.clone() } else { format!("{}:{}", setting.name, setting.object.sub) }
 }

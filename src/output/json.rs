@@ -1,6 +1,6 @@
-//! JSON Lines: one object a line.
+//! JSON Lines: one object on each line.
 
-use super::text::steers;
+use super::text::is_unsafe;
 use crate::measure::sample::Number;
 use serde::Serialize;
 use serde_json::ser::Formatter;
@@ -11,15 +11,15 @@ pub(super) fn line<T: Serialize>(out: &mut dyn Write, object: &T) -> io::Result<
     out.write_all(b"\n")
 }
 
-/// Escapes more than JSON asks for: what steers a terminal is not only below 20h (9Bh begins a sequence, too), and
-/// JSON Lines are looked at in terminals.
+/// Escapes more characters than JSON requires, because JSON Lines are also shown in terminals. Not only characters below
+/// 20h control a terminal: 9Bh starts a sequence too.
 struct Safe;
 
 impl Formatter for Safe {
     fn write_string_fragment<W: ?Sized + Write>(&mut self, out: &mut W, fragment: &str) -> io::Result<()> {
-        for part in fragment.split_inclusive(steers) {
+        for part in fragment.split_inclusive(is_unsafe) {
             match part.char_indices().next_back() {
-                Some((at, last)) if steers(last) => {
+                Some((at, last)) if is_unsafe(last) => {
                     out.write_all(&part.as_bytes()[..at])?;
                     write!(out, "\\u{:04x}", u32::from(last))?;
                 }
@@ -30,7 +30,7 @@ impl Formatter for Safe {
     }
 }
 
-/// A number as JSON has them: decimals keep their digits, what is not finite is null.
+/// A number in JSON: decimals keep their digits, a number that is not finite is null.
 pub(super) struct JsonNumber(pub(super) Option<Number>);
 
 impl Serialize for JsonNumber {
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_steers_a_terminal_is_escaped_and_reads_back() {
+    fn control_characters_are_escaped_and_read_back() {
         let text = "MH\x1b[2J\u{9b}31m\u{7f}\u{202e}\n\"D\u{fc}se\" \u{1f600}";
         let mut out = Vec::new();
         line(&mut out, &[text]).expect("memory");

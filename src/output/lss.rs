@@ -2,7 +2,7 @@
 
 use super::failure::host::up_by_hand;
 use super::identity;
-use super::notes::Told;
+use super::notes::NoteText;
 use super::report::{Cell, Column, Report};
 use crate::canopen::id::NodeId;
 use crate::device::assign::short_bit_rate;
@@ -140,7 +140,7 @@ impl Report for AssignReport {
             };
             Cell::Rows(ids.stale.iter().map(row).collect())
         }));
-        cells.push(Cell::List(self.notes().iter().map(Told::cell).collect()));
+        cells.push(Cell::List(self.notes().iter().map(NoteText::cell).collect()));
         cells
     }
 
@@ -175,7 +175,7 @@ impl AssignReport {
     }
 
     /// What remains to be done.
-    pub fn notes(&self) -> Vec<Told> {
+    pub fn notes(&self) -> Vec<NoteText> {
         let assigned = &self.assigned;
         let mut notes = Vec::new();
         let stale = assigned.cob_ids.iter().flat_map(|ids| &ids.stale);
@@ -184,22 +184,22 @@ impl AssignReport {
             let cob_id = stale.cob_id.can_id().number();
             let message = format!("{} still has the COB-ID 0x{cob_id:03X} of node-ID {old}", stale.object);
             let command = format!("cangauge sdo write {} {} 0x{:X}", new?, stale.object, stale.expected);
-            Some(Told::new("stale-cob-id", message).command("change it", command))
+            Some(NoteText::new("stale-cob-id", message).command("change it", command))
         }));
         if let Some(rate) = assigned.rate.filter(|_| !assigned.retimed) {
             notes.push(self.host_must_follow(rate));
         }
         if !assigned.stored {
-            notes.push(Told::new("not-stored", "not stored: a power cycle restores the old values"));
+            notes.push(NoteText::new("not-stored", "not stored: a power cycle restores the old values"));
         }
         notes
     }
 
-    fn host_must_follow(&self, planned: PlannedRate) -> Told {
+    fn host_must_follow(&self, planned: PlannedRate) -> NoteText {
         const CODE: &str = "host-must-follow";
         let rate = self::rate(planned);
         if planned.is_auto {
-            return Told::new(CODE, "the device detects the bit rate after a restart: power it off and on");
+            return NoteText::new(CODE, "the device detects the bit rate after a restart: power it off and on");
         }
         let host = match (&self.interface, planned.bits) {
             (Some(interface), Some(bits)) => up_by_hand(interface, Some(bits)),
@@ -207,74 +207,74 @@ impl AssignReport {
         };
         if self.assigned.stored {
             let message = format!("bit rate {rate} takes effect at the next start: power it off; {host}; power it on");
-            return Told::new(CODE, message);
+            return NoteText::new(CODE, message);
         }
         let target = &self.assigned.target;
-        Told::new(CODE, format!("bit rate {rate} takes effect after its activation; then {host}"))
+        NoteText::new(CODE, format!("bit rate {rate} takes effect after its activation; then {host}"))
             .command("activate it", format!("cangauge lss activate {target} 1s"))
     }
 }
 
 /// The text for an event.
-pub(super) fn fact(fact: &LssFact) -> Told {
-    let told = event(fact);
+pub(super) fn fact(fact: &LssFact) -> NoteText {
+    let text = event(fact);
     match (fact.device.node, fact.device.address, &fact.event) {
         (None, Some(address), event) if !matches!(event, LssEvent::MoreUnconfigured { .. }) => {
-            Told { message: format!("{address}: {}", told.message), ..told }
+            NoteText { message: format!("{address}: {}", text.message), ..text }
         }
-        _ => told,
+        _ => text,
     }
 }
 
-fn event(fact: &LssFact) -> Told {
+fn event(fact: &LssFact) -> NoteText {
     match &fact.event {
         LssEvent::Found { title, free } => {
             let serial = fact.device.address.map(|address| format!("serial {}", address.serial));
             let title = title.clone().unwrap_or_else(|| "an unknown device".to_owned());
             let device = std::iter::once(title).chain(serial).collect::<Vec<_>>().join(", ");
             let free = free.map_or_else(String::new, |free| format!("; node-ID {free} is free"));
-            Told::new("found", format!("{device}{free}"))
+            NoteText::new("found", format!("{device}{free}"))
         }
         LssEvent::StandardRateTable => {
-            Told::new("standard-rate-table", "its own bit rate table is unknown; the table of CiA 305 is used")
+            NoteText::new("standard-rate-table", "its own bit rate table is unknown; the table of CiA 305 is used")
         }
-        LssEvent::Progress(done) => Told::new("progress", progress(done)),
-        LssEvent::RetryInStopped => Told::new("retry-in-stopped", "no LSS answer; tried again in STOPPED"),
+        LssEvent::Progress(done) => NoteText::new("progress", progress(done)),
+        LssEvent::RetryInStopped => NoteText::new("retry-in-stopped", "no LSS answer; tried again in STOPPED"),
         LssEvent::LeftPreOperational => {
-            Told::new("left-pre-operational", "now in PRE-OPERATIONAL; its state before is unknown")
+            NoteText::new("left-pre-operational", "now in PRE-OPERATIONAL; its state before is unknown")
         }
         LssEvent::ChangingRate { bit_rate, delay_ms } => {
-            Told::new("changing-rate", format!("device and host change to {} in {delay_ms} ms", short(*bit_rate)))
+            NoteText::new("changing-rate", format!("device and host change to {} in {delay_ms} ms", short(*bit_rate)))
         }
-        LssEvent::AnswersAt { bit_rate } => Told::new("answers", format!("it answers at {}", short(*bit_rate))),
-        LssEvent::ObjectsInsteadOfLss => Told::new(
+        LssEvent::AnswersAt { bit_rate } => NoteText::new("answers", format!("it answers at {}", short(*bit_rate))),
+        LssEvent::ObjectsInsteadOfLss => NoteText::new(
             "objects-instead-of-lss",
             "no LSS answer; its own objects are used instead, as its description allows (--via sdo)",
         ),
         LssEvent::UnverifiedMethod { doubt } => {
-            Told::new("unverified-method", format!("no document confirms this method: {doubt}"))
+            NoteText::new("unverified-method", format!("no document confirms this method: {doubt}"))
         }
-        LssEvent::StoreResetsCobIds => Told::new(
+        LssEvent::StoreResetsCobIds => NoteText::new(
             "store-resets-cob-ids",
             "1010h:1 stores every present value, and resets the COB-IDs of 1014h and 180xh:1 to their defaults",
         ),
-        LssEvent::SharedNodeId(node) => Told::new(
+        LssEvent::SharedNodeId(node) => NoteText::new(
             "shared-node-id",
             format!("another device has node-ID {node} too: it is not reset, since that would reset the other one"),
         ),
         LssEvent::AllSlavesChange(sign) => {
-            Told::new("all-slaves-change", format!("{}: all of them accept the change", another(sign)))
+            NoteText::new("all-slaves-change", format!("{}: all of them accept the change", another(sign)))
         }
         LssEvent::CannotExcludeOthers(service) => cannot_exclude_others(*service),
         LssEvent::MoreUnconfigured { last, reason } => more_unconfigured(*last, reason.as_ref()),
-        LssEvent::NoReturn { bit_rate } => Told::new(
+        LssEvent::NoReturn { bit_rate } => NoteText::new(
             "no-return",
             format!("it stores {} before it uses it: it cannot return to the old bit rate", short(*bit_rate)),
         ),
     }
 }
 
-fn cannot_exclude_others(service: UnansweredService) -> Told {
+fn cannot_exclude_others(service: UnansweredService) -> NoteText {
     let service = match service {
         UnansweredService::Inquire => "the LSS inquiries (5Ah to 5Dh)",
         UnansweredService::Identify => "LSS identify (46h to 4Bh)",
@@ -283,17 +283,17 @@ fn cannot_exclude_others(service: UnansweredService) -> Told {
         "the device does not support {service}: only SDO shows that it is the only one, and a device that is stopped or \
          has no node-ID does not answer SDO"
     );
-    Told::new("cannot-exclude-others", message)
+    NoteText::new("cannot-exclude-others", message)
 }
 
-fn more_unconfigured(last: LssAddress, reason: Option<&Reason>) -> Told {
+fn more_unconfigured(last: LssAddress, reason: Option<&Reason>) -> NoteText {
     let reason = match reason {
         Some(reason) => reason.0.to_string(),
         None => "it answers again although it was found".to_owned(),
     };
     let message =
         format!("there may be more devices without a node-ID than {last} ({reason}): set its node-ID, then scan again");
-    Told::new("more-unconfigured", message)
+    NoteText::new("more-unconfigured", message)
 }
 
 /// How far a change has come: `node-ID 12 configured, not stored`.

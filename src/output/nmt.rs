@@ -1,8 +1,8 @@
 //! Reports of `nmt`.
 
 use super::report::{Cell, Column, Report, rows_only};
-use crate::bus::time::spoken;
-use crate::tasks::nmt::{Change, LeftHeartbeat, Seen, Starts, StartupReport, StateReport};
+use crate::bus::time::format_duration;
+use crate::tasks::nmt::{Change, LeftHeartbeat, Starts, StartupReport, StateEvent, StateReport};
 use std::io::{self, Write};
 
 impl Report for StateReport {
@@ -17,7 +17,7 @@ impl Report for StateReport {
     }
 }
 
-impl Report for Seen {
+impl Report for StateEvent {
     const COLUMNS: &'static [Column] =
         &[Column::new("time"), Column::new("node"), Column::new("event"), Column::new("state")];
 
@@ -35,15 +35,15 @@ impl Report for Seen {
         let event = match self.change {
             Change::State(state) => format!("state {state}"),
             Change::Back(state) => format!("back {state}"),
-            Change::Lost(silence) => format!("lost: no heartbeat for {}", spoken(silence)),
+            Change::Lost(silence) => format!("lost: no heartbeat for {}", format_duration(silence)),
             Change::BootUp => "boot-up".to_owned(),
         };
         writeln!(out, "{}  {:>3}  {event}", time(self), self.node)
     }
 }
 
-fn time(seen: &Seen) -> String {
-    humantime::format_rfc3339_micros(seen.at.wall.system_time()).to_string()
+fn time(event: &StateEvent) -> String {
+    humantime::format_rfc3339_micros(event.at.wall.system_time()).to_string()
 }
 
 impl Report for StartupReport {

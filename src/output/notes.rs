@@ -14,7 +14,7 @@ use serde::Serialize;
 
 /// An effect or a note as text, and as one object in the `effects` or `notes` of a JSON report.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Told {
+pub struct NoteText {
     /// The code for scripts.
     pub code: &'static str,
     /// One line, without the node in front.
@@ -26,14 +26,14 @@ pub struct Told {
     pub purpose: &'static str,
 }
 
-impl Told {
+impl NoteText {
     /// An effect or a note without a command.
-    pub(super) fn new(code: &'static str, message: impl Into<String>) -> Told {
-        Told { code, message: message.into(), command: None, purpose: "" }
+    pub(super) fn new(code: &'static str, message: impl Into<String>) -> NoteText {
+        NoteText { code, message: message.into(), command: None, purpose: "" }
     }
 
     /// The same with a command. `purpose` says what the command does: `undo`.
-    pub(super) fn command(mut self, purpose: &'static str, command: impl Into<String>) -> Told {
+    pub(super) fn command(mut self, purpose: &'static str, command: impl Into<String>) -> NoteText {
         self.command = Some(command.into());
         self.purpose = purpose;
         self
@@ -61,16 +61,16 @@ impl Told {
 }
 
 /// The text for an effect on `node`.
-pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> Told {
+pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> NoteText {
     let number = node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
     match effect {
-        Effect::NothingChanged => Told::new("nothing-changed", "nothing was changed"),
-        Effect::InterfaceNotRestored { interface, bit_rate, reason } => Told::new(
+        Effect::NothingChanged => NoteText::new("nothing-changed", "nothing was changed"),
+        Effect::InterfaceNotRestored { interface, bit_rate, reason } => NoteText::new(
             "interface-not-restored",
             format!("{interface} was not set back to its previous bit rate: {reason}"),
         )
         .command("set it back", up_by_hand(interface, *bit_rate)),
-        Effect::WasOperational => Told::new("was-operational", "the node was operational before")
+        Effect::WasOperational => NoteText::new("was-operational", "the node was operational before")
             .command("start it again", format!("cangauge nmt start {number}")),
         Effect::Autozero(effect) => autozero::effect(&number, effect),
         Effect::Lss(effect) => failure::lss::effect(effect),
@@ -82,17 +82,19 @@ pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> Told {
 }
 
 /// The text for a note.
-pub fn note(note: &Note) -> Told {
+pub fn note(note: &Note) -> NoteText {
     match &note.fact {
         Fact::KeptUntilPowerOff => {
-            let told = Told::new("kept-until-power-off", "not stored: the node loses the new values at power off");
+            let text = NoteText::new("kept-until-power-off", "not stored: the node loses the new values at power off");
             match note.node {
-                Some(node) => told.command("to keep them", format!("cangauge store {node}")),
-                None => told,
+                Some(node) => text.command("to keep them", format!("cangauge store {node}")),
+                None => text,
             }
         }
-        Fact::OperationalAgain => Told::new("operational-again", "the node was operational and is operational again"),
-        Fact::LeftOperational => Told::new(
+        Fact::OperationalAgain => {
+            NoteText::new("operational-again", "the node was operational and is operational again")
+        }
+        Fact::LeftOperational => NoteText::new(
             "left-operational",
             "the node was started; its previous state is unknown, so it stays operational",
         ),
@@ -102,7 +104,7 @@ pub fn note(note: &Note) -> Told {
         Fact::Settings(fact) => settings::fact(fact),
         Fact::State(state) => state_text(&note.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string()), *state),
         Fact::Store(fact) => store::fact(note.node, fact),
-        Fact::StateAsBooted => Told::new(
+        Fact::StateAsBooted => NoteText::new(
             "state-as-booted",
             "the state before the reset is unknown; the node is in the state in which it boots",
         ),
@@ -110,26 +112,26 @@ pub fn note(note: &Note) -> Told {
 }
 
 /// The text for an NMT state that is not the previous one.
-fn state_text(node: &str, state: StateEffect) -> Told {
+fn state_text(node: &str, state: StateEffect) -> NoteText {
     match state {
-        StateEffect::Unknown => Told::new(
+        StateEffect::Unknown => NoteText::new(
             "left-pre-operational",
             "the node was set to PRE-OPERATIONAL; its previous state is unknown, so it stays there",
         )
         .command("start it", format!("cangauge nmt start {node}")),
         StateEffect::Differs { before, now } => {
-            Told::new("state-differs", format!("the node was {before} before and is {now} now"))
+            NoteText::new("state-differs", format!("the node was {before} before and is {now} now"))
                 .command("show its state", format!("cangauge nmt state {node}"))
         }
         StateEffect::Unconfirmed { before } => {
-            Told::new("state-unconfirmed", format!("the node was set to {before} again, without confirmation"))
+            NoteText::new("state-unconfirmed", format!("the node was set to {before} again, without confirmation"))
         }
-        StateEffect::NotRestored => Told::new("state-not-restored", "the previous NMT state was not restored"),
+        StateEffect::NotRestored => NoteText::new("state-not-restored", "the previous NMT state was not restored"),
     }
 }
 
 /// The notes of a report, for JSON.
-pub fn notes(notes: &[Note]) -> Vec<Told> {
+pub fn notes(notes: &[Note]) -> Vec<NoteText> {
     notes.iter().map(note).collect()
 }
 
@@ -146,6 +148,6 @@ pub fn print(console: &Console, note: &Note) {
 }
 
 /// Prints a note of a report on stderr.
-pub fn print_told(console: &Console, told: &Told) {
-    console.note(&told.line());
+pub fn print_text(console: &Console, text: &NoteText) {
+    console.note(&text.line());
 }

@@ -4,7 +4,7 @@ use super::failure::pdo::entry;
 use super::report::{Cell, Column, Report};
 use super::{notes, text};
 use crate::bus::Stamp;
-use crate::bus::time::spoken;
+use crate::bus::time::format_duration;
 use crate::canopen::id::NodeId;
 use crate::canopen::pdo::TpdoNumber;
 use crate::measure::sample::{Sample, Source, Status};
@@ -81,7 +81,7 @@ fn time(time: Option<Duration>) -> String {
     match time {
         None => "-".to_owned(),
         Some(time) if time.is_zero() => "0".to_owned(),
-        Some(time) => spoken(time),
+        Some(time) => format_duration(time),
     }
 }
 

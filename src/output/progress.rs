@@ -49,7 +49,7 @@ impl Progress {
         self.multi.is_hidden()
     }
 
-    /// Takes the latest values.
+    /// Stores the latest values for the next redraw.
     pub fn take(&mut self, samples: &[Sample], sources: &[Source]) {
         if self.is_hidden() {
             return;
@@ -115,11 +115,11 @@ impl Progress {
 #[derive(Debug)]
 pub struct Transfer {
     bar: Option<ProgressBar>,
-    /// Calls of [`Transfer::moved`]: ten per second.
+    /// The number of calls of [`Transfer::moved`], which come ten times a second.
     calls: Cell<u32>,
 }
 
-/// The call from which on the progress is shown: after three tenths of a second.
+/// The first call that shows the progress: after 0.3 s.
 const FIRST_SHOWN_CALL: u32 = 3;
 
 impl Transfer {
@@ -129,7 +129,7 @@ impl Transfer {
         Transfer { bar, calls: Cell::new(0) }
     }
 
-    /// Takes the number of bytes moved, and the total if it is known.
+    /// Shows the number of bytes moved, and the total if it is known.
     pub fn moved(&self, (done, total): (usize, Option<usize>)) {
         self.calls.set(self.calls.get().saturating_add(1));
         let Some(bar) = self.bar.as_ref().filter(|_| self.calls.get() >= FIRST_SHOWN_CALL) else { return };

@@ -65,7 +65,7 @@ impl Report for ReadValue<'_> {
             self.unit.as_str().into(),
             match self.status {
                 Some(status) => status.into(),
-                None => Cell::Null.shown_as("(tells no status)"),
+                None => Cell::Null.shown_as("(no status)"),
             },
         ]
     }

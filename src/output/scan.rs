@@ -21,8 +21,8 @@ impl Report for Found {
     ];
 
     fn cells(&self) -> Vec<Cell> {
-        let identity = &self.instrument.identity;
-        let model = self.instrument.model.as_deref();
+        let identity = &self.device.identity;
+        let model = self.device.model.as_deref();
         let name = identity.name.as_deref().map(|name| Cell::from(name).shown_as(shown_name(name)));
         let mut cells: Vec<Cell> = vec![
             self.node.into(),

@@ -3,7 +3,7 @@
 use super::events::remark_text;
 use super::report::{Cell, Column, Format, Report, render};
 use super::text::{grouped, significant};
-use crate::bus::time::spoken;
+use crate::bus::time::format_duration;
 use crate::measure::histogram::Histogram;
 use crate::measure::sample::{Number, Source};
 use crate::measure::statistics::{Jitter, Statistics};
@@ -203,7 +203,7 @@ fn head(report: &RecordingReport, written: Written) -> String {
     let mut head = format!(
         "{} rows in {}, {} timestamps, {} frames dropped, {} gaps",
         grouped(written.rows),
-        spoken(report.length),
+        format_duration(report.length),
         report.timestamps,
         grouped(report.dropped),
         grouped(report.gaps)
@@ -232,9 +232,9 @@ fn head(report: &RecordingReport, written: Written) -> String {
 
 fn syncs(syncs: &SyncStatistics) -> Option<String> {
     let delays = &syncs.delays;
-    let quantile = |share| delays.quantile(share).map(spoken);
+    let quantile = |share| delays.quantile(share).map(format_duration);
     let (p50, p99) = (quantile(0.5)?, quantile(0.99)?);
-    let (min, max) = (spoken(delays.shortest()?), spoken(delays.longest()?));
+    let (min, max) = (format_duration(delays.shortest()?), format_duration(delays.longest()?));
     Some(format!("{} SYNC sent, delay min {min}  p50 {p50}  p99 {p99}  max {max}", grouped(syncs.sent)))
 }
 
@@ -251,7 +251,7 @@ fn signal_line(source: &Source, statistics: &Statistics) -> String {
         line = format!("{}  {}/s", line.trim_end(), significant(rate, 4));
     }
     if let Some(Jitter { median, p99, max, .. }) = statistics.jitter() {
-        let (median, p99, max) = (spoken(median), spoken(p99), spoken(max));
+        let (median, p99, max) = (format_duration(median), format_duration(p99), format_duration(max));
         line.push_str(&format!("  every {median}, jitter p99 {p99}  max {max}"));
     }
     if statistics.gaps() > 0 {

@@ -1,9 +1,9 @@
-//! Aligned columns. Text from devices is made safe for a terminal here, whatever the cell.
+//! Aligned columns. Each cell is made safe for a terminal, because it may contain text from a device.
 
 use super::text::safe;
 use std::io::{self, Write};
 
-/// How a column stands.
+/// The alignment of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
     /// Text.
@@ -12,7 +12,7 @@ pub enum Align {
     Right,
 }
 
-/// Writes rows in aligned columns, two blanks apart, without blanks at the ends of lines.
+/// Writes rows in aligned columns with two spaces between them. Lines have no trailing spaces.
 pub fn write(out: &mut dyn Write, align: &[Align], rows: &[Vec<String>]) -> io::Result<()> {
     let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(|cell| safe(cell)).collect()).collect();
     let width = |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();

@@ -3,12 +3,12 @@
 use crate::bus::Stamp;
 use std::fmt::Write;
 
-/// Makes text that came from a device safe for a terminal: control characters, and the marks that turn
-/// the direction of writing, are shown as `\x1B` and never sent.
+/// Makes text from a device safe for a terminal: control characters, invisible characters and characters that change the
+/// writing direction are replaced by escapes such as `\x1B`.
 pub fn safe(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for character in text.chars() {
-        if steers(character) {
+        if is_unsafe(character) {
             // Writing to a String cannot fail.
             let _ = if character.is_ascii() || u32::from(character) < 0x100 {
                 write!(safe, "\\x{:02X}", u32::from(character))
@@ -22,8 +22,8 @@ pub fn safe(text: &str) -> String {
     safe
 }
 
-/// Whether a terminal does something else with this character than show it.
-pub(super) fn steers(character: char) -> bool {
+/// Whether a terminal does not simply show this character.
+pub(super) fn is_unsafe(character: char) -> bool {
     let hidden =
         matches!(character, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
     character.is_control() || hidden
@@ -34,7 +34,7 @@ pub fn utc(at: Stamp) -> String {
     humantime::format_rfc3339_micros(at.wall.system_time()).to_string()
 }
 
-/// A count with thousands separated: `124,310`.
+/// A count with separated thousands: `124,310`.
 pub fn grouped(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::new();
@@ -47,7 +47,7 @@ pub fn grouped(count: u64) -> String {
     text
 }
 
-/// A number with `digits` significant digits and no exponent where that stays readable.
+/// A number with `digits` significant digits. Very large and very small numbers have an exponent.
 pub fn significant(number: f64, digits: usize) -> String {
     if number == 0.0 || !number.is_finite() {
         return number.to_string();
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_from_a_device_steers_a_terminal() {
+    fn text_from_a_device_cannot_control_a_terminal() {
         assert_eq!(safe("MH-4-CAN"), "MH-4-CAN");
         assert_eq!(safe("\x1b[2J\r\n\x07"), "\\x1B[2J\\x0D\\x0A\\x07");
         assert_eq!(safe("\u{9b}31m"), "\\x9B31m");

@@ -352,8 +352,8 @@ impl Channel {
     }
 
     fn unit(&self, objects: &Objects) -> Unit {
-        let told = self.signal.unit.filter(|object| objects.has(*object));
-        Unit(told.map_or(self.quantity.channel().unit, |object| objects.number(object)))
+        let object = self.signal.unit.filter(|object| objects.has(*object));
+        Unit(object.map_or(self.quantity.channel().unit, |object| objects.number(object)))
     }
 
     /// The value of an object in the unit of the channel.

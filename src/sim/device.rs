@@ -12,7 +12,7 @@ use super::nmt::{Command, State};
 use super::objects::{Area, Objects};
 use super::record::{Line, Recorder, line, plain};
 use super::sdo_server::SdoServer;
-use super::settings::{Pair, Rate, Settings};
+use super::settings::{BitRate, Pair, Settings};
 use super::setup::{OfflineAfter, SERIAL_NUMBER, Setup};
 use super::tpdo::{Cause, Tpdo};
 use crate::bus::memory::Outbox;
@@ -99,7 +99,7 @@ impl Device {
         let answers_60 = description.quirks.contains(&Quirk::UploadAnswered60);
         let sdo = SdoServer::new(description.sdo.clone(), answers_60);
         let emergencies = Emergencies::new(description);
-        let pair = Pair { node: setup.node, rate: setup.bit_rate.map_or(Rate::Auto, Rate::At) };
+        let pair = Pair { node: setup.node, rate: setup.bit_rate.map_or(BitRate::Auto, BitRate::At) };
         let settings = Settings::new(description, &objects, pair);
         let memory = Memory { node, settings, objects, channels, emergencies, remap: description.pdo.remap };
         let oddities = &setup.oddities;
@@ -369,8 +369,8 @@ impl Device {
             let Some(reading) = channels.reading(objects, *object, time) else {
                 return Some(plain(*node, *object, objects.spec(*object)?.data_type, bytes));
             };
-            let told = reading.status.is_some_and(|status| mapped.contains(&status));
-            Some(line(*node, &reading, bytes, told))
+            let has_status = reading.status.is_some_and(|status| mapped.contains(&status));
+            Some(line(*node, &reading, bytes, has_status))
         };
         values.iter().filter_map(described).collect()
     }
@@ -420,10 +420,10 @@ fn counter(direction: Direction) -> &'static str {
     }
 }
 
-fn fixed(rate: Rate) -> Option<u32> {
+fn fixed(rate: BitRate) -> Option<u32> {
     match rate {
-        Rate::At(rate) => Some(rate),
-        Rate::Auto => None,
+        BitRate::At(rate) => Some(rate),
+        BitRate::Auto => None,
     }
 }
 

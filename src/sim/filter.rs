@@ -285,7 +285,7 @@ mod tests {
         assert!((4.0..6.0).contains(&at(19)));
         assert_eq!(at(20), quantity.sample(20));
         assert_eq!(at(29), quantity.sample(29));
-        assert_eq!(at(30), quantity.sample(30), "begins anew");
+        assert_eq!(at(30), quantity.sample(30), "starts again");
         assert!((at(40) - quantity.sample(30)).abs() < 0.05);
     }
 
@@ -310,7 +310,7 @@ mod tests {
         let (quantity, at) = (noisy(Vec::new()), Duration::from_millis);
         let mut filter = Filter::new(&mh4.description, 1, false);
         filter.begin(&objects, &quantity, at(3));
-        assert_eq!(filter.value(&quantity, at(100)), quantity.sample(100), "none as delivered");
+        assert_eq!(filter.value(&quantity, at(100)), quantity.sample(100), "no filter by default");
         let [kind, constant] = [TYPE, CONSTANT].map(|index| ObjectId::new(index, 1));
         assert!(filter.is_set_by(kind) && filter.is_set_by(constant) && !filter.is_set_by(kind.with_sub(2)));
         objects.put(kind, vec![1]);

@@ -57,17 +57,17 @@ mod tests {
 
     #[test]
     fn commands_for_one_node_and_for_all() {
-        let told = |frame: &str| {
+        let command = |frame: &str| {
             let node = NodeId::new(5).expect("a node-ID");
             Command::for_node(node, &frame.parse().expect("a frame"))
         };
-        assert_eq!(told("000#0105"), Some(Command::Enter(State::Operational)));
-        assert_eq!(told("000#0200"), Some(Command::Enter(State::Stopped)));
-        assert_eq!(told("000#8005"), Some(Command::Enter(State::PreOperational)));
-        assert_eq!(told("000#8105"), Some(Command::ResetNode));
-        assert_eq!(told("000#8200"), Some(Command::ResetCommunication));
-        for other in ["000#0106", "000#01", "000#010500", "000#0305", "000#R2", "001#0105", "00000000#0105"] {
-            assert_eq!(told(other), None, "{other}");
+        assert_eq!(command("000#0105"), Some(Command::Enter(State::Operational)));
+        assert_eq!(command("000#0200"), Some(Command::Enter(State::Stopped)));
+        assert_eq!(command("000#8005"), Some(Command::Enter(State::PreOperational)));
+        assert_eq!(command("000#8105"), Some(Command::ResetNode));
+        assert_eq!(command("000#8200"), Some(Command::ResetCommunication));
+        for other in ["000#0106", "000#", "000#01", "000#010500", "000#0305", "000#R2", "001#0105", "00000000#0105"] {
+            assert_eq!(command(other), None, "{other}");
         }
     }
 }

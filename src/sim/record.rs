@@ -62,9 +62,9 @@ impl Recorder {
     }
 }
 
-/// The line of one mapped value. `told`: the same PDO contains the device's status.
-pub(super) fn line(node: NodeId, reading: &Reading, bytes: &[u8], told: bool) -> Line {
-    let status = match (reading.overload, told, reading.marker) {
+/// The line of one mapped value. `has_status`: the same PDO contains the status.
+pub(super) fn line(node: NodeId, reading: &Reading, bytes: &[u8], has_status: bool) -> Line {
+    let status = match (reading.overload, has_status, reading.marker) {
         (Some(Direction::High), true, _) => "overload-high",
         (Some(Direction::Low), true, _) => "overload-low",
         // The marker alone does not show the direction.
@@ -72,7 +72,7 @@ pub(super) fn line(node: NodeId, reading: &Reading, bytes: &[u8], told: bool) ->
         (None, true, _) | (None, false, true) => "ok",
         (_, false, false) => "",
     };
-    let value = match (reading.overload, told || reading.marker) {
+    let value = match (reading.overload, has_status || reading.marker) {
         (Some(_), true) => String::new(),
         _ => match reading.digits {
             Some(digits) => decimal(signed(bytes), digits),
@@ -141,8 +141,8 @@ mod tests {
         Reading { signal: "pressure".to_owned(), unit: Unit(0xab_0000), status: None, digits, overload, marker }
     }
 
-    fn text(reading: &Reading, bytes: &[u8], told: bool) -> String {
-        line(NodeId::MAX, reading, bytes, told).0
+    fn text(reading: &Reading, bytes: &[u8], has_status: bool) -> String {
+        line(NodeId::MAX, reading, bytes, has_status).0
     }
 
     #[test]

@@ -12,7 +12,7 @@ const STANDARD: [(u8, u32); 8] =
 
 /// A bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Rate {
+pub(super) enum BitRate {
     /// This one, in bit/s.
     At(u32),
     /// The bit rate of the bus.
@@ -23,7 +23,7 @@ pub(super) enum Rate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Pair {
     pub(super) node: Option<NodeId>,
-    pub(super) rate: Rate,
+    pub(super) rate: BitRate,
 }
 
 /// The three pairs of CiA 305, and the objects that contain and change them.
@@ -38,7 +38,7 @@ pub(super) struct Settings {
     /// The bit rate of the bus, if it is known.
     pub(super) bus_bit_rate: Option<u32>,
     /// The codes of the bit rates.
-    codes: Vec<(u8, Rate)>,
+    codes: Vec<(u8, BitRate)>,
     node_at: Option<Place>,
     rate_at: Option<Place>,
 }
@@ -55,12 +55,12 @@ struct Place {
 
 impl Settings {
     pub(super) fn new(description: &Description, objects: &Objects, pair: Pair) -> Settings {
-        let mut codes: Vec<(u8, Rate)> =
-            description.bit_rates.iter().map(|(code, rate)| (*code, Rate::At(*rate))).collect();
+        let mut codes: Vec<(u8, BitRate)> =
+            description.bit_rates.iter().map(|(code, rate)| (*code, BitRate::At(*rate))).collect();
         if codes.is_empty() {
-            codes = STANDARD.map(|(code, rate)| (code, Rate::At(rate))).to_vec();
+            codes = STANDARD.map(|(code, rate)| (code, BitRate::At(rate))).to_vec();
         }
-        codes.extend(description.auto_bit_rate.map(|code| (code, Rate::Auto)));
+        codes.extend(description.auto_bit_rate.map(|code| (code, BitRate::Auto)));
         let way = description.assign.iter().find(|entry| entry.way == AssignKind::Objects);
         let place = |place: fn(&AssignEntry) -> Option<AssignObject>| {
             let entry = way?;
@@ -94,7 +94,7 @@ impl Settings {
     pub(super) fn set_bus_bit_rate(&mut self, bit_rate: u32, is_given: bool) {
         if self.bus_bit_rate.is_none() && !is_given {
             for pair in [&mut self.active, &mut self.pending, &mut self.persistent] {
-                pair.rate = Rate::At(bit_rate);
+                pair.rate = BitRate::At(bit_rate);
             }
         }
         self.bus_bit_rate = Some(bit_rate);
@@ -121,7 +121,7 @@ impl Settings {
         }
     }
 
-    fn rate(&self, code: u8) -> Option<Rate> {
+    fn rate(&self, code: u8) -> Option<BitRate> {
         self.codes.iter().find(|(known, _)| *known == code).map(|(_, rate)| *rate)
     }
 
@@ -170,9 +170,9 @@ impl Settings {
     /// The code of the active bit rate; with automatic detection, of the rate detected (MH-4, 4.3.9).
     fn shown_rate(&self) -> Option<u8> {
         let rate = match self.active.rate {
-            Rate::At(rate) => rate,
-            Rate::Auto => self.bus_bit_rate?,
+            BitRate::At(rate) => rate,
+            BitRate::Auto => self.bus_bit_rate?,
         };
-        self.codes.iter().find(|(_, known)| *known == Rate::At(rate)).map(|(code, _)| *code)
+        self.codes.iter().find(|(_, known)| *known == BitRate::At(rate)).map(|(code, _)| *code)
     }
 }

@@ -1,7 +1,7 @@
 //! Why a node sends no measurements.
 //!
 //! [`diagnose`] decides from evidence, in this order: what the node sent last ([`Heard`]), what it answers now
-//! ([`Inquiry`]), and the parameters of the TPDOs that carry the requested signals. Causes that cannot be told apart are
+//! ([`Inquiry`]), and the parameters of the TPDOs that carry the requested signals. Causes that cannot be distinguished are
 //! named together: see [`Running`].
 
 mod inquiry;

@@ -4,7 +4,7 @@ use super::Failure;
 use super::failure::{BusError, Cause};
 use crate::tasks::Kind;
 
-/// What was to be done with an interface.
+/// An action on an interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HostAction {
     /// Bring it up.
@@ -33,16 +33,16 @@ pub enum HostAction {
 pub enum HostFailure {
     /// The program lacks the privilege (CAP_NET_ADMIN).
     NotPermitted {
-        /// What the privilege is missing for: `set the bit rate of can0`.
+        /// The action without privilege: `set the bit rate of can0`.
         what: String,
-        /// What was to be done.
+        /// The action.
         action: HostAction,
     },
     /// The interface, its driver or this system cannot do it.
     Unsupported {
         /// The reason.
         reason: String,
-        /// What was to be done.
+        /// The action.
         action: HostAction,
     },
     /// The interface has no bit rate yet, and none was given.

@@ -9,4 +9,4 @@ pub use crate::node::state::{Proof, StateReport, command, states};
 pub use failure::NmtFailure;
 pub use probe::{LeftHeartbeat, Probe, probe};
 pub use startup::{Starts, StartupReport, startup};
-pub use watch::{Change, Seen, watch};
+pub use watch::{Change, StateEvent, watch};

@@ -21,7 +21,7 @@ pub struct Found {
     /// Its state, if a heartbeat showed it.
     pub state: Option<NmtState>,
     /// Its identity and description, as far as they could be read.
-    pub instrument: Node,
+    pub device: Node,
     /// Whether the description or EDS that the user named is for another device.
     pub is_other_device: bool,
     /// Why its identity could not be read.
@@ -51,7 +51,7 @@ pub fn scan(
         match result {
             Ok(node) => {
                 entry.is_other_device = overrides.get(&node.id).is_some_and(|model| !node.identity.fits(model));
-                entry.instrument = node;
+                entry.device = node;
             }
             Err(error) => entry.failure = Some(error.into()),
         }
@@ -74,8 +74,8 @@ pub fn listen(
     for entry in &mut found {
         let identity = presence.overheard.identity(entry.node);
         let named = overrides.get(&entry.node).filter(|model| identity.fits(model)).cloned();
-        entry.instrument.model = named.or_else(|| presence.overheard.recognise(entry.node));
-        entry.instrument.identity = identity;
+        entry.device.model = named.or_else(|| presence.overheard.recognise(entry.node));
+        entry.device.identity = identity;
     }
     Ok(found)
 }
@@ -85,7 +85,7 @@ fn found(presence: &Presence, nodes: &[NodeId]) -> Vec<Found> {
     let of_node = |node| Found {
         node,
         state: presence.state(node),
-        instrument: Node::new(node),
+        device: Node::new(node),
         is_other_device: false,
         failure: None,
     };

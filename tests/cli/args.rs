@@ -1,4 +1,4 @@
-//! What is typed wrong is said before the bus is opened.
+//! Wrong arguments are reported before the bus is opened.
 
 use super::{ALL, Bench};
 use serde_json::json;
@@ -13,16 +13,16 @@ fn nodes_are_never_clamped() {
             assert_eq!((done.stdout.as_str(), done.frames.len()), ("", 0), "{line}");
         }
     }
-    bench.run("read 200").refuses("\"200\" is not a node-ID: they go from 1 to 127 (5, 0x7f, 1-16, 1,5, all)");
-    bench.run("read 0").refuses("\"0\" is not a node-ID: they go from 1 to 127 (5, 0x7f, 1-16, 1,5, all)");
-    bench.run("read 5-1").refuses("\"5-1\" counts backwards: 1-5");
+    bench.run("read 200").refuses("\"200\" is not a valid node-ID (1 to 127; examples: 5, 0x7f, 1-16, 1,5, all)");
+    bench.run("read 0").refuses("\"0\" is not a valid node-ID (1 to 127; examples: 5, 0x7f, 1-16, 1,5, all)");
+    bench.run("read 5-1").refuses("\"5-1\" is in the wrong order: 1-5");
     bench.run("sdo read 200 0x1018:1").refuses("\"200\" is not a node-ID (1 to 127)");
     let done = bench.run("read 1,0x7f pressure -f csv").exit(0);
     assert_eq!(done.stdout.lines().count(), 3, "{}", done.stdout);
 }
 
 #[test]
-fn the_hint_names_the_help_of_the_command() {
+fn hint_names_the_help_of_the_command() {
     let done = Bench::of(ALL).run("--retries 0 nmt start 200").exit(2);
     assert_eq!(done.stderr.lines().nth(1), Some("hint: cangauge nmt start --help"));
     let done = Bench::of(ALL).run("log 1 --retries many").exit(2);
@@ -33,7 +33,7 @@ fn the_hint_names_the_help_of_the_command() {
 }
 
 #[test]
-fn wrong_words() {
+fn wrong_arguments_are_explained() {
     let bench = Bench::of(ALL);
     let first = |line: &str| {
         let done = bench.run(line).exit(2);
@@ -63,13 +63,13 @@ fn wrong_words() {
 }
 
 #[test]
-fn usage_errors_are_json_too_where_that_was_asked_for() {
+fn usage_errors_are_json_with_format_json() {
     for line in ["read 200 --format json", "read 200 -f json", "--format=json read 200"] {
         let done = Bench::of(ALL).run(line).exit(2);
         assert_eq!(
             done.error(),
             json!({"error": {"kind": "usage", "exit": 2, "node": null, "object": null, "abort": null,
-                "message": "\"200\" is not a node-ID: they go from 1 to 127 (5, 0x7f, 1-16, 1,5, all)",
+                "message": "\"200\" is not a valid node-ID (1 to 127; examples: 5, 0x7f, 1-16, 1,5, all)",
                 "hint": "cangauge read --help"}})
         );
     }
@@ -86,7 +86,7 @@ fn help_and_version_go_to_stdout() {
     }
     let done = bench.finish(&mut bench.command(&["--version"]));
     assert_eq!(done.exit(0).stdout, format!("cangauge {}\n", env!("CARGO_PKG_VERSION")));
-    // Without a command the help is no answer.
+    // Without a command, the help goes to stderr.
     for words in [vec![], vec!["sdo"], vec!["nmt"]] {
         let done = bench.finish(&mut bench.command(&words)).exit(2);
         assert!(done.stderr.contains("Usage: cangauge") && done.stdout.is_empty(), "{words:?}");
@@ -94,7 +94,7 @@ fn help_and_version_go_to_stdout() {
 }
 
 #[test]
-fn global_options_stand_before_and_after_the_command() {
+fn global_options_work_before_and_after_the_command() {
     let bench = Bench::of("mh4@5");
     let bus = bench.bus.as_str();
     for words in [
@@ -110,13 +110,13 @@ fn global_options_stand_before_and_after_the_command() {
 }
 
 #[test]
-fn buses_that_are_none() {
+fn invalid_bus_names_are_refused() {
     let bench = Bench::of(ALL);
     let run = |bus: &str| bench.finish(&mut bench.command(&["-b", bus, "scan"]));
     run("foo:bar")
         .refuses("\"foo:bar\" is not a bus (can0, socketcan:can0, sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE)");
-    run("").refuses("\"\" is not a name of an interface");
-    run("a-name-that-is-too-long").refuses("\"a-name-that-is-too-long\" is not a name of an interface");
+    run("").refuses("\"\" is not the name of an interface");
+    run("a-name-that-is-too-long").refuses("\"a-name-that-is-too-long\" is not the name of an interface");
     run("sim:mh4").refuses("\"mh4\" is not DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) and no file FILE.toml");
     run("sim:mh5@5").refuses("no device \"mh5\" (baumer, d20, dps, hydac, hydac-old, jumo, mc1609, mh4, or FILE.toml)");
     run("sim:mh4@128").refuses("mh4@128: \"128\" is not a node-ID (1 to 127)");
@@ -127,7 +127,7 @@ fn buses_that_are_none() {
 }
 
 #[test]
-fn simulated_devices_are_for_others() {
+fn sim_requires_a_shared_bus() {
     Bench::of(ALL).run("sim mh4@5").refuses("no other program can reach the simulated bus: it is inside this program");
     Bench::of(ALL)
         .run("sim mh5@5")
@@ -135,7 +135,7 @@ fn simulated_devices_are_for_others() {
 }
 
 #[test]
-fn completions_are_those_that_are_shipped() {
+fn printed_completions_equal_the_shipped_files() {
     for (shell, file) in [("bash", "cangauge.bash"), ("zsh", "_cangauge"), ("fish", "cangauge.fish")] {
         let shipped = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("completions").join(file);
         Bench::of(ALL).run_words(&["completions", shell]).prints(&std::fs::read_to_string(shipped).expect(file));
@@ -143,7 +143,7 @@ fn completions_are_those_that_are_shipped() {
     assert_eq!(Bench::of(ALL).run("completions tcsh").exit(2).stdout, "");
 }
 
-/// An interface that nobody has: what is said depends on the kernel, that it is exit 5 does not.
+/// An interface that does not exist. The message depends on the kernel, the exit code does not.
 #[test]
 #[cfg(target_os = "linux")]
 fn an_interface_that_does_not_exist() {
@@ -161,7 +161,7 @@ fn an_interface_that_does_not_exist() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn words_that_are_no_unicode() {
+fn arguments_that_are_not_unicode_are_refused() {
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
     let bench = Bench::of(ALL);

@@ -2,8 +2,8 @@
 
 use super::{ALL, Bench};
 
-/// An MH-4, a D-20-9 and a DPS that stand still, with these readings.
-fn still(mh4: f64, d20: f64, dps: f64) -> Bench {
+/// An MH-4, a D-20-9 and a DPS with constant readings.
+fn constant(mh4: f64, d20: f64, dps: f64) -> Bench {
     let device = |kind: &str, node: u8, base: f64| {
         format!(
             "[[device]]\nkind = \"{kind}\"\nnode = {node}\n[[device.channel]]\nchannel = 1\nbase = {base:?}\n\
@@ -14,8 +14,8 @@ fn still(mh4: f64, d20: f64, dps: f64) -> Bench {
 }
 
 #[test]
-fn the_zero_is_set_where_each_device_keeps_it() {
-    let bench = still(0.0625, -0.125, 0.5);
+fn each_device_is_zeroed_by_its_own_object() {
+    let bench = constant(0.0625, -0.125, 0.5);
     let done = bench.run("autozero 1,2,127").exit(0);
     assert_eq!(
         done.stdout,
@@ -38,7 +38,7 @@ fn the_zero_is_set_where_each_device_keeps_it() {
         assert_eq!(frames.iter().filter(|frame| frame[2..6] == *"2561").collect::<Vec<_>>(), [&signature]);
         assert_eq!(frames.iter().filter(|frame| frame.starts_with('2')).count(), 1, "{frames:?}");
     }
-    let done = still(0.0625, 0.0, 0.0).run("autozero 1 --store -f json").exit(0);
+    let done = constant(0.0625, 0.0, 0.0).run("autozero 1 --store -f json").exit(0);
     assert!(
         done.stdout.starts_with(
             "{\"node\":1,\"channel\":1,\"signal\":\"pressure\",\"unit\":\"bar\",\"before\":0.0625,\"after\":0.0,\"offset_before\":0.0,\
@@ -56,7 +56,7 @@ fn the_zero_is_set_where_each_device_keeps_it() {
     );
 }
 
-/// That a command was refused and no frame to node 1 changed anything.
+/// Checks that a command was refused, and that no frame to node 1 changed anything.
 #[track_caller]
 fn refuses(bench: &Bench, line: &str, stderr: &str) {
     let done = bench.run(line).exit(1);
@@ -65,23 +65,23 @@ fn refuses(bench: &Bench, line: &str, stderr: &str) {
 }
 
 #[test]
-fn what_is_no_zero_is_refused() {
+fn reading_beyond_the_limit_is_refused() {
     refuses(
-        &still(3.204, 0.0, 0.0),
+        &constant(3.204, 0.0, 0.0),
         "autozero 1",
         "cangauge: node 1: pressure is 3.204 bar, limit 0.100 bar (1 % of the range): \
          nothing was changed\n\
          hint: vent or isolate the line; if the limit is too low: cangauge autozero 1 --limit 3.4\n",
     );
-    let done = still(3.204, 0.0, 0.0).run("autozero 1 --limit 3.4").exit(0);
+    let done = constant(3.204, 0.0, 0.0).run("autozero 1 --limit 3.4").exit(0);
     assert_eq!(done.stdout, "1  pressure  3.204 -> 0.000 bar  shift -3.204 bar  offset 0 -> -3.204\n");
-    still(0.15, 0.0, 0.0).run("autozero 1 --limit 2%").exit(0);
-    still(0.15, 0.0, 0.0).run("autozero 1 --limit 2psi").exit(1);
-    still(0.15, 0.0, 0.0).run("autozero 1 --limit 1e-1bar").exit(1);
-    // Below zero as well as above.
-    let done = still(0.0, -3.25, 0.0).run("autozero 2").exit(1);
+    constant(0.15, 0.0, 0.0).run("autozero 1 --limit 2%").exit(0);
+    constant(0.15, 0.0, 0.0).run("autozero 1 --limit 2psi").exit(1);
+    constant(0.15, 0.0, 0.0).run("autozero 1 --limit 1e-1bar").exit(1);
+    // The limit also applies below zero.
+    let done = constant(0.0, -3.25, 0.0).run("autozero 2").exit(1);
     assert!(done.stderr.starts_with("cangauge: node 2: pressure is -3.250 bar, limit "), "{}", done.stderr);
-    // What was taken away before counts along.
+    // The previous offset is part of the total offset.
     let device = "[[device]]\nkind = \"mh4\"\nnode = 1\nset = { \"0x6127:1\" = -0.45 }\n[[device.channel]]\n\
                   channel = 1\nbase = 0.5125\namplitude = 0.0\nnoise = 0.0\n";
     refuses(
@@ -97,7 +97,7 @@ fn what_is_no_zero_is_refused() {
 }
 
 #[test]
-fn a_restless_or_invalid_reading_is_refused() {
+fn unsteady_or_invalid_reading_is_refused() {
     let restless = "[[device]]\nkind = \"mh4\"\nnode = 1\n[[device.channel]]\nchannel = 1\nbase = 0.0\namplitude = 0.0\n\
                     noise = 0.09\n";
     let done = Bench::described(restless).run("autozero 1").exit(1);
@@ -114,7 +114,7 @@ fn a_restless_or_invalid_reading_is_refused() {
         "cangauge: node 1: pressure has no valid value: overload-low: nothing was changed\n\
          hint: find the reason, then try again\n",
     );
-    // Forced, it is still no zero afterwards, and no success.
+    // With --force, the reading afterwards is still not zero: an error.
     let done = Bench::described(overloaded).run("autozero 1 --force").exit(6);
     assert!(
         done.stderr.contains("pressure has no valid value afterwards; the offset went from 0 to"),
@@ -124,7 +124,7 @@ fn a_restless_or_invalid_reading_is_refused() {
 }
 
 #[test]
-fn absolute_pressure_has_no_zero() {
+fn absolute_pressure_is_refused() {
     let device = "[[device]]\nkind = \"dps\"\nnode = 1\nset = { \"0x200D\" = 1 }\n[[device.channel]]\nchannel = 1\n\
                   base = 0.1\namplitude = 0.0\nnoise = 0.0\n";
     refuses(
@@ -138,26 +138,26 @@ fn absolute_pressure_has_no_zero() {
 }
 
 #[test]
-fn who_has_no_zero_says_so() {
+fn device_without_autozero_is_refused() {
     Bench::of(ALL).run("autozero 3").fails(2, "cangauge: node 3: HBM SomatXR MC1609 has no autozero\n");
     Bench::of(ALL)
         .run("autozero 1 --channel 2")
         .fails(2, "cangauge: node 1: WIKA MH-4-CAN has no autozero of channel 2\nhint: it has one of: 1\n");
-    // Asked as an unknown device, it refuses the object itself.
+    // Without its description, the device itself rejects the object.
     let bench = Bench::of("mc1609@3");
     std::fs::write(bench.path("none.eds"), "[FileInfo]\nFileName=none.eds\n[1000]\nDataType=7\nAccessType=ro\n")
         .expect("a file");
     let done = bench.run("autozero 3 --eds none.eds --channel 1").exit(4);
     assert!(done.stderr.contains("it has no autozero of channel 1 (no 0x6125:1)"), "{}", done.stderr);
-    // Everybody was meant who has one.
+    // `all` zeroes the devices that have autozero.
     let done = Bench::of("mc1609@3,mh4@1").run("autozero all --limit 2bar --samples 2").exit(0);
     assert!(done.stdout.starts_with("1  pressure"), "{}", done.stdout);
     assert!(done.stderr.contains("node 3: HBM SomatXR MC1609 has no autozero\n"), "{}", done.stderr);
 }
 
 #[test]
-fn a_device_that_is_not_known_is_treated_by_the_standard() {
-    let bench = still(0.0625, 0.0, 0.0);
+fn unknown_device_is_zeroed_as_in_cia_404() {
+    let bench = constant(0.0625, 0.0, 0.0);
     std::fs::write(bench.path("none.eds"), "[FileInfo]\nFileName=none.eds\n[1000]\nDataType=7\nAccessType=ro\n")
         .expect("a file");
     let done = bench.run("autozero 1 --eds none.eds --channel 1 --store").exit(0);

@@ -1,20 +1,20 @@
-//! `cangauge bus`, without an interface: what is typed, and `detect` on the simulated bus.
+//! `cangauge bus` without an interface: its arguments, and `detect` on the simulated bus.
 
 use super::Bench;
 
 #[test]
-fn what_is_typed_wrong_is_said_first() {
+fn wrong_arguments_are_reported_first() {
     let bench = Bench::of("mh4@1");
     let first = |line: &str| {
         let done = bench.run(line).exit(2);
         done.stderr.lines().next().unwrap_or("").to_owned()
     };
     for rate in ["0", "2M", "250", "-1", "fast", "auto", "83.3k"] {
-        let wrong = format!("cangauge: \"{rate}\" is not a bit rate of CAN (250k, 1M, 125000)");
+        let wrong = format!("cangauge: \"{rate}\" is not a CAN bit rate (250k, 1M, 125000)");
         assert_eq!(first(&format!("bus up can0 -- {rate}")), wrong);
     }
-    assert_eq!(first("bus up sim 250k"), "cangauge: \"sim\" is no interface of this machine (can0)");
-    assert_eq!(first("bus down a/b"), "cangauge: \"a/b\" is not a name of an interface");
+    assert_eq!(first("bus up sim 250k"), "cangauge: \"sim\" is not a CAN interface of this computer (can0)");
+    assert_eq!(first("bus down a/b"), "cangauge: \"a/b\" is not the name of an interface");
     assert_eq!(first("bus up"), "cangauge: the following required arguments were not provided: <INTERFACE>");
     assert!(first("bus up can0 --listen-only").contains("required arguments were not provided: <RATE>"));
     assert_eq!(first("bus detect can0 --for 0s"), "cangauge: \"0s\" for --for <DUR>: a duration must be longer than 0");
@@ -25,7 +25,7 @@ fn what_is_typed_wrong_is_said_first() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn an_interface_that_is_not_there() {
+fn absent_interface_is_exit_5() {
     let bench = Bench::of("mh4@1");
     let refused = "cangauge: there is no CAN interface \"nosuchcan\"\n\
                    hint: list the interfaces: cangauge bus list; without hardware: --bus sim\n";
@@ -37,18 +37,18 @@ fn an_interface_that_is_not_there() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn what_is_no_can_interface() {
+fn loopback_is_not_a_can_interface() {
     let bench = Bench::of("mh4@1");
     let done = bench.run("bus up lo").exit(5);
     assert!(done.stderr.starts_with("cangauge: lo is not a CAN interface\n"), "{}", done.stderr);
 }
 
-/// Two devices at 125 kbit/s with a heartbeat, where the program is at 250 kbit/s.
+/// Two devices with a heartbeat at 125 kbit/s. The program starts at 250 kbit/s.
 const OTHER_RATE: &str = "[[device]]\nkind = \"mh4\"\nnode = 5\nbit_rate = 125000\nset = { \"0x1017\" = 1000 }\n\
                           [[device]]\nkind = \"dps\"\nnode = 6\nbit_rate = 125000\n";
 
 #[test]
-fn the_bit_rate_is_found_by_listening() {
+fn listening_finds_the_bit_rate() {
     let bench = Bench::described(OTHER_RATE);
     let done = bench.run("bus detect").prints("125000\n");
     let lines: Vec<&str> = done.stderr.lines().collect();
@@ -67,7 +67,7 @@ fn the_bit_rate_is_found_by_listening() {
 }
 
 #[test]
-fn one_sensor_alone_is_asked_only_with_active() {
+fn single_sensor_is_asked_only_with_active() {
     let bench = Bench::described("[[device]]\nkind = \"dps\"\nnode = 6\nbit_rate = 100000\n");
     let done = bench.run("bus detect -q").exit(3);
     assert_eq!(done.stdout, "");

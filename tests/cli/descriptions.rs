@@ -1,4 +1,4 @@
-//! Descriptions and EDS files that the user names: of this device, of another one, together, with warnings.
+//! Descriptions and EDS files that the user names: for this device, for another one, both together, with warnings.
 
 use super::Bench;
 use std::fs;
@@ -61,7 +61,7 @@ fn numbers_that_are_0_or_missing_are_not_compared() {
 }
 
 #[test]
-fn an_eds_for_all_nodes_applies_to_those_that_it_fits() {
+fn eds_for_all_nodes_applies_to_matching_nodes() {
     let bench = bench_with("mh4@1,dps@127", &[("mh4.eds", eds(0x47, 1, &NAMES))]);
     let done = bench.run("--eds mh4.eds log 1,127 --poll 100ms --count 4").exit(0);
     assert!(done.stdout.contains(",127,pressure,"), "{}", done.stdout);
@@ -70,7 +70,7 @@ fn an_eds_for_all_nodes_applies_to_those_that_it_fits() {
 }
 
 #[test]
-fn values_and_vendor_are_those_of_the_device() {
+fn values_and_vendor_come_from_the_device() {
     let other = eds(0x56, 0x41, &[(0x6130, "Value", 4), (0x2200, "Offset", 8)]).replace("[6130]", "[6130sub1]");
     let bench = bench_with("mh4@1", &[("other.eds", other)]);
     let plain = bench.run("scan 1 --format json").exit(0).json();
@@ -97,7 +97,7 @@ fn a_description_and_an_eds_are_used_together() {
 }
 
 #[test]
-fn warnings_of_an_eds_are_one_line_and_those_of_the_object() {
+fn eds_warnings_are_one_line_and_those_of_the_object() {
     let text = eds(0x47, 1, &NAMES).replace("4=0x2202\n", "").replace("3=0x2201\n", "");
     let bench = bench_with("mh4@1", &[("x.eds", text)]);
     let done = bench.run("--eds x.eds sdo read 1 0x1018:1").exit(0);
@@ -111,7 +111,7 @@ fn warnings_of_an_eds_are_one_line_and_those_of_the_object() {
 }
 
 #[test]
-fn what_is_no_address_is_a_name() {
+fn text_that_is_not_an_address_is_a_name() {
     let bench = bench_with("mh4@1", &[("x.eds", eds(0x47, 1, &NAMES))]);
     for (name, object) in [
         ("offset", "0x2200:0"),
@@ -146,7 +146,7 @@ fn description(unit: Option<&str>) -> String {
 }
 
 #[test]
-fn tpdos_that_a_description_leaves_open_are_read_from_the_device() {
+fn tpdos_missing_in_a_description_are_read_from_the_device() {
     let files = [("mine.toml", description(None)), ("x.eds", eds(0x47, 1, &NAMES))];
     let bench = bench_with("mh4@1", &files);
     for line in ["--device mine.toml", "--eds x.eds", "--device mine.toml --eds x.eds"] {

@@ -1,9 +1,9 @@
-//! A device whose texts are made for steering a terminal, and what becomes of them in every output.
+//! A device whose texts contain control sequences for terminals. No output passes them on.
 
 use super::Bench;
 use std::fs;
 
-/// ESC and BEL, the one-character form of ESC [, an override of the direction of writing.
+/// ESC, BEL, the one-character form of ESC [, and a character that changes the writing direction.
 const NAME: &str = r#""MH4\u001b[2J\u0007\u009b31m\u001b]0;owned\u0007""#;
 
 fn bench() -> Bench {
@@ -13,8 +13,8 @@ fn bench() -> Bench {
     ))
 }
 
-/// What a terminal takes for a command: control characters but the ends of lines.
-fn steering(text: &str) -> Option<char> {
+/// The first character that controls a terminal, except line ends.
+fn control_character(text: &str) -> Option<char> {
     text.chars().find(|&c| c.is_control() && c != '\n')
 }
 
@@ -35,17 +35,17 @@ const COMMANDS: [&str; 13] = [
 ];
 
 #[test]
-fn no_output_steers_a_terminal() {
+fn output_contains_no_control_characters() {
     let bench = bench();
     for line in COMMANDS {
         for format in ["text", "json", "csv"] {
             let done = bench.run(&format!("{line} --format {format} -v --color never"));
             for (what, text) in [("stdout", &done.stdout), ("stderr", &done.stderr)] {
-                assert_eq!(steering(text), None, "{line} --format {format}, {what}: {text:?}");
+                assert_eq!(control_character(text), None, "{line} --format {format}, {what}: {text:?}");
             }
         }
     }
-    // It was there to be seen, and its value is not lost in JSON.
+    // The text is shown with escapes, and JSON keeps its value.
     let shown = bench.run("scan").exit(0).stdout;
     assert!(shown.contains("MH4\\x1B[2J\\x07\\x9B31m"), "{shown}");
     let value = bench.run("sdo read 5 0x1008 --format json").exit(0).json();
@@ -53,7 +53,7 @@ fn no_output_steers_a_terminal() {
 }
 
 #[test]
-fn neither_does_it_in_colour() {
+fn coloured_output_contains_no_control_characters_of_devices() {
     let bench = bench();
     for line in ["log 5 -o no\u{1b}[2J/such", "read 5 --device \u{1b}[2Jx"] {
         let done = bench.run(&format!("{line} --color always"));
@@ -63,7 +63,7 @@ fn neither_does_it_in_colour() {
 }
 
 #[test]
-fn neither_does_what_files_say() {
+fn texts_of_files_are_escaped_too() {
     let bench = bench();
     fs::write(bench.path("own.toml"), "name = \"a\u{9b}31m\\u001b[2J\"\nvendor = 5\n").expect("a file");
     fs::write(bench.path("own.eds"), "[FileInfo]\n\u{1b}[2J\u{9b}=3\n[1000]\nParameterName=\u{1b}[31m\n")
@@ -79,23 +79,27 @@ fn neither_does_what_files_say() {
     ] {
         for format in ["text", "json"] {
             let done = bench.run(&format!("{line} --format {format}"));
-            assert_eq!((steering(&done.stdout), steering(&done.stderr)), (None, None), "{line:?}: {done:?}");
+            assert_eq!(
+                (control_character(&done.stdout), control_character(&done.stderr)),
+                (None, None),
+                "{line:?}: {done:?}"
+            );
             assert!(!done.stderr.is_empty(), "{line:?}");
         }
     }
 }
 
-/// Where `-o` and the like lead is the user's business.
+/// `-o` may name a link, a FIFO or a device.
 #[test]
 #[cfg(unix)]
-fn links_fifos_and_standard_output_are_written_as_they_are() {
+fn links_fifos_and_standard_output_can_be_written() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     use std::process::{Command, Stdio};
     let bench = bench();
     let rows = "log 5 pressure --count 2 --sync 50ms --device mh4";
     let lines = |text: String| text.lines().count();
 
-    // A link to nothing makes what it points at; one to a file guards that file, and stays a link.
+    // A dangling link: its target is created. A link to an existing file: the file is refused, and the link stays.
     symlink("target.csv", bench.path("link.csv")).expect("a link");
     bench.run(&format!("{rows} -o link.csv")).exit(0);
     assert_eq!(lines(bench.text("target.csv")), 3);
@@ -104,14 +108,14 @@ fn links_fifos_and_standard_output_are_written_as_they_are() {
     assert!(bench.path("link.csv").symlink_metadata().expect("a link").is_symlink());
     assert_eq!(lines(bench.text("target.csv")), 3);
 
-    // A FIFO is written to whoever reads it.
+    // A FIFO.
     assert!(Command::new("mkfifo").arg(bench.path("fifo")).status().expect("mkfifo").success());
     let path = bench.path("fifo");
     let reader = std::thread::spawn(move || fs::read_to_string(path));
     bench.run(&format!("{rows} -o fifo")).exit(0);
     assert_eq!(lines(reader.join().expect("a thread").expect("text")), 3);
 
-    // Standard output is a pipe here, and in the next lines a file with something in it.
+    // Standard output: first a pipe, then a file with content.
     let done = bench.run(&format!("{rows} -o /dev/stdout")).exit(0);
     assert_eq!(lines(done.stdout), 3);
     fs::write(bench.path("all.txt"), "before\n").expect("a file");
@@ -122,7 +126,7 @@ fn links_fifos_and_standard_output_are_written_as_they_are() {
     let text = bench.text("all.txt");
     assert!(text.starts_with("before\ntime,") && lines(text.clone()) == 4, "{text}");
 
-    // Who else may read it is said by the umask alone.
+    // The umask alone decides who can read a new file.
     let program = env!("CARGO_BIN_EXE_cangauge");
     for (umask, mode) in [("077", 0o600), ("022", 0o644), ("000", 0o666)] {
         let script = format!(

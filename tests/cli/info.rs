@@ -1,16 +1,16 @@
-//! `cangauge info`, and the two devices that are described by one TOML file each: HYDAC and JUMO.
+//! `cangauge info`, and two devices that only a TOML file describes: HYDAC and JUMO.
 
 use super::{ALL, Bench};
 use serde_json::{Value, json};
 
-/// A setting of a list by its name.
+/// The setting with this name.
 fn named<'a>(list: &'a Value, name: &str) -> &'a Value {
     let list = list.as_array().expect("a list");
     list.iter().find(|item| item["name"] == name).unwrap_or_else(|| panic!("no {name} in {list:?}"))
 }
 
 #[test]
-fn a_page_of_an_mh4() {
+fn page_of_an_mh4() {
     let channel = |number: u8, base: f64| {
         format!("[[device.channel]]\nchannel = {number}\nbase = {base:?}\namplitude = 0.0\nnoise = 0.0\n")
     };
@@ -24,7 +24,7 @@ fn a_page_of_an_mh4() {
         "node 5: WIKA MH-4-CAN",
         "  revision     0x00010007 1.7",
         "  bit rate                 250 kbit/s",
-        "  state                    pre-operational, by its heartbeat",
+        "  state                    pre-operational (heartbeat)",
         "  monitoring               heartbeat every 1000 ms",
         "  emcy-inhibit-time        0.0 ms",
         "  nmt-startup              0 the master starts the device",
@@ -43,16 +43,16 @@ fn a_page_of_an_mh4() {
         "  TPDO1  0x185  sync:1     pressure 0x6130:1/32, pressure.status 0x6150:1/8",
         "  TPDO2  0x285  timer off  temperature 0x6130:2/32, temperature.status 0x6150:2/8",
         "  bit-rate  3 250 kbit/s",
-        "  group 2   communication: on command",
-        "  not kept  original-unit",
+        "  group 2     communication: on command",
+        "  not stored  original-unit",
     ] {
         assert!(page.lines().any(|found| found == line), "{line:?} is not in\n{page}");
     }
-    assert!(page.lines().all(|line| line.chars().count() <= 100), "it fits a page:\n{page}");
+    assert!(page.lines().all(|line| line.chars().count() <= 100), "a line is too long:\n{page}");
 }
 
 #[test]
-fn every_device_has_its_page_and_one_object() {
+fn info_is_one_page_and_one_json_object() {
     let bench = Bench::of(&format!("{ALL},hydac@10,jumo@126"));
     for node in [1, 2, 3, 10, 126, 127] {
         let done = bench.run(&format!("info {node} -f json")).exit(0);
@@ -61,43 +61,43 @@ fn every_device_has_its_page_and_one_object() {
         assert_eq!(done.stderr, "");
         let csv = bench.run(&format!("info {node} -f csv")).exit(0).stdout;
         assert!(csv.starts_with("node,object,name,value,text\n") && csv.lines().count() > 5);
-        assert_eq!(done.frames_of("000"), [""; 0], "nobody is started for it");
-        // Once it is recognised nothing is asked that it has not; these three are by their identity alone.
+        assert_eq!(done.frames_of("000"), [""; 0], "no node is started");
+        // A device recognised by its identity alone is not asked for objects that it does not have.
         if ![1, 2, 127].contains(&node) {
             continue;
         }
-        let asked_in_vain = |frame: &&&str| frame.starts_with("80");
-        assert_eq!(done.frames_of(&format!("{:X}", 0x580 + node)).iter().filter(asked_in_vain).count(), 0, "{node}");
+        let is_abort = |frame: &&&str| frame.starts_with("80");
+        assert_eq!(done.frames_of(&format!("{:X}", 0x580 + node)).iter().filter(is_abort).count(), 0, "{node}");
     }
 }
 
 #[test]
-fn the_state_where_something_tells_it() {
+fn state_is_shown_only_if_a_heartbeat_reports_it() {
     let line = |done: &super::Done| {
         let line = done.stdout.lines().find(|line| line.starts_with("  state ")).expect("a state");
         line.split_once(' ').map(|_| line.trim_start().trim_start_matches("state").trim().to_owned()).expect("text")
     };
     let bench = Bench::of(ALL);
-    // Guarding could tell it of a D-20-9, and might disturb whoever guards it already.
+    // A guarding request would show the state of a D-20-9, but could disturb a master that guards it.
     for node in [1, 2] {
         let done = bench.run(&format!("info {node}")).exit(0);
-        assert_eq!(line(&done), format!("no heartbeat tells it: cangauge nmt state {node} (--probe)"));
+        assert_eq!(line(&done), format!("unknown (no heartbeat): cangauge nmt state {node} --probe"));
         assert!(!done.frames_of(&format!("{:X}", 0x700 + node)).iter().any(|frame| frame.starts_with('R')));
     }
     assert_eq!(bench.run("info 1 -f json").exit(0).json()[0]["state"], Value::Null);
-    // A page does not wait a minute for a heartbeat.
+    // The command does not wait a minute for a heartbeat.
     let device = |period: u32| {
         format!("[[device]]\nkind = \"d20\"\nnode = 5\nstart = true\nset = {{ \"0x1017\" = {period} }}\n")
     };
     let done = Bench::described(&device(60_000)).run("info 5 -f json").exit(0);
     assert_eq!(done.json()[0]["state"], Value::Null);
     let bench = Bench::described(&device(100));
-    assert_eq!(line(&bench.run("info 5").exit(0)), "operational, by its heartbeat");
+    assert_eq!(line(&bench.run("info 5").exit(0)), "operational (heartbeat)");
     assert_eq!(bench.run("info 5 -f json").exit(0).json()[0]["state"], "operational");
 }
 
 #[test]
-fn what_only_some_devices_have() {
+fn manufacturer_specific_settings() {
     let bench = Bench::of(ALL);
     let page = |node: u8| bench.run(&format!("info {node} -f json")).exit(0).json().remove(0);
     let dps = page(127);
@@ -129,7 +129,7 @@ fn what_only_some_devices_have() {
 }
 
 #[test]
-fn many_channels_are_gathered_by_value() {
+fn settings_of_many_channels_are_grouped_by_value() {
     let bench =
         Bench::described("[[device]]\nkind = \"mc1609\"\nnode = 3\nset = { \"0x6110:2\" = 1, \"0x6110:5\" = 1 }\n");
     let page = bench.run("info 3").exit(0).stdout;
@@ -140,24 +140,24 @@ fn many_channels_are_gathered_by_value() {
 }
 
 #[test]
-fn guarding_is_told_against_the_heartbeat() {
+fn node_guarding_is_shown_as_monitoring() {
     let bench = Bench::described("[[device]]\nkind = \"d20\"\nnode = 2\nset = { \"0x100C\" = 100, \"0x100D\" = 3 }\n");
     let page = bench.run("info 2 -f json").exit(0).json().remove(0);
     assert_eq!(page["monitoring"], "node guarding every 100 ms, life time 300 ms");
 }
 
 #[test]
-fn silence_fails_and_refusals_do_not() {
+fn missing_answer_is_an_error_and_rejection_is_not() {
     let bench = Bench::of("mh4@5");
     bench.run("info 9").exit(3);
-    // Taken for another device, most of what is asked for does not exist.
+    // With the description of another device, most objects do not exist.
     let done = bench.run("info 5 --device dps -f json").exit(0);
     assert_eq!(done.json()[0]["calibrated"], Value::Null);
     bench.run("info all").exit(2);
 }
 
 #[test]
-fn a_hydac_and_a_jumo_by_one_file_each() {
+fn hydac_and_jumo_are_described_by_toml_files() {
     let bench = Bench::of("hydac@1,jumo@126");
     let found = bench.run("scan -f json").exit(0).json();
     assert_eq!((&found[0]["device"], &found[1]["device"]), (&json!("hydac"), &json!("jumo")));
@@ -167,17 +167,17 @@ fn a_hydac_and_a_jumo_by_one_file_each() {
     assert!(rows.iter().all(|row| row["status"] == "ok"));
     let rows = bench.run("log 1,126 --duration 3s -f json").exit(0).json();
     let of = |node: u8, signal: &str| rows.iter().filter(|row| row["node"] == node && row["signal"] == signal).count();
-    // 3601h goes out every second under the name of the signal; TPDO5 is off as delivered.
+    // HYDAC sends 3601h each second; JUMO has TPDO5 off by default.
     assert!((2..=3).contains(&of(1, "pressure")), "{}", of(1, "pressure"));
     assert!(of(126, "ch1") >= 28, "{}", of(126, "ch1"));
     assert_eq!(of(126, "ch2"), 0);
 }
 
 #[test]
-fn a_hydac_boots_operational_and_takes_its_node_id_with_1010h_4_alone() {
+fn hydac_boots_operational_and_stores_its_node_id_with_1010h_4() {
     let bench = Bench::of("hydac@1");
     let done = bench.run("log 1 --passive --device hydac --duration 3s -f json").exit(0);
-    assert!(done.stdout.lines().count() >= 2, "it sends before anybody has started it: {}", done.stderr);
+    assert!(done.stdout.lines().count() >= 2, "it sends without an NMT start: {}", done.stderr);
     bench.run("nmt startup 1").prints("auto\n");
     let kept = Bench::described("[[device]]\nkind = \"hydac\"\nnode = 1\nset = { \"0x1F80\" = 12 }\n");
     kept.run("nmt startup 1").prints("wait\n");
@@ -187,7 +187,7 @@ fn a_hydac_boots_operational_and_takes_its_node_id_with_1010h_4_alone() {
 }
 
 #[test]
-fn the_fifth_tpdo_of_a_jumo() {
+fn jumo_sends_tpdo5() {
     let bench = Bench::described("[[device]]\nkind = \"jumo\"\nnode = 126\nset = { \"0x1804:1\" = 0x1FF }\n");
     let rows = bench.run("log 126 --duration 1s -f json").exit(0).json();
     assert!(rows.iter().filter(|row| row["signal"] == "ch2").count() >= 8);
@@ -198,13 +198,13 @@ fn the_fifth_tpdo_of_a_jumo() {
 }
 
 #[test]
-fn an_emergency_that_is_repeated_is_one() {
+fn repeated_emergency_is_reported_once() {
     let overload = "[[device.overload]]\nchannel = 1\nfrom = \"1s\"\nuntil = \"6500ms\"\ndirection = \"high\"\n";
     let bench = Bench::described(&format!("[[device]]\nkind = \"jumo\"\nnode = 126\n{overload}"));
     let done = bench.run("log 126 --duration 9s -o run.csv").exit(0);
     let sent: Vec<&str> = done.frames_of("0FE");
     assert!((5..=7).contains(&sent.iter().filter(|frame| frame.starts_with("3050")).count()), "every second: {sent:?}");
     assert_eq!(sent.iter().filter(|frame| frame.starts_with("0000")).count(), 1, "{sent:?}");
-    let told = done.stderr.lines().filter(|line| line.contains("sensor break or short circuit")).count();
-    assert_eq!(told, 1, "{}", done.stderr);
+    let reports = done.stderr.lines().filter(|line| line.contains("sensor break or short circuit")).count();
+    assert_eq!(reports, 1, "{}", done.stderr);
 }

@@ -1,11 +1,11 @@
-//! `cangauge log`: what it records is what the devices sent.
+//! `cangauge log` records exactly the values that the devices sent.
 
 use super::{Bench, Done, since_epoch};
 use std::collections::{BTreeMap, BTreeSet};
 
 const HEADER: &str = "time,elapsed_s,node,signal,value,unit,status,raw";
 
-/// A line of the log, or of the simulator's own record, which has no `elapsed_s`.
+/// A line of the log, or of the record of the simulator, which has no `elapsed_s`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Row {
     /// Microseconds since the bus was opened.
@@ -34,7 +34,7 @@ fn time(text: &str) -> u64 {
     seconds * 1_000_000 + fraction.parse::<u64>().expect(text)
 }
 
-/// The rows of a CSV log. Its form is held on the way: header, columns, `elapsed_s` from the first row.
+/// The rows of a CSV log. Checks the header, the columns and `elapsed_s` too.
 fn rows(csv: &str) -> Vec<Row> {
     let mut lines = csv.split_inclusive('\n');
     assert_eq!(lines.next(), Some(format!("{HEADER}\n").as_str()));
@@ -52,7 +52,7 @@ fn rows(csv: &str) -> Vec<Row> {
     rows
 }
 
-/// The simulator's own record.
+/// The record of the simulator.
 fn truth(bench: &Bench) -> Vec<Row> {
     let text = bench.text("truth.csv");
     let mut lines = text.lines();
@@ -66,7 +66,7 @@ fn truth(bench: &Bench) -> Vec<Row> {
     lines.map(row).collect()
 }
 
-/// That the log is what was sent between its first and its last row: every value, in order, nothing else.
+/// Checks that the log has exactly the values that were sent between its first and its last row, in order.
 #[track_caller]
 fn assert_true(rows: &[Row], truth: &[Row]) {
     let (first, last) = (rows.first().expect("rows").at, rows.last().expect("rows").at);
@@ -77,8 +77,8 @@ fn assert_true(rows: &[Row], truth: &[Row]) {
     assert_eq!(rows.len(), sent.len());
 }
 
-/// All four, recorded, with overloads in the middle.
-fn everybody(seed: u64) -> Bench {
+/// The four devices, with overloads in the middle, and a record of the simulator.
+fn four_devices(seed: u64) -> Bench {
     let mut text = format!("seed = {seed}\nrecord = \"truth.csv\"\n");
     for (kind, node, channel, direction) in
         [("mh4", 1, 1, "high"), ("d20", 2, 1, "high"), ("mc1609", 3, 7, "low"), ("dps", 127, 1, "low")]
@@ -91,7 +91,7 @@ fn everybody(seed: u64) -> Bench {
     Bench::described(&text)
 }
 
-/// One device of a kind, recorded.
+/// One device of this kind, with a record of the simulator.
 fn one(kind: &str, more: &str) -> Bench {
     Bench::described(&format!("record = \"truth.csv\"\n[[device]]\nkind = \"{kind}\"\nnode = 5\n{more}"))
 }
@@ -108,7 +108,7 @@ fn count<'a>(rows: impl IntoIterator<Item = &'a Row>) -> BTreeMap<(&'a str, &'a 
 fn rows_match_what_four_devices_sent() {
     let mut first_values = BTreeSet::new();
     for seed in [0, 1, 7, 12345] {
-        let bench = everybody(seed);
+        let bench = four_devices(seed);
         let done = bench.run("log 1-3,127 --sync 10ms --duration 2s").exit(0);
         let mut rows = rows(&done.stdout);
         // D-20-9 and DPS report no status: a value beyond the measuring range shows their overload.
@@ -121,19 +121,22 @@ fn rows_match_what_four_devices_sent() {
         rows.iter_mut().filter(|row| ["2", "127"].contains(&row.node.as_str())).for_each(|row| row.rest[2].clear());
         let truth = truth(&bench);
         assert_true(&rows, &truth);
-        // Nothing was sent before the first row, and the recording ended no sooner than asked for.
+        // Nothing was sent before the first row, and the recording did not end early.
         assert_eq!(rows[0], truth[0]);
         assert!(rows.last().expect("rows").at - rows[0].at > 1_980_000);
         let counts = count(&rows);
         assert_eq!((counts[&("1", "pressure")], counts[&("2", "pressure")]), (200, 200), "one a SYNC");
         assert_eq!(counts.keys().filter(|(node, _)| *node == "3").count(), 16);
         assert!(counts.iter().filter(|((node, _), _)| ["3", "127"].contains(node)).all(|(_, count)| *count == 19));
-        // The overload of the MH-4 shows for the 400 ms that it lasts, with no number made up.
+        // The overload of the MH-4 lasts 400 ms. Its rows have no value.
         let over: Vec<&Row> = rows.iter().filter(|row| row.status() == "overload-high").collect();
         assert_eq!((over.len(), count(over.iter().copied()).len()), (40, 1));
         assert!(over.iter().all(|row| row.node == "1" && row.rest[0].is_empty() && row.rest[3] == "0x0000C07F"));
         assert!(over.iter().all(|row| (900_000..1_310_000).contains(&row.at)));
-        assert!(rows.iter().filter(|row| row.node != "1").all(|row| row.status().is_empty()), "they tell none");
+        assert!(
+            rows.iter().filter(|row| row.node != "1").all(|row| row.status().is_empty()),
+            "the other devices report no status"
+        );
         first_values.insert(rows[0].rest[0].clone());
     }
     assert_eq!(first_values.len(), 4, "another seed, other values");
@@ -141,14 +144,14 @@ fn rows_match_what_four_devices_sent() {
 
 #[test]
 fn two_runs_write_the_same_bytes() {
-    let run = || everybody(3).run("log 1-3,127 --sync 10ms --duration 1s").exit(0).stdout;
+    let run = || four_devices(3).run("log 1-3,127 --sync 10ms --duration 1s").exit(0).stdout;
     assert_eq!(run(), run());
 }
 
 #[test]
 fn json_lines_contain_the_same_rows() {
-    let csv = rows(&everybody(5).run("log 1-3,127 --sync 10ms --duration 2s").exit(0).stdout);
-    let json = everybody(5).run("log 1-3,127 --sync 10ms --duration 2s --format json").exit(0).json();
+    let csv = rows(&four_devices(5).run("log 1-3,127 --sync 10ms --duration 2s").exit(0).stdout);
+    let json = four_devices(5).run("log 1-3,127 --sync 10ms --duration 2s --format json").exit(0).json();
     assert_eq!(csv.len(), json.len());
     let keys =
         |line: &serde_json::Value| line.as_object().expect("an object").keys().cloned().collect::<Vec<_>>().len();
@@ -180,7 +183,7 @@ fn sync_count_is_exact_and_does_not_drift() {
     assert!(syncs.windows(2).all(|pair| pair[1] - pair[0] == 10_000), "{syncs:?}");
     assert!(done.stderr.contains("100 SYNC sent"), "{}", done.stderr);
     assert_eq!(rows(&done.stdout).len(), 100);
-    // A period that is no divisor: the last one that begins within the time.
+    // The period does not divide the duration: the last SYNC is before the end.
     let done = one("mh4", "").run("log 5 --sync 300ms --duration 1s").exit(0);
     assert_eq!(sent(&done, "080#").len(), 4);
 }
@@ -229,7 +232,7 @@ fn dps_sends_ten_rows_per_second() {
     let done = bench.run("log 5 --duration 10s").exit(0);
     let rows = rows(&done.stdout);
     assert_true(&rows, &truth(&bench));
-    // Started just after it was asked for: the first comes 100 ms later, the hundredth at the very end.
+    // The first row comes 100 ms after the start, the hundredth at the end.
     assert!((99..=100).contains(&rows.len()), "{}", rows.len());
     assert!(rows.windows(2).all(|pair| (99_900..100_100).contains(&(pair[1].at - pair[0].at))));
     assert!(rows.iter().all(|row| row.rest[1] == "psi" && row.status().is_empty()));
@@ -254,7 +257,7 @@ fn each_device_alone() {
 
 #[test]
 fn changed_setup_is_decoded() {
-    // An event timer, another unit (mbar), another digit count: all is read from the device.
+    // Event timer, unit (mbar) and decimal digits are read from the device.
     let bench = one("mh4", "start = true\nset = { \"0x1800:2\" = 254, \"0x1800:5\" = 50 }\n");
     let rows = rows(&bench.run("log 5 --duration 1s").exit(0).stdout);
     assert_true(&rows, &truth(&bench));
@@ -283,12 +286,12 @@ fn only_requested_signals_are_recorded() {
     assert_eq!(ch5, wanted[..10]);
     let both = rows_of("log 5 ch16 ch1 --count 10");
     assert_eq!(count(&both).into_keys().collect::<Vec<_>>(), [("5", "ch1"), ("5", "ch16")]);
-    // The status fills its column, and has rows of its own only when asked for.
+    // The status has rows of its own only if it is requested.
     let bench = one("mh4", "");
     let status = rows(&bench.run("log 5 pressure pressure.status --sync 10ms --count 4").exit(0).stdout);
-    let told: Vec<_> = status.iter().map(|row| (row.signal.as_str(), row.status(), row.rest[3].len())).collect();
+    let found: Vec<_> = status.iter().map(|row| (row.signal.as_str(), row.status(), row.rest[3].len())).collect();
     assert_eq!(
-        told,
+        found,
         [("pressure", "ok", 10), ("pressure.status", "", 4), ("pressure", "ok", 10), ("pressure.status", "", 4)]
     );
     let raw = rows(&bench.run("log 5 0x6130:1 --sync 10ms --count 2").exit(0).stdout);
@@ -296,8 +299,8 @@ fn only_requested_signals_are_recorded() {
 }
 
 #[test]
-fn nodes_without_a_requested_signal_are_excused() {
-    let bench = everybody(0);
+fn nodes_without_a_requested_signal_are_skipped() {
+    let bench = four_devices(0);
     for line in ["log 1-3,127 pressure --sync 10ms --count 50", "log 1-3,127 pressure --poll 100ms --count 30"] {
         let done = bench.run(line).exit(0);
         let counts = count(&rows(&done.stdout)).into_keys().map(|(node, _)| node.to_owned()).collect::<BTreeSet<_>>();
@@ -316,7 +319,7 @@ fn polled_values() {
     let counts = count(&rows);
     assert_eq!(counts.len(), 2 + 16 + 1);
     assert!(counts.values().all(|&count| count == 20), "{counts:?}");
-    // Each value stands where its answer came, byte for byte: 43h or 42h, an expedited answer of four bytes.
+    // Each value has the time and the bytes of its answer: 43h or 42h, expedited, four bytes.
     let answers: BTreeSet<(u64, &str)> =
         done.times.iter().zip(&done.frames).map(|(time, frame)| (*time, &frame[..6])).collect();
     let bytes: BTreeMap<u64, &str> = (done.times.iter().zip(&done.frames))
@@ -358,7 +361,7 @@ fn passive_sends_nothing_and_needs_a_mapping() {
 
 #[test]
 fn frames_before_the_recording_make_no_rows() {
-    // A node that runs already sends before, during and after the reading: the log begins with the recording.
+    // A started node also sends while its setup is read. Only later frames are recorded.
     let bench = one("dps", "start = true\nset = { \"0x1017\" = 100 }\n");
     let done = bench.run("log 5 --duration 3s").exit(0);
     let rows = rows(&done.stdout);

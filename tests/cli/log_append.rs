@@ -18,7 +18,7 @@ fn second_run_continues_the_file() {
     assert_eq!(rest.lines().count(), 2);
     // elapsed_s counts from the first row of its run.
     assert_eq!(rest.lines().next().and_then(|line| line.split(',').nth(1)), Some("0.000000"));
-    // The summary gets a line per run.
+    // The summary has one line for each run.
     bench.run("log 127 --count 1 -o run.csv --append --summary sum.json").exit(0);
     let summary = bench.text("sum.json");
     let rows: Vec<serde_json::Value> = summary.lines().map(|line| serde_json::from_str(line).expect(line)).collect();
@@ -41,7 +41,7 @@ fn cut_off_line_is_removed() {
         assert_eq!((rest.lines().count(), rest.split(',').count()), (1, 8), "{kept} {cut}: {text}");
         assert!(rest.ends_with('\n'));
     }
-    // Until there is a row nothing is touched.
+    // The file is not changed before the first row.
     fs::write(bench.path("run.csv"), lines[..2].concat() + "2026").expect("written");
     bench.run("log 9 -o run.csv --append").exit(3);
     assert_eq!(bench.text("run.csv"), lines[..2].concat() + "2026");
@@ -57,7 +57,7 @@ fn other_columns_are_refused() {
     bench.run("log 127 --format json --count 3 -o run.csv --append").exit(2);
     assert_eq!(bench.text("run.csv"), "a,b\n1,2\n3");
     bench.run("log 127 --count 3 -o run.csv --append --force").exit(2);
-    // The columns of the wide layout are known only when the devices are; still nothing is switched.
+    // The columns of the wide layout are known only after the setup is read. No state is changed before.
     bench.run("log 127 --poll 100ms --count 3 --layout wide -o wide.csv").exit(0);
     let wide = bench.text("wide.csv");
     let done = bench.run("log 1,127 --sync 100ms --count 3 --layout wide -o wide.csv --append").exit(2);

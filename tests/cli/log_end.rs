@@ -33,7 +33,7 @@ fn known_state_is_restored() {
     assert!(done.frames[last..].contains(&"000#8005".to_owned()), "restored at the end");
     let done = with("start = true\n").run("log 5 --sync 10ms --count 10").exit(0);
     assert_eq!(done.frames_of("000"), [""; 0], "it was operational already");
-    // Also after a failure.
+    // Also after an error.
     let done = with("").run("log 5").exit(3);
     assert_eq!(done.frames_of("000"), ["0105", "8005"]);
 }
@@ -248,7 +248,7 @@ fn ctrl_c_before_the_first_row_is_interrupted() {
     assert_eq!(bench.files(), [""; 0], "no file is left");
 }
 
-/// On the real clock. The reader takes the header, at least.
+/// On the real clock. The reader reads at least the header.
 #[cfg(unix)]
 fn end_early(words: &[&str], end: impl FnOnce(&mut std::process::Child)) -> (Option<i32>, String, serde_json::Value) {
     let bench = Bench::real("dps@127");

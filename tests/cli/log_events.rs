@@ -1,4 +1,4 @@
-//! `cangauge log --events`: what happens on the way, with its time.
+//! `cangauge log --events`: events during a recording, with their times.
 
 use super::Bench;
 
@@ -26,7 +26,7 @@ fn emergencies_have_the_time_of_the_rows() {
         let warning = format!("warning: {}", event[4].trim_matches('"'));
         assert!(done.stderr.lines().any(|line| line == warning), "{warning}: the same words as on stderr");
     }
-    // Both time columns are those of the rows: between the row before and the one behind.
+    // Both times of an event are between those of the row before and of the row after it.
     let rows = bench.text("run.csv");
     let first_bad = rows.lines().position(|line| line.contains("overload-high")).expect("a row");
     let near = |line: Option<&str>, column: usize| line.and_then(|line| line.split(',').nth(column)).map(str::to_owned);

@@ -1,4 +1,4 @@
-//! The files of `cangauge log`: none overwritten unasked, none left empty, none half written.
+//! The files of `cangauge log`: never overwritten without `--force`, never empty, never cut off.
 
 use super::Bench;
 use std::fs;
@@ -12,7 +12,7 @@ fn existing_file_is_refused() {
     assert_eq!(done.stderr, "cangauge: run.csv exists\nhint: overwrite it with --force, or choose another file\n");
     done.refuses("run.csv exists");
     assert_eq!(bench.text("run.csv"), "old\n");
-    // Asked to overwrite: only once there is something to write.
+    // --force overwrites only when there is something to write.
     bench.run("log 9 -o run.csv --force").exit(3);
     bench.run("log 1 -o run.csv --force").exit(3);
     assert_eq!(bench.text("run.csv"), "old\n");
@@ -40,7 +40,7 @@ fn links_and_pipes() {
     bench.run("log 1 --sync 10ms --count 2 -o link.csv").refuses("link.csv exists");
     bench.run("log 1 --sync 10ms --count 2 -o link.csv --force").exit(0);
     assert_eq!(bench.text("old.csv").lines().count(), 3);
-    // A link to a file that does not exist yet makes it, as elsewhere.
+    // A dangling link: its target is created.
     std::os::unix::fs::symlink("nowhere.csv", bench.path("broken.csv")).expect("a link");
     bench.run("log 1 --sync 10ms --count 2 -o broken.csv").exit(0);
     assert_eq!(bench.text("nowhere.csv").lines().count(), 3);
@@ -69,13 +69,13 @@ fn unwritable_places_fail_before_the_bus_is_used() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_full_disk() {
+fn full_disk_is_exit_8() {
     let bench = Bench::of("mh4@1");
     bench.run("log 1 --sync 10ms --count 5 -o /dev/full").fails(
         8,
         "SYNC every 10 ms with its TPDOs takes 7.4 % of the bus\nwarning: 5 rows could not be written\ncangauge: write /dev/full: No space left on device (os error 28)\n",
     );
-    // The failure ends the recording, and the node's state is restored.
+    // The error ends the recording, and the state of the node is restored.
     let heartbeat = Bench::described("[[device]]\nkind = \"mh4\"\nnode = 1\nset = { \"0x1017\" = 100 }\n");
     let done = heartbeat.run("log 1 --sync 10ms --duration 1h -o /dev/full").exit(8);
     assert_eq!(done.frames_of("000"), ["0101", "8001"]);
@@ -84,9 +84,9 @@ fn a_full_disk() {
 
 #[test]
 fn rows_are_handed_over_within_a_second() {
-    // A reader that goes after the first line ends a recording of an hour at the next rows, on the real clock.
+    // On the real clock: if the reader ends after the first line, the recording of an hour ends at the next rows.
     use std::io::{BufRead, BufReader};
-    let begun = std::time::Instant::now();
+    let start = std::time::Instant::now();
     let bench = Bench::real("dps@127");
     let mut command = bench.traced(&["log", "127"]);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
@@ -97,8 +97,8 @@ fn rows_are_handed_over_within_a_second() {
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{stderr}");
     assert!(!stderr.contains("cangauge:") && !stderr.contains("warning"), "{stderr}");
-    // However busy the machine is: a block of rows takes a minute.
-    assert!(begun.elapsed() < std::time::Duration::from_secs(30), "{:?}", begun.elapsed());
+    // Even on a busy machine: filling a block with rows would take a minute.
+    assert!(start.elapsed() < std::time::Duration::from_secs(30), "{:?}", start.elapsed());
 }
 
 /// Holds the lock of a file, as a recording does.

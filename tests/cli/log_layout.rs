@@ -1,4 +1,4 @@
-//! The forms of a log: wide rows, delimiters, decimal signs, times.
+//! The layouts of a log: wide rows, delimiters, decimal signs, times.
 
 use super::{Bench, Done};
 use std::collections::{BTreeMap, BTreeSet};
@@ -8,7 +8,7 @@ fn cells(csv: &str) -> Vec<Vec<String>> {
     csv.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
 }
 
-/// What the long layout says of each signal: time, value and status.
+/// Time, value and status by signal, from the long layout.
 fn long(bench: &Bench, line: &str) -> BTreeMap<String, Vec<[String; 3]>> {
     let done = bench.run(line).exit(0);
     let mut signals: BTreeMap<String, Vec<[String; 3]>> = BTreeMap::new();
@@ -36,7 +36,7 @@ fn wide_has_a_row_per_sync_with_the_values_of_the_long_layout() {
             long.get(name).into_iter().flatten().map(|[_, value, status]| [value.clone(), status.clone()]).collect();
         assert_eq!(given, wanted, "{name}");
     }
-    // The DPS sends ten times a second, of itself: its cells are empty between.
+    // The DPS sends only ten times a second: its other cells are empty.
     assert!(long["127.pressure"].len() < 11 && long["1.pressure"].len() == 100);
     let times: BTreeSet<&String> = long.values().flatten().map(|[time, ..]| time).collect();
     for (at, row) in wide[1..].iter().enumerate() {
@@ -75,7 +75,7 @@ fn wide_rows_of_polling_and_as_json() {
 
 #[test]
 fn late_answer_is_in_the_row_of_its_poll() {
-    // The second device takes as long as a cycle and a half.
+    // The second device answers after one and a half cycles.
     let bench = Bench::described(
         "[[device]]\nkind = \"dps\"\nnode = 1\n[[device]]\nkind = \"dps\"\nnode = 2\nlatency = \"150ms\"\n",
     );
@@ -88,20 +88,20 @@ fn late_answer_is_in_the_row_of_its_poll() {
 #[test]
 fn silent_node_has_empty_cells() {
     let done = Bench::of("mh4@1,dps@127").run("log 1,127 --sync 1s --count 3 --layout wide --no-nmt");
-    assert_eq!(done.code, Some(3), "nobody was started: {}", done.stderr);
+    assert_eq!(done.code, Some(3), "no node was started: {}", done.stderr);
     let bench =
         Bench::described("[[device]]\nkind = \"mh4\"\nnode = 1\nstart = true\n[[device]]\nkind = \"mh4\"\nnode = 2\n");
     let done = bench.run("log 1,2 pressure --sync 100ms --count 5 --layout wide --no-nmt").exit(7);
     let rows = cells(&done.stdout);
     assert_eq!(rows.len(), 6);
     assert!(rows[1..].iter().all(|row| !row[2].is_empty() && row[4].is_empty() && row[5].is_empty()), "{rows:?}");
-    // Five rows, and a cycle later it was clear that the fifth has no more to come.
+    // The fifth row is written one cycle later, when its values cannot arrive any more.
     assert!(done.frames_of("080").len() <= 7, "{}", done.frames_of("080").len());
     assert!(done.stderr.contains("5 rows in "), "{}", done.stderr);
 }
 
 #[test]
-fn second_value_in_a_cycle_is_left_out_and_reported() {
+fn second_value_in_a_cycle_is_omitted_and_counted() {
     let done = Bench::of("mh4@1,dps@127").run("log 1,127 --sync 1s --count 3 --layout wide --summary -").exit(0);
     let said = "values are in no row: late, or not the first in their cycle (--layout long contains all values)";
     assert!(done.stderr.contains(said), "{}", done.stderr);
@@ -112,7 +112,7 @@ fn second_value_in_a_cycle_is_left_out_and_reported() {
 
 #[test]
 fn changed_unit_starts_new_columns() {
-    // What log itself sends cannot change a unit; the shape of the change is held by the tests of the rows.
+    // A unit cannot change here, because log does not write. The unit tests of the rows check the new columns.
     let done = Bench::of("mh4@1").run("log 1 pressure pressure.status --sync 10ms --count 2 --layout wide").exit(0);
     let head = "time,elapsed_s,1.pressure [bar],1.pressure.status,1.pressure.status [code],1.pressure.status.status";
     assert_eq!(done.stdout.lines().next(), Some(head));
@@ -131,7 +131,7 @@ fn separators_and_times_for_spreadsheets() {
         let (cells, plain): (Vec<&str>, Vec<&str>) = (line.split(';').collect(), plain.split(',').collect());
         let number = |text: &str| text.replace(',', ".").parse::<f64>().expect(line);
         assert!(cells[0].contains(',') && cells[4].contains(','), "{line}");
-        // 2026-01-01 is day 46023; the virtual clock begins with it.
+        // The virtual clock starts on 2026-01-01, which is day 46023.
         assert!((46023.0..46023.01).contains(&number(cells[0])), "{line}");
         assert_eq!((number(cells[1]), number(cells[4])), (number(plain[1]), number(plain[4])));
         assert_eq!((cells[2], cells[7]), (plain[2], plain[7]));

@@ -5,7 +5,7 @@ use std::fs;
 
 const HEADER: &str = "time,elapsed_s,node,signal,value,unit,status,raw\n";
 
-/// What stands in the files below their headers, one after the other.
+/// The rows of the files without headers, in order.
 fn rows(bench: &Bench, names: &[String]) -> String {
     let rows = |name: &String| bench.text(name).strip_prefix(HEADER).expect(name).to_owned();
     names.iter().map(rows).collect()
@@ -22,7 +22,7 @@ fn rotation_by_time_neither_loses_nor_repeats_rows() {
     bench.run("log 1 --sync 10ms --duration 5s -o run.csv --rotate 2s").prints("");
     assert_eq!(bench.files(), names(1..=3));
     assert_eq!(rows(&bench, &names(1..=3)), whole.strip_prefix(HEADER).expect("rows"));
-    // Two signals a hundred times a second, and each file begins at a whole multiple of two seconds.
+    // Two signals, each 100 times a second. Each file starts at a multiple of two seconds.
     for (name, begin) in names(1..=3).iter().zip([0.0, 2.0, 4.0]) {
         let text = bench.text(name);
         let elapsed = |line: &str| line.split(',').nth(1).and_then(|cell| cell.parse::<f64>().ok()).expect(line);
@@ -59,7 +59,7 @@ fn existing_files_are_kept_without_force() {
     bench.run(&format!("{log} --force")).exit(0);
     assert_eq!(bench.files(), names(1..=3));
     assert!(bench.text("run-0002.csv").starts_with(HEADER));
-    // Nothing measured: no file.
+    // Without measurements there is no file.
     Bench::of("mh4@1").run("log 1 -o run.csv --rotate 1s").exit(3);
     bench.run("log 9 -o other.csv --rotate 1s").exit(3);
     assert_eq!(bench.files(), names(1..=3));

@@ -1,4 +1,4 @@
-//! Readers that are slow, stop reading, or go: the recording does not wait for them, and nobody hangs.
+//! Readers that are slow, stop reading or end. The recording neither waits for them nor hangs.
 
 use super::Bench;
 use std::io::{BufRead, BufReader, Read};
@@ -6,7 +6,7 @@ use std::process::Stdio;
 
 #[test]
 fn slow_reader_gets_every_row_on_the_virtual_clock() {
-    // Far more than a pipe holds, and nobody reads at first.
+    // Far more data than a pipe holds, and at first no reader.
     let bench = Bench::of("mh4@1");
     let whole = bench.run("log 1 --sync 10ms --duration 60s").exit(0).stdout;
     let mut command = bench.traced(&["log", "1", "--sync", "10ms", "--duration", "60s"]);
@@ -24,19 +24,19 @@ fn signal(child: &std::process::Child, name: &str) {
     assert!(status.expect("kill").success());
 }
 
-/// On the real clock: rows wait for a reader that has stopped reading, and Ctrl-C ends it all the same.
+/// On the real clock: rows wait for a blocked reader, and Ctrl-C ends the recording.
 #[test]
 #[cfg(unix)]
 fn ctrl_c_ends_a_recording_into_a_blocked_pipe() {
     let bench = Bench::real("mc1609@3,mh4@1");
-    // Three hundred kilobytes a second fill the pipe's 64 within a moment.
+    // 300 kB per second fill the 64 kB of the pipe quickly.
     let mut command = bench.traced(&["log", "1", "--sync", "1ms", "--summary", "sum.json"]);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary");
     let mut reader = BufReader::new(child.stdout.take().expect("stdout"));
     let mut line = String::new();
     reader.read_line(&mut line).expect("a line");
     assert_eq!(line, "time,elapsed_s,node,signal,value,unit,status,raw\n");
-    // SYNC goes on while the pipe is full: that is to be seen in the trace, far beyond what the pipe holds.
+    // SYNC continues while the pipe is full: the trace has far more of them than the pipe has rows.
     let mut syncs = 0;
     while syncs < 3000 {
         let trace = std::fs::read_to_string(bench.path("trace")).unwrap_or_default();
@@ -53,16 +53,16 @@ fn ctrl_c_ends_a_recording_into_a_blocked_pipe() {
     let summary: serde_json::Value = serde_json::from_str(&bench.text("sum.json")).expect("JSON");
     let (rows, lost) = (summary["rows"].as_u64().expect("rows"), summary["rows_lost"].as_u64().expect("rows_lost"));
     assert!(0 < lost && lost < rows, "{lost} of {rows}");
-    // What was not counted as lost is there, whole or cut in its last line.
+    // All rows that were not counted as lost are there. Only the last line may be cut off.
     let mut rest = String::new();
     reader.read_to_string(&mut rest).expect("rows");
     assert!(rest.matches('\n').count() as u64 >= rows - lost, "{lost} of {rows} were lost");
 }
 
-/// On the real clock: rows reach the file while it is recorded, and after `kill -9` every one of them is whole.
+/// On the real clock: rows reach the file during the recording, and after `kill -9` each row is complete.
 #[test]
 #[cfg(unix)]
-fn kill_leaves_whole_rows() {
+fn kill_leaves_complete_rows() {
     let bench = Bench::real("mh4@1");
     let mut child = bench
         .traced(&["log", "1", "--sync", "1ms", "-o", "run.csv"])
@@ -71,7 +71,7 @@ fn kill_leaves_whole_rows() {
         .spawn()
         .expect("the binary");
     let text = || std::fs::read_to_string(bench.path("run.csv")).unwrap_or_default();
-    // A file grows while it is recorded, in steps of half a second.
+    // The file grows during the recording, every half second.
     let mut sizes = std::collections::BTreeSet::new();
     while sizes.len() < 4 {
         sizes.insert(text().len());

@@ -7,7 +7,7 @@ fn dps(node: u8, more: &str) -> Bench {
     Bench::described(&format!("bit_rate = 125000\n[[device]]\nkind = \"dps\"\nnode = {node}\n{more}"))
 }
 
-/// The frames of NMT, LSS and boot-up from this one on.
+/// The frames of NMT, LSS and boot-up, starting with this one.
 #[track_caller]
 fn from<'a>(done: &'a Done, first: &str) -> Vec<&'a str> {
     let frames = done.frames.iter().map(String::as_str).skip_while(|frame| *frame != first);
@@ -197,10 +197,10 @@ fn several_unconfigured_devices_get_ids_in_one_command() {
     let unconfigured = |serial: u32| format!("[[device]]\nkind = \"mh4\"\nserial = {serial}\n");
     let bench = Bench::described(&[30, 10, 20].map(unconfigured).concat());
     let done = bench.run("lss set-id unconfigured 12-14 -f json").exit(0);
-    let told: Vec<_> =
+    let assigned: Vec<_> =
         done.json().iter().map(|done| (done["new"].clone(), done["serial"].clone(), done["old"].clone())).collect();
     assert_eq!(
-        told,
+        assigned,
         [(12, 10), (13, 20), (14, 30)].map(|(new, serial)| (new.into(), serial.into(), serde_json::Value::Null))
     );
     let done = bench.run("lss set-id unconfigured 12-15").exit(7);
@@ -219,7 +219,7 @@ fn scan_inquire_and_identify() {
     );
     let done = bench.run("lss scan -f json").exit(0);
     assert_eq!(done.json()[1]["node"], serde_json::Value::Null);
-    // A found device waits while the next one is searched; none is changed.
+    // A found device stays in configuration state during the next search. No device is changed.
     let several = [30, 10, 20].map(|serial| format!("[[device]]\nkind = \"mh4\"\nserial = {serial}\n")).concat();
     let done = Bench::described(&several).run("lss scan -f csv").exit(0);
     let serials: Vec<_> = done.stdout.lines().skip(1).map(|line| line.rsplit(',').nth(1).unwrap_or_default()).collect();
@@ -227,7 +227,7 @@ fn scan_inquire_and_identify() {
     let services: Vec<&str> = done.frames_of("7E5").into_iter().map(|frame| &frame[..2]).collect();
     assert!(!services.iter().any(|service| ["11", "13", "15", "17"].contains(service)), "{services:?}");
     assert_eq!(done.frames_of("7E5").last(), Some(&"0400000000000000"), "left again");
-    // A device that takes part in configuration state as well hides the others: a warning says so.
+    // A device that also answers in configuration state hides the others: a warning.
     let hides = "[[device]]\nkind = \"mh4\"\nserial = 10\nlss = { endless_fastscan = true }\n";
     let done =
         Bench::described(&format!("{hides}[[device]]\nkind = \"mh4\"\nserial = 20\n")).run("lss scan -f json").exit(0);

@@ -1,5 +1,5 @@
-//! The binary on the simulated bus, in a cleared environment: stdout, stderr, exit code, and by `--trace` the
-//! frames. Benches go by the virtual clock, so that waiting takes no time.
+//! Runs the binary on the simulated bus in a cleared environment. Checks stdout, stderr, exit code and, by `--trace`, the
+//! frames. Benches use the virtual clock, so waiting takes no time.
 
 mod args;
 mod autozero;
@@ -41,33 +41,33 @@ use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// No command here needs longer, however slow the machine; who does is hanging.
-const PATIENCE: Duration = Duration::from_secs(120);
+/// No command takes longer, even on a slow machine. One that does is hanging.
+const COMMAND_TIMEOUT: Duration = Duration::from_secs(120);
 
 /// The default bench, on the virtual clock.
 const ALL: &str = "mh4@1,d20@2,mc1609@3,dps@127";
 
-/// What a command did.
+/// The result of a command.
 #[derive(Debug)]
 struct Done {
     code: Option<i32>,
     stdout: String,
     stderr: String,
-    /// `601#4000100000000000`, as they were on the bus; nothing when it was never opened.
+    /// The frames on the bus (`601#4000100000000000`); empty if the bus was not opened.
     frames: Vec<String>,
-    /// When each of them was, in microseconds since the bus was opened; on the virtual clock.
+    /// The times of the frames in microseconds since the bus was opened (virtual clock).
     times: Vec<u64>,
 }
 
 impl Done {
-    /// That the command ended with this code.
+    /// Checks the exit code.
     #[track_caller]
     fn exit(self, code: i32) -> Done {
         assert_eq!(self.code, Some(code), "stdout:\n{}stderr:\n{}", self.stdout, self.stderr);
         self
     }
 
-    /// That it succeeded with exactly this on stdout.
+    /// Checks that the command succeeded and printed exactly this text.
     #[track_caller]
     fn prints(self, stdout: &str) -> Done {
         let done = self.exit(0);
@@ -75,7 +75,7 @@ impl Done {
         done
     }
 
-    /// That it failed with exactly this on stderr and nothing on stdout.
+    /// Checks that the command failed, with exactly this text on stderr and nothing on stdout.
     #[track_caller]
     fn fails(self, code: i32, stderr: &str) -> Done {
         let done = self.exit(code);
@@ -83,7 +83,7 @@ impl Done {
         done
     }
 
-    /// That it was refused before the bus was opened.
+    /// Checks that the command was refused before the bus was opened.
     #[track_caller]
     fn refuses(self, message: &str) -> Done {
         let done = self.exit(2);
@@ -119,7 +119,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// These devices on the virtual clock: `mh4@1,dps@127`.
+    /// A bench with these devices on the virtual clock: `mh4@1,dps@127`.
     fn of(devices: &str) -> Bench {
         let device = |text: &str| {
             let (kind, node) = text.split_once('@').expect("kind@node");
@@ -128,14 +128,14 @@ impl Bench {
         Bench::described(&devices.split(',').map(device).collect::<String>())
     }
 
-    /// Devices as they are described, on the virtual clock.
+    /// A bench file with these devices on the virtual clock.
     fn described(devices: &str) -> Bench {
         let folder = tempfile::tempdir().expect("a folder");
         fs::write(folder.path().join("bench.toml"), format!("clock = \"virtual\"\n{devices}")).expect("the bench");
         Bench { folder, bus: "sim:bench.toml".to_owned() }
     }
 
-    /// Devices on the real clock: for what is about people and signals.
+    /// A bench with these devices on the real clock, for tests with signals and readers.
     fn real(devices: &str) -> Bench {
         Bench { folder: tempfile::tempdir().expect("a folder"), bus: format!("sim:{devices}") }
     }
@@ -149,7 +149,7 @@ impl Bench {
         fs::read_to_string(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    /// What else is in the folder.
+    /// The other files in the folder.
     fn files(&self) -> Vec<String> {
         let entries = fs::read_dir(self.folder.path()).expect("the folder");
         let names = entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
@@ -166,7 +166,7 @@ impl Bench {
         command
     }
 
-    /// The command on the bench, traced.
+    /// The command on the bench, with --trace.
     fn traced(&self, words: &[&str]) -> Command {
         let mut all = vec!["--bus", &self.bus, "--trace", "trace"];
         all.extend(words);
@@ -174,7 +174,7 @@ impl Bench {
         self.command(&all)
     }
 
-    /// Runs a command on the bench: `run("read 1 pressure")`, or with words that contain blanks
+    /// Runs a command on the bench: `run("read 1 pressure")`, or with words that contain spaces
     /// `run_words(&["…"])`.
     fn run(&self, line: &str) -> Done {
         self.run_words(&line.split_whitespace().collect::<Vec<_>>())
@@ -190,11 +190,11 @@ impl Bench {
         self.end(child)
     }
 
-    /// Waits for the end of a command that runs already.
+    /// Waits for the end of a running command.
     fn end(&self, mut child: Child) -> Done {
         let stdout = drain(child.stdout.take());
         let stderr = drain(child.stderr.take());
-        let outputs = [stdout, stderr].map(|output| output.recv_timeout(PATIENCE));
+        let outputs = [stdout, stderr].map(|output| output.recv_timeout(COMMAND_TIMEOUT));
         if outputs.iter().any(Result::is_err) {
             child.kill().expect("killed");
         }
@@ -228,26 +228,26 @@ fn since_epoch(time: &str) -> u64 {
     (seconds - EPOCH_S) * 1_000_000 + micros.parse::<u64>().expect("microseconds")
 }
 
-/// Reads a stream to its end beside the test.
+/// Reads a stream to its end in another thread.
 fn drain(stream: Option<impl Read + Send + 'static>) -> mpsc::Receiver<String> {
     let (done, result) = mpsc::channel();
     thread::spawn(move || {
         let mut text = Vec::new();
         stream.map(|mut stream| io::copy(&mut stream, &mut text));
-        // Nobody waits any more when the command was given up.
+        // After a time-out of the test, the text is not needed.
         let _ = done.send(String::from_utf8_lossy(&text).into_owned());
     });
     result
 }
 
-/// A pipe that nobody reads.
+/// A pipe whose reader is closed.
 fn closed_pipe() -> Stdio {
     let (reader, writer) = io::pipe().expect("a pipe");
     drop(reader);
     writer.into()
 }
 
-/// A disk that is full.
+/// A full disk.
 #[cfg(target_os = "linux")]
 fn full_disk() -> Stdio {
     fs::OpenOptions::new().write(true).open("/dev/full").expect("/dev/full").into()

@@ -5,7 +5,7 @@ use super::{ALL, Bench};
 const HEARTBEAT: &str = "[[device]]\nkind = \"mh4\"\nnode = 5\nset = { \"0x1017\" = 100 }\n";
 
 #[test]
-fn a_heartbeat_confirms() {
+fn heartbeat_confirms_a_command() {
     let bench = Bench::described(HEARTBEAT);
     let done = bench.run("nmt start 5").prints("5  operational  heartbeat\n");
     assert_eq!((done.frames_of("000"), done.stderr.as_str()), (vec!["0105"], ""));
@@ -18,7 +18,7 @@ fn a_heartbeat_confirms() {
 }
 
 #[test]
-fn a_boot_up_confirms_a_reset() {
+fn boot_up_confirms_a_reset() {
     let bench = Bench::of(ALL);
     let done = bench.run("nmt reset 1").prints("1  pre-operational  boot-up\n");
     assert_eq!((done.frames_of("000"), done.frames_of("701")), (vec!["8101"], vec!["00", "00"]));

@@ -1,10 +1,10 @@
-//! What goes where: data to stdout, the rest to stderr, and what happens when nobody takes it.
+//! Data goes to stdout, everything else to stderr; closed pipes, full disks, colour, and `--trace`.
 
 use super::{ALL, Bench, closed_pipe};
 use std::fs;
 use std::process::Stdio;
 
-/// Every command that prints.
+/// Commands that print to stdout.
 const PRINTING: [&str; 7] = [
     "scan",
     "read 1,127",
@@ -16,7 +16,7 @@ const PRINTING: [&str; 7] = [
 ];
 
 #[test]
-fn a_reader_that_has_gone_is_a_quiet_success() {
+fn closed_stdout_is_a_silent_success() {
     let bench = Bench::of(ALL);
     for line in PRINTING {
         let words: Vec<&str> = line.split(' ').collect();
@@ -38,7 +38,7 @@ fn a_reader_that_has_gone_is_a_quiet_success() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_full_disk_is_said() {
+fn full_disk_is_an_error() {
     let bench = Bench::of(ALL);
     for line in PRINTING {
         let words: Vec<&str> = line.split(' ').collect();
@@ -50,7 +50,7 @@ fn a_full_disk_is_said() {
 }
 
 #[test]
-fn quiet_leaves_errors_only() {
+fn quiet_prints_only_errors() {
     let bench = Bench::of(ALL);
     for line in ["scan -q", "nmt start 1 -q", "log 1 --sync 10ms --count 3 -q", "log 1,127 --sync 10ms --count 30 -q"] {
         let done = bench.run(line).exit(0);
@@ -62,7 +62,7 @@ fn quiet_leaves_errors_only() {
 }
 
 #[test]
-fn colour_only_where_it_was_asked_for() {
+fn colour_only_on_a_terminal_or_on_request() {
     let bench = Bench::of(ALL);
     let run = |words: &[&str], environment: &[(&str, &str)]| {
         let mut command = bench.traced(words);
@@ -78,7 +78,7 @@ fn colour_only_where_it_was_asked_for() {
 }
 
 #[test]
-fn the_trace_is_as_candump_writes_it() {
+fn trace_has_the_format_of_candump() {
     let bench = Bench::of("mh4@5");
     bench.run("sdo read 5 0x1018:1").prints("71\n");
     let trace = bench.text("trace");
@@ -88,7 +88,7 @@ fn the_trace_is_as_candump_writes_it() {
     assert!(lines[2].starts_with("(1767225600.00") && lines[2].ends_with(") sim 585#4318100147000000"), "{trace}");
     let done = bench.finish(&mut bench.command(&["-b", &bench.bus, "--trace", "-", "sdo", "read", "5", "0x1018:1"]));
     assert_eq!(done.exit(0).stderr, trace);
-    // A value that does not fit opens nothing, and a trace that cannot be written is found before the bus is.
+    // A wrong value is found before the trace is opened, and a trace that cannot be written before the bus is opened.
     fs::remove_file(bench.path("trace")).expect("removed");
     bench.run("sdo write 5 0x1017 70000").exit(2);
     assert!(!bench.path("trace").exists());
@@ -100,7 +100,7 @@ fn the_trace_is_as_candump_writes_it() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_trace_on_a_full_disk_is_said() {
+fn trace_on_a_full_disk_is_an_error() {
     let bench = Bench::of("mh4@5");
     let words = ["-b", &bench.bus, "--trace", "/dev/full", "sdo", "read", "5", "0x1018:1"];
     let done = bench.finish(&mut bench.command(&words)).exit(8);

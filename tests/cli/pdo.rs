@@ -45,7 +45,7 @@ fn show() {
 
 /// MH-4, 3.4.2: TPDO1 carries the pressure alone.
 #[test]
-fn the_mh4_is_remapped_as_its_manual_says() {
+fn mh4_is_remapped_as_in_its_manual() {
     let done = Bench::of("mh4@1").run("pdo map 1 1 pressure -v").exit(0);
     assert_eq!(
         steps(&done, 1),
@@ -70,7 +70,7 @@ fn the_mh4_is_remapped_as_its_manual_says() {
 
 /// DPS, tables 26 and 22 (there the value is in wire order).
 #[test]
-fn the_dps_is_remapped_as_its_manual_says() {
+fn dps_is_remapped_as_in_its_manual() {
     let table_26 = |word: &str| {
         [
             "67F#22001801FF0100C0".to_owned(),
@@ -94,7 +94,7 @@ fn the_dps_is_remapped_as_its_manual_says() {
 
 /// DPS, tables 27 to 29 (the acknowledges printed with seven bytes).
 #[test]
-fn the_dps_is_sent_as_its_manual_says() {
+fn dps_transmission_is_set_as_in_its_manual() {
     let bench = Bench::of("dps@127");
     let one = |line: &str, frames: &[&str]| assert_eq!(steps(&bench.run(line).exit(0), 127), frames, "{line}");
     let answer = "5FF#6000180200000000";
@@ -108,7 +108,7 @@ fn the_dps_is_sent_as_its_manual_says() {
 /// D-20-9, page 6: no invalidation, in PRE-OPERATIONAL. The node is operational before (shown by node guarding) and
 /// afterwards; while the mapping is changed, its PDO would have no bytes.
 #[test]
-fn the_d20_is_remapped_as_its_manual_says() {
+fn d20_is_remapped_as_in_its_manual() {
     let bench = Bench::described("[[device]]\nkind = \"d20\"\nnode = 2\nstart = true\n");
     let done = bench.run("pdo map 2 1 pressure -q").exit(0);
     let frames = [
@@ -170,7 +170,7 @@ fn a_rejected_write_is_named_and_the_old_mapping_is_restored() {
         ),
         "{error}"
     );
-    // As it was, entry for entry, and on again.
+    // Each entry is restored, and the PDO is switched on.
     let all = steps(&done, 1);
     assert_eq!(all.last(), Some(&"581#6000180100000000"));
     assert!(all.ends_with(&["601#2300180181010040", "581#6000180100000000"]), "{all:?}");
@@ -207,7 +207,7 @@ fn wrong_requests_are_rejected_before_the_first_write() {
         let done = bench.run(&format!("pdo map 1 1 --cob-id {restricted}")).exit(2);
         assert!(done.frames.is_empty() && done.stderr.contains("is not for PDOs"), "{restricted}: {}", done.stderr);
     }
-    // MH-4, 3.4.1 prints the mapping at 1800h: as a COB-ID it is none.
+    // MH-4, 3.4.1 prints the mapping at 1800h. It is not a valid COB-ID.
     let word = "is not an 11-bit identifier (0x181 to 0x57F, without the flags of the COB-ID)";
     refuses("pdo map 1 1 --cob-id 0x61300120", &format!("\"0x61300120\" {word}"));
     refuses("pdo map 1 1 --cob-id 0x40000181", &format!("\"0x40000181\" {word}"));
@@ -235,7 +235,7 @@ fn wrong_requests_are_rejected_before_the_first_write() {
 }
 
 #[test]
-fn an_identifier_is_free_or_refused() {
+fn occupied_identifier_is_refused() {
     let bench = Bench::of(ALL);
     for (id, who) in [
         ("0x281", "its TPDO2"),
@@ -254,7 +254,7 @@ fn an_identifier_is_free_or_refused() {
     let done = bench.run("pdo map 1 1 --cob-id 0x3a5").exit(0);
     let moves = ["601#23001801810100C0", "581#6000180100000000", "601#23001801A5030040", "581#6000180100000000"];
     assert_eq!(steps(&done, 1), moves);
-    // The present identifier is no change, even if other nodes are present.
+    // The present identifier is accepted, even if other nodes are present.
     let done = bench.run("pdo map 1 1 --cob-id 0x181").exit(0);
     assert_eq!(steps(&done, 1), [""; 0]);
 }

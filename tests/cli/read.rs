@@ -3,8 +3,8 @@
 use super::{ALL, Bench};
 use serde_json::json;
 
-/// Devices whose quantities stand still, so that every reading is known.
-fn still() -> Bench {
+/// Devices with constant values.
+fn constant() -> Bench {
     Bench::described(
         "[[device]]\nkind = \"mh4\"\nnode = 5\n\
          [[device.channel]]\nchannel = 1\nbase = 1.25\namplitude = 0.0\nnoise = 0.0\n\
@@ -27,8 +27,8 @@ const NO_ANSWER: &str =
     "cangauge: node 9: read 0x1000:0: no answer within 500 ms\nhint: list the nodes that answer: cangauge scan\n";
 
 #[test]
-fn one_signal_of_one_node_is_the_bare_number() {
-    let bench = still();
+fn one_signal_of_one_node_is_a_bare_number() {
+    let bench = constant();
     let done = bench.run("read 5 pressure").prints("1.25\n");
     assert_eq!(done.stderr, "");
     bench.run("read 127 pressure").prints("50.000\n");
@@ -36,17 +36,17 @@ fn one_signal_of_one_node_is_the_bare_number() {
 }
 
 #[test]
-fn several_are_a_table_with_unit_and_status() {
-    still().run("read 5,127").prints(
+fn several_signals_are_a_table_with_unit_and_status() {
+    constant().run("read 5,127").prints(
         "5    pressure     1.25 bar    ok\n\
          5    temperature  25.5 degC   ok\n\
-         127  pressure     50.000 psi  (tells no status)\n",
+         127  pressure     50.000 psi  (no status)\n",
     );
 }
 
 #[test]
 fn json_and_csv() {
-    let bench = still();
+    let bench = constant();
     let done = bench.run("read 5,127 -f json").prints(
         "{\"node\":5,\"signal\":\"pressure\",\"value\":1.25,\"unit\":\"bar\",\"status\":\"ok\"}\n\
          {\"node\":5,\"signal\":\"temperature\",\"value\":25.5,\"unit\":\"degC\",\"status\":\"ok\"}\n\
@@ -57,9 +57,9 @@ fn json_and_csv() {
 }
 
 #[test]
-fn converted_to_another_unit() {
-    let bench = still();
-    // 50 psi = 50 * 0.0689475729 bar, with as many digits as were sent.
+fn values_are_converted_to_another_unit() {
+    let bench = constant();
+    // 50 psi = 50 * 0.0689475729 bar, with the number of digits that was sent.
     bench.run("read 127 pressure --in bar").prints("3.4474\n");
     bench.run("read 5 pressure --in mbar").prints("1250.000\n");
     bench
@@ -72,7 +72,7 @@ fn converted_to_another_unit() {
 
 #[test]
 fn objects_and_status_objects() {
-    let bench = still();
+    let bench = constant();
     bench.run("read 5 0x6130:1").prints("1.25\n");
     bench.run("read 5 pressure.status").prints("0\n");
     bench.run("read 127 pressure.status").fails(2, "cangauge: node 127: pressure has no status object\n");
@@ -81,7 +81,7 @@ fn objects_and_status_objects() {
 }
 
 #[test]
-fn no_number_is_made_up_for_an_invalid_value() {
+fn invalid_value_has_no_number() {
     let bench = overloaded();
     let done = bench.run("read 5 pressure").exit(6);
     assert_eq!(
@@ -100,19 +100,19 @@ fn no_number_is_made_up_for_an_invalid_value() {
 }
 
 #[test]
-fn a_node_that_is_not_there() {
-    let done = still().run("read 9 pressure").fails(3, NO_ANSWER);
-    assert_eq!(done.frames_of("609").len(), 2, "asked, and asked once more");
-    let done = still().run("read 9 -t 50ms --retries 0").exit(3);
+fn absent_node_is_exit_3() {
+    let done = constant().run("read 9 pressure").fails(3, NO_ANSWER);
+    assert_eq!(done.frames_of("609").len(), 2, "one request and one retry");
+    let done = constant().run("read 9 -t 50ms --retries 0").exit(3);
     assert!(done.stderr.contains("no answer within 50 ms"), "{}", done.stderr);
     assert_eq!(done.frames_of("609").len(), 1);
 }
 
 #[test]
-fn of_several_nodes_those_that_answer_are_printed() {
-    let bench = still();
+fn values_of_answering_nodes_are_printed() {
+    let bench = constant();
     let done = bench.run("read 9,127").exit(7);
-    assert_eq!(done.stdout, "127  pressure  50.000 psi  (tells no status)\n");
+    assert_eq!(done.stdout, "127  pressure  50.000 psi  (no status)\n");
     assert_eq!(done.stderr, NO_ANSWER);
     let done = bench.run("read 9,10").exit(3);
     assert_eq!(done.stdout, "");
@@ -126,8 +126,8 @@ fn of_several_nodes_those_that_answer_are_printed() {
 }
 
 #[test]
-fn a_device_that_says_no() {
-    let bench = still();
+fn rejected_read_is_exit_4() {
+    let bench = constant();
     bench
         .run("read 5 0x5000:1")
         .fails(4, "cangauge: node 5: read 0x5000:1: refused by the device (0x06020000, the object does not exist)\n");
@@ -139,12 +139,14 @@ fn a_device_that_says_no() {
 }
 
 #[test]
-fn a_signal_that_it_does_not_have() {
-    still().run("read 5 presure").fails(2, "cangauge: node 5: no signal \"presure\" (it has: pressure, temperature)\n");
+fn unknown_signal_is_a_usage_error() {
+    constant()
+        .run("read 5 presure")
+        .fails(2, "cangauge: node 5: no signal \"presure\" (it has: pressure, temperature)\n");
 }
 
 #[test]
-fn all_are_those_that_answer() {
+fn all_means_the_nodes_that_answer() {
     let done = Bench::of(ALL).run("read all -f json").exit(0);
     let rows = done.json();
     let of = |node: u8| rows.iter().filter(|row| row["node"] == node).count();
@@ -153,9 +155,9 @@ fn all_are_those_that_answer() {
 }
 
 #[test]
-fn the_description_can_be_said() {
-    let bench = still();
-    // Taken for a DPS, its REAL32 is an INTEGER32 with 3 digits.
+fn user_can_choose_the_description() {
+    let bench = constant();
+    // With the description of a DPS, its REAL32 is read as an INTEGER32 with 3 digits.
     bench.run("read 5 pressure --device 5=dps").prints("1067450.368\n");
     bench.run("read 5 pressure --device 6=dps").prints("1.25\n");
     bench.run("read 5 --device mh5").refuses("no built-in device \"mh5\"");
@@ -165,8 +167,8 @@ fn the_description_can_be_said() {
 }
 
 #[test]
-fn mistakes_in_a_description_have_their_line() {
-    let bench = still();
+fn error_in_a_description_names_its_line() {
+    let bench = constant();
     let head = "name = \"mine\"\ntitle = \"Transmitter\"\nvendor = \"Maker\"\n\n";
     let signal = |name: &str| format!("[[signal]]\nname = \"{name}\"\nchannel = 1\nvalue = \"0x6130:1\"\n\n");
     let refuses = |text: String, message: &str| {
@@ -185,7 +187,7 @@ fn mistakes_in_a_description_have_their_line() {
 }
 
 #[test]
-fn who_has_it_not_is_excused_where_everybody_was_asked() {
+fn all_skips_nodes_without_the_signal() {
     let done = Bench::of("mh4@1,mc1609@3").run("read all pressure -f json").exit(0);
     assert_eq!(done.stdout.lines().count(), 1, "{}", done.stdout);
     assert!(done.stderr.starts_with("node 3: no signal \"pressure\" (it has: ch1, "), "{}", done.stderr);
@@ -208,7 +210,7 @@ fn user_can_state_the_type_of_an_object() {
 
 #[test]
 fn each_json_error_of_several_nodes_keeps_its_own_kind() {
-    let done = still().run("read 5,9 -f json").exit(7);
+    let done = constant().run("read 5,9 -f json").exit(7);
     assert_eq!(done.stdout.lines().count(), 2, "{}", done.stdout);
     let errors: Vec<serde_json::Value> = done.stderr.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let [error] = &errors[..] else { panic!("one error: {}", done.stderr) };

@@ -1,4 +1,4 @@
-//! A recording played again.
+//! Commands on a recording (`replay:FILE`).
 
 use super::{Bench, Done};
 use std::fs;
@@ -10,20 +10,20 @@ fn replay(bench: &Bench, file: &str, line: &str) -> Done {
     bench.finish(&mut bench.command(&words))
 }
 
-/// Keeps what the last command sent and received.
+/// Keeps the trace of the last command as a recording.
 fn keep(bench: &Bench) {
     fs::rename(bench.path("trace"), bench.path("t.log")).expect("the trace");
 }
 
 #[test]
-fn gives_the_rows_of_the_live_log() {
+fn replay_gives_the_rows_of_the_live_log() {
     let bench = Bench::of("mh4@1,d20@2,mc1609@3,dps@127");
     let live = bench.run("log 1-3,127 --sync 20ms --count 200").exit(0).stdout;
     keep(&bench);
     assert_eq!(live.lines().count(), 201);
     let replayed = replay(&bench, "t.log", "log 1-3,127 --count 200").exit(0).stdout;
     assert_eq!(replayed, live);
-    // The end of the recording is the end of the log.
+    // The log ends with the recording.
     let all = replay(&bench, "t.log", "log all").exit(0);
     assert_eq!(all.stdout, live);
     assert!(all.stderr.contains("200 rows in"), "{}", all.stderr);
@@ -31,7 +31,7 @@ fn gives_the_rows_of_the_live_log() {
 }
 
 #[test]
-fn a_recording_without_its_beginning_needs_a_description() {
+fn recording_without_the_setup_needs_a_description() {
     let bench = Bench::of("mh4@1");
     bench.run("log 1 --sync 20ms --count 20").exit(0);
     keep(&bench);
@@ -43,8 +43,8 @@ fn a_recording_without_its_beginning_needs_a_description() {
     assert_eq!(done.stdout.lines().count(), 21, "{}", done.stdout);
 }
 
-/// A recording of node 5, which another program asks for these objects; `None` is one that it does not have. Then it
-/// sends two INTEGER32 in TPDO1, 1234 and -5678.
+/// A recording in which another program reads these objects of node 5; `None` is an object that does not exist. Then
+/// node 5 sends two INTEGER32 in TPDO1, 1234 and -5678.
 fn asked(objects: &[(u16, u8, Option<u32>)]) -> String {
     let mut lines = String::new();
     for (at, (index, sub, value)) in objects.iter().enumerate() {
@@ -58,7 +58,7 @@ fn asked(objects: &[(u16, u8, Option<u32>)]) -> String {
 }
 
 #[test]
-fn each_channel_is_learned_with_its_own_digits_and_none_is_guessed() {
+fn decimal_digits_are_learned_per_channel() {
     let bench = Bench::of("mh4@1");
     // Without the profile the types would be unknown.
     let mut objects = vec![
@@ -81,14 +81,14 @@ fn each_channel_is_learned_with_its_own_digits_and_none_is_guessed() {
     let done = log(&objects).exit(0);
     let rows: Vec<&str> = done.stdout.lines().skip(1).map(|row| row.splitn(4, ',').last().unwrap_or(row)).collect();
     assert_eq!(rows, ["ch1,1.234,bar,,0xD2040000", "ch2,-567.8,degC,,0xD2E9FFFF"]);
-    // Who has no such object has no digits.
+    // A device without this object has no digits.
     objects[8].2 = None;
     let done = log(&objects).exit(0);
     assert!(done.stdout.ends_with("ch2,-5678,degC,,0xD2E9FFFF\n"), "{}", done.stdout);
 }
 
 #[test]
-fn nothing_can_be_sent_into_it() {
+fn commands_that_send_are_refused() {
     let bench = Bench::of("mh4@1");
     fs::write(bench.path("t.log"), "(1700000000.000000) can0 701#00\n").expect("written");
     let done = replay(&bench, "t.log", "read 1").exit(5);
@@ -227,7 +227,7 @@ fn files_that_are_no_recordings_are_named() {
 }
 
 #[test]
-fn scan_and_watch_listen_to_the_whole_of_it() {
+fn scan_and_watch_read_the_complete_recording() {
     let bench = Bench::of("mh4@1");
     let log = "(1700000000.000000) can0 701#00\n(1700003600.000000) can0 705#05\n";
     fs::write(bench.path("t.log"), log).expect("written");

@@ -5,7 +5,7 @@ use serde_json::json;
 use std::fs;
 
 #[test]
-fn one_object_is_the_bare_value() {
+fn one_object_is_a_bare_value() {
     let bench = Bench::of(ALL);
     let done = bench.run("sdo read 1 0x1018:1").prints("71\n");
     assert_eq!(done.frames, ["601#4018100100000000", "701#00", "581#4318100147000000"]);
@@ -16,7 +16,7 @@ fn one_object_is_the_bare_value() {
 }
 
 #[test]
-fn several_are_lines_of_object_and_value() {
+fn several_objects_are_lines_of_object_and_value() {
     Bench::of(ALL)
         .run("sdo read 1 vendor-id 0x1018:4 1008h")
         .prints("vendor-id 71\n0x1018:4 10001\n0x1008:0 MH-4-CAN\n");
@@ -42,7 +42,7 @@ fn json() {
 }
 
 #[test]
-fn the_type_can_be_said() {
+fn user_can_state_the_type() {
     let bench = Bench::of(ALL);
     bench.run("sdo read 1 0x1018:1 --hex").prints("0x00000047\n");
     bench.run("sdo read 1 0x1018:1 --bytes").prints("47 00 00 00\n");
@@ -54,7 +54,7 @@ fn the_type_can_be_said() {
     bench.run("sdo read 1 0x1A00:1").prints("0x61300120\n");
     bench.run("sdo read 1 0x6131:1").prints("0x004E0000\n");
     bench.run("sdo read 1 0x1018:1 --type i32").prints("71\n");
-    // A value that is wider than the type, the rest not zero: both widths are named.
+    // The value is wider than the type, and the excess is not zero: the error names both widths.
     bench.run("sdo read 1 0x1008 --type u8").fails(
         6,
         "cangauge: node 1: read 0x1008:0: the device delivered 8 bytes, but u8 has 1\n\
@@ -64,7 +64,7 @@ fn the_type_can_be_said() {
     assert_eq!(done.stderr, "warning: node 1: 0x1017:0: the device delivered 2 bytes for 4\n");
 }
 
-/// The requests to node 5 after those that read its identity, which decides the form of the write.
+/// The requests to node 5 after its identity, which decides the form of the write.
 fn after_identity(done: &Done) -> Vec<&str> {
     let requests = done.frames_of("605").into_iter();
     requests
@@ -73,7 +73,7 @@ fn after_identity(done: &Done) -> Vec<&str> {
 }
 
 #[test]
-fn value_is_written_as_its_type() {
+fn value_is_written_with_the_width_of_its_type() {
     let bench = Bench::of("mh4@5");
     let done = bench.run("sdo write 5 0x1017 1000").prints("");
     assert_eq!((after_identity(&done), done.stderr.as_str()), (vec!["2B171000E8030000"], ""));
@@ -87,14 +87,14 @@ fn value_is_written_as_its_type() {
 
 #[test]
 fn acknowledged_value_that_is_not_kept_is_exit_6() {
-    // HYDAC: a COB-ID of 0 stands for the default.
+    // HYDAC: a COB-ID of 0 sets the default.
     let bench = Bench::of("hydac@5");
     let message = "0x1800:1 was acknowledged and reads 0x85010040 instead of 0x00000000";
     bench.run("sdo write 5 0x1800:1 0 --verify").fails(6, &format!("cangauge: node 5: {message}\n"));
 }
 
 #[test]
-fn nothing_is_sent_of_a_value_that_does_not_fit() {
+fn value_that_does_not_fit_is_not_sent() {
     let bench = Bench::of("mh4@5");
     for (value, why) in [
         ("70000", "70000 does not fit u16 (0 to 65535)"),
@@ -112,7 +112,7 @@ fn nothing_is_sent_of_a_value_that_does_not_fit() {
         .run("sdo write 5 0x5000 1e39 --type r32")
         .refuses("0x5000:0: 1e39 does not fit r32 (-3.4028235e38 to 3.4028235e38)");
     bench.run("sdo write 5 0x5000 xyz --type hex").refuses("0x5000:0: \"xyz\" is not a value of type os");
-    // Of several, the first is not written either.
+    // If one of several values does not fit, none is written.
     bench.run("sdo write 5 0x1017=500 0x1800:5=70000").refuses("0x1800:5: 70000 does not fit u16 (0 to 65535)");
     bench
         .run("sdo write 5 0x1017=500 0x1800:5")
@@ -120,16 +120,16 @@ fn nothing_is_sent_of_a_value_that_does_not_fit() {
 }
 
 #[test]
-fn an_object_that_only_its_device_has_is_checked_before_it_is_written() {
-    // 2023h is the MH-4's own: who it is has to be read first, and that is all that is sent.
+fn value_is_checked_against_the_description_before_the_write() {
+    // 2023h is specific to the MH-4: only the requests for its identity are sent.
     let done = Bench::of("mh4@5").run("sdo write 5 0x2023:1 70000").exit(2);
     assert_eq!(done.stderr, "cangauge: node 5: write 0x2023:1: 70000 does not fit u16 (0 to 65535)\n");
-    // 4xh begins a read, 6xh and 7xh go on with it; 2xh would be a write.
+    // 4xh starts a read, 6xh and 7xh continue it; 2xh would be a write.
     assert!(done.frames_of("605").iter().all(|request| request.starts_with(['4', '6', '7'])), "{:?}", done.frames);
 }
 
 #[test]
-fn an_object_without_a_known_type_asks_for_it() {
+fn unknown_type_must_be_stated() {
     Bench::of("mh4@5").run("sdo write 5 0x5000 5").fails(
         2,
         "cangauge: node 5: write 0x5000:0: its type is unknown\n\
@@ -138,7 +138,7 @@ fn an_object_without_a_known_type_asks_for_it() {
 }
 
 #[test]
-fn a_device_that_says_no() {
+fn rejected_request_is_exit_4() {
     let bench = Bench::of("mh4@5");
     bench
         .run("sdo write 5 0x1018:1 5")
@@ -146,19 +146,19 @@ fn a_device_that_says_no() {
     bench
         .run("sdo read 5 0x5000")
         .fails(4, "cangauge: node 5: read 0x5000:0: refused by the device (0x06020000, the object does not exist)\n");
-    // What was read before stays.
+    // The values read before are printed.
     let done = bench.run("sdo read 5 0x1018:1 0x5000 0x1018:4").exit(4);
     assert_eq!(done.stdout, "0x1018:1 71\n");
 }
 
 #[test]
-fn a_node_that_is_not_there() {
+fn absent_node_is_exit_3() {
     let bench = Bench::of("mh4@1");
     let hint = "hint: list the nodes that answer: cangauge scan\n";
     let done = bench
         .run("sdo read 5 0x6130:1")
         .fails(3, &format!("cangauge: node 5: read 0x6130:1: no answer within 500 ms\n{hint}"));
-    assert_eq!(done.frames_of("605"), ["4030610100000000"; 2], "nobody had begun to answer: no abort");
+    assert_eq!(done.frames_of("605"), ["4030610100000000"; 2], "the server never answered: no abort is sent");
     assert!(done.times.last().is_some_and(|last| (500_000..520_000).contains(last)), "{:?}", done.times);
     bench
         .run("sdo write 5 0x1017 100")
@@ -172,7 +172,7 @@ fn a_node_that_is_not_there() {
 }
 
 #[test]
-fn names_that_are_none() {
+fn unknown_names_are_refused() {
     let bench = Bench::of("mh4@5");
     bench
         .run("sdo read 5 vendor-di")
@@ -193,7 +193,7 @@ fn bytes_to_and_from_files() {
     bench.run("sdo read 5 0x1018:1 --output name.bin --force").prints("");
     assert_eq!(fs::read(bench.path("name.bin")).expect("the file"), [0x47, 0, 0, 0]);
     bench.run("sdo read 9 0x1008 --output other.bin").exit(3);
-    assert_eq!(bench.files(), ["name.bin"], "nothing was read: no file");
+    assert_eq!(bench.files(), ["name.bin"], "a failed read leaves no file");
     bench.run("sdo read 5 0x1008 0x1018:1 --output other.bin").refuses("--output takes one object");
 
     fs::write(bench.path("time.bin"), [0xe8, 0x03]).expect("written");
@@ -206,7 +206,7 @@ fn bytes_to_and_from_files() {
 }
 
 #[test]
-fn text_from_a_device_steers_no_terminal() {
+fn text_from_a_device_is_escaped() {
     let bench = Bench::described("[[device]]\nkind = \"mh4\"\nnode = 5\nset = { \"0x1008\" = \"a\\u001B[2Jb\" }\n");
     bench.run("sdo read 5 0x1008").prints("a\\x1B[2Jb\n");
     let done = bench.run("sdo read 5 0x1008 -f json").exit(0);

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 /// Devices with constant values: a DPS at 50 psi, an MH-4 at 1.25 bar and 25.5 degC, an MC1609.
-fn still() -> Bench {
+fn constant() -> Bench {
     Bench::described(&format!(
         "[[device]]\nkind = \"mh4\"\nnode = 5\n{}{}[[device]]\nkind = \"dps\"\nnode = 127\n{}\
          [[device]]\nkind = \"mc1609\"\nnode = 3\n[[device]]\nkind = \"d20\"\nnode = 2\n{}",
@@ -29,8 +29,8 @@ fn kept(node: u8) -> serde_json::Value {
 }
 
 #[test]
-fn the_unit_of_one_signal_is_bare() {
-    let bench = still();
+fn unit_of_one_signal_is_bare_text() {
+    let bench = constant();
     bench.run("unit 127").prints("psi\n");
     bench.run("unit 5 temperature").prints("degC\n");
     bench
@@ -47,8 +47,8 @@ fn the_unit_of_one_signal_is_bare() {
 
 /// DPS manual, table 19: from psi to bar; the pressure is 50.000 psi, then 3.447 bar (3.448 in print).
 #[test]
-fn table_19_and_what_the_new_unit_rescales() {
-    let done = still().run("unit 127 bar").exit(0);
+fn new_unit_rescales_other_values() {
+    let done = constant().run("unit 127 bar").exit(0);
     assert_eq!(
         done.stdout,
         "pressure           psi          ->  bar\n\
@@ -112,7 +112,7 @@ fn table_19_with_its_60h() {
 
 #[test]
 fn a_unit_that_the_device_does_not_accept_is_rejected_with_the_list() {
-    let bench = still();
+    let bench = constant();
     let written = |done: &super::Done, id: &str| done.frames_of(id).iter().any(|frame| frame.starts_with('2'));
     let done = bench.run("unit 5 pressure kPa").exit(2);
     assert_eq!(done.stderr, "cangauge: node 5: pressure accepts bar, psi, MPa, not kPa\n");
@@ -138,7 +138,7 @@ fn a_unit_that_the_device_does_not_accept_is_rejected_with_the_list() {
 
 #[test]
 fn filters() {
-    let bench = still();
+    let bench = constant();
     bench.run("filter 5").prints("pressure  none (0)  constant 1\n");
     bench.run("filter 5 temperature").fails(4, "cangauge: node 5: temperature has no filter (61A0h, 61A1h)\n");
     let done = bench.run("filter 5 --type moving --constant 8 -f json").exit(0);
@@ -180,7 +180,7 @@ fn filters() {
 
 #[test]
 fn limits() {
-    let bench = still();
+    let bench = constant();
     bench.run("limits 5 pressure").prints(
         "delta       0 bar   (0x6133:1)\nlower       0 bar   (0x6134:1)\n\
          upper       10 bar  (0x6135:1)\nhysteresis  0 bar   (0x6136:1)\n",
@@ -229,7 +229,7 @@ fn minimum_and_maximum() {
     let done = bench.run("minmax 5 --reset -f json").exit(0);
     assert_eq!(done.frames_of("605").iter().filter(|frame| frame.starts_with("232220")).count(), 2, "once a channel");
     assert!(done.json()[0]["before"]["min"].is_number());
-    let still = still();
+    let still = constant();
     still
         .run("minmax 5")
         .prints("pressure     min 1.25 bar   max 1.25 bar\ntemperature  min 25.5 degC  max 25.5 degC\n");
@@ -267,7 +267,7 @@ fn errors_are_explained_by_the_description() {
     assert!(done.frames_of("605").contains(&"2F03100000000000"));
     // The DPS counts its errors; the entries cannot be read.
     bench.run("errors 127").prints("register  0x05 generic, voltage\nhistory   1 error\n");
-    bench.run("errors 2").prints("register  0x00 no error\nhistory   none is kept\n");
+    bench.run("errors 2").prints("register  0x00 no error\nhistory   not supported\n");
     bench.run("errors 2 --clear").fails(6, "cangauge: node 2: it has no error history (1003h)\n");
     let done = bench.run("errors 9").exit(3);
     assert!(done.stdout.is_empty());
@@ -300,8 +300,8 @@ fn a_device_without_a_description() {
     let done = bench.run("filter 5 ch1 --type repeating --constant 3 -f csv").exit(0);
     assert_eq!(done.stdout, "node,signal,code,type,constant\n5,ch1,2,repeating average,3\n");
     let page = bench.run("info 5").exit(0).stdout;
-    assert!(page.starts_with("node 5: not a device that is known\n"), "{page}");
-    for part in ["ai-sensor-type        90 pressure transducer", "range 0 to 10", "  kept     not known"] {
+    assert!(page.starts_with("node 5: unknown device\n"), "{page}");
+    for part in ["ai-sensor-type        90 pressure transducer", "range 0 to 10", "  stored   unknown"] {
         assert!(page.contains(part), "{part:?} is not in\n{page}");
     }
 }

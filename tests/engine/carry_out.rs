@@ -19,14 +19,14 @@ use cangauge::node::Overrides;
 use cangauge::node::{Node, WriteOptions};
 use cangauge::tasks::log::{LogEvent, LogOptions, Mode, Observer, log};
 use cangauge::tasks::lss::{self, Descriptions, Job, LssAddress, LssRange, RequestedRate};
-use cangauge::tasks::nmt::Seen;
+use cangauge::tasks::nmt::StateEvent;
 use cangauge::tasks::pdo::{self, Item, PdoRequest, Settings, Trigger, WatchEvent};
 use cangauge::tasks::settings::{self, errors, filter, info, limits, minmax, unit};
 use cangauge::tasks::{Failure, autozero, check, detect, nmt, read, restore, scan, sdo, store};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// What a successful command claims.
+/// The state that a successful command claims.
 #[derive(Clone, Debug)]
 pub(crate) enum Claim {
     Nothing,
@@ -53,13 +53,13 @@ pub(crate) enum Claim {
     Satisfied,
 }
 
-/// What a command reports while it runs.
+/// The reports of a running command.
 #[derive(Default)]
 pub(crate) struct Observations {
     /// Rows of a recording, in the format of the simulator's own record.
     pub(crate) rows: Vec<String>,
     /// Changes of nodes.
-    pub(crate) seen: Vec<Seen>,
+    pub(crate) seen: Vec<StateEvent>,
     /// Results of expressions.
     pub(crate) verdicts: Vec<Verdict>,
 }
@@ -134,7 +134,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             let wait = Duration::from_millis(200.min(spec.timeout_ms));
             let found = scan::scan(master, &nodes(ids), wait, spec.retries + 1, &none)?;
             let found = found.into_iter().filter(|found| found.failure.is_none());
-            Claim::Found(found.map(|found| (found.node.get(), found.instrument.identity.serial)).collect())
+            Claim::Found(found.map(|found| (found.node.get(), found.device.identity.serial)).collect())
         }
         Command::Read { nodes: ids } => {
             let mut values = Vec::new();
@@ -198,14 +198,14 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             Claim::Found(found.iter().filter_map(|slave| Some((slave.node?.get(), serial(slave)))).collect())
         }
         Command::LssInquire { target: wanted } => {
-            let told = lss::inquire(
+            let inquired = lss::inquire(
                 master,
                 &target(spec, wanted),
                 &Descriptions { overrides: &none, given: None },
                 &mut quiet,
             )?;
-            let node = told.node.flatten();
-            let serial = told.address.map(|address| address.serial);
+            let node = inquired.node.flatten();
+            let serial = inquired.address.map(|address| address.serial);
             Claim::Found(node.map(|node| (node.get(), serial)).into_iter().collect())
         }
         Command::LssStore { target: wanted, force } => {

@@ -34,7 +34,7 @@ WRAP = 4096
 
 
 class Kind:
-    """What distinguishes the kinds of devices."""
+    """The differences between the kinds of devices."""
 
     def __init__(self, name, index, bits, product, unit, digits, value, status=lambda n: 0):
         self.name, self.index, self.bits, self.product = name, index, bits, product

@@ -56,13 +56,13 @@ def into_a_file(cangauge, directory):
         assert text.endswith("\n") and text.count("\n") == len(rows) + 1
         begins(rows, record(12))
         with open(summary, encoding="ascii") as file:
-            told = json.load(file)
-        signals = told["signals"]
+            totals = json.load(file)
+        signals = totals["signals"]
         values = [float(row[2]) for row in rows if row[2]]
-        assert told["rows"] == len(rows) and told["dropped"] == 0 and told["lost_nodes"] == [], told
+        assert totals["rows"] == len(rows) and totals["dropped"] == 0 and totals["lost_nodes"] == [], totals
         assert [(s["node"], s["signal"], s["unit"], s["count"], s["invalid"], s["min"], s["max"]) for s in signals] == \
-            [(12, "ch1", "bar", len(rows), len(rows) - len(values), min(values), max(values))], told
-        assert abs(signals[0]["mean"] - sum(values) / len(values)) < 1e-9, told
+            [(12, "ch1", "bar", len(rows), len(rows) - len(values), min(values), max(values))], totals
+        assert abs(signals[0]["mean"] - sum(values) / len(values)) < 1e-9, totals
         # An existing file is not overwritten.
         cangauge.run("log", "12", "-o", path, "--count", 1, exit=2)
         assert open(path).read() == text

@@ -532,13 +532,13 @@ def nmt_watch(cangauge, directory):
             text = watch.text("out")
             lines = [json.loads(line) for line in text[:text.rfind("\n") + 1].splitlines()]
             events, state = [], None
-            for event, told in [(line["event"], line["state"]) for line in lines if line["node"] == NODE]:
+            for event, state_now in [(line["event"], line["state"]) for line in lines if line["node"] == NODE]:
                 # If the guest paused, a heartbeat is late: the node is lost and back, perhaps in another state.
                 if event == "back" and events[-1] == ("lost", None):
                     events.pop()
-                    event = "state" if told != state else None
-                state = told or state
-                events += [(event, told)] if event else []
+                    event = "state" if state_now != state else None
+                state = state_now or state
+                events += [(event, state_now)] if event else []
             return events
 
         def await_seen(*events):

@@ -252,7 +252,7 @@ fn other_frames_do_not_extend_the_timeout() {
         bus.attach(PeriodicSender(text.parse().expect("a frame"), Mono::START + Duration::from_millis(1)));
         let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 0 });
         let error = master.transfer_one(Request::read(node(), ObjectId::new(0x2000, 0))).expect("the bus works");
-        let failure = error.expect_err("nobody answers").failure;
+        let failure = error.expect_err("no node answers").failure;
         assert_eq!(failure, SdoFailure::NoAnswer { waited: TIMEOUT, started: false }, "{text}");
         assert!(master.now().since_start() < TIMEOUT + Duration::from_millis(20), "{text}: {:?}", master.now());
     }

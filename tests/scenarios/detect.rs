@@ -1,4 +1,4 @@
-//! The bit rate of a running bus, found on a wire where everybody at another rate is deaf and mute.
+//! Finding the bit rate of a running bus. A device at a different bit rate neither receives nor sends.
 
 use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::bus::time::Mono;
@@ -26,33 +26,33 @@ fn run(bus: &mut MemoryBus, ask: bool) -> Result<Detection, Failure> {
     detect(bus, ask, EACH, &mut |_| ())
 }
 
-/// That the program takes part at its old rate again.
-fn assert_put_back(bus: &mut MemoryBus) {
+/// Checks that the interface has its old bit rate, and can send.
+fn assert_restored(bus: &mut MemoryBus) {
     assert_eq!(bus.bit_rate(), Some(250_000));
     bus.send(&"701#05".parse().unwrap()).expect("not listen-only");
 }
 
 #[test]
-fn a_bus_with_company_is_heard_at_every_rate() {
+fn listening_finds_each_bit_rate_of_two_devices() {
     for rate in RATES {
         let mut bus = bench(rate, &[(5, 1000), (6, 900)]);
         let found = run(&mut bus, false).unwrap();
         assert_eq!(found.found, Some((rate, By::Frames)), "{:?}", found.tried);
         assert!(found.tried.iter().all(|tried| tried.how == How::Listening));
-        assert_put_back(&mut bus);
+        assert_restored(&mut bus);
     }
 }
 
 #[test]
-fn listening_disturbs_nobody() {
+fn listening_does_not_disturb_the_bus() {
     let mut bus = bench(125_000, &[(5, 20), (6, 30)]);
     let mut undisturbed = bench(125_000, &[(5, 20), (6, 30)]);
     undisturbed.set_bit_rate(125_000, Mode::ListenOnly).unwrap();
     assert_eq!(run(&mut bus, false).unwrap().found, Some((125_000, By::Frames)));
-    // Both go on to the very same moment: every heartbeat afterwards comes when it would have come.
+    // Afterwards each heartbeat has the same time as on the undisturbed bus.
     bus.set_bit_rate(125_000, Mode::ListenOnly).unwrap();
     let from = bus.now().mono;
-    let heard = |bus: &mut MemoryBus| {
+    let received = |bus: &mut MemoryBus| {
         let mut frames = Vec::new();
         let until = from + Duration::from_secs(1);
         loop {
@@ -64,30 +64,30 @@ fn listening_disturbs_nobody() {
             }
         }
     };
-    let frames = heard(&mut bus);
+    let frames = received(&mut bus);
     assert!(frames.len() > 50, "{}", frames.len());
-    assert_eq!(frames, heard(&mut undisturbed));
+    assert_eq!(frames, received(&mut undisturbed));
 }
 
 #[test]
-fn one_sensor_alone_needs_somebody_who_acknowledges() {
+fn single_sensor_needs_an_acknowledge() {
     for heartbeat in [0, 100] {
         for rate in [50_000, 1_000_000] {
             let mut bus = bench(rate, &[(5, heartbeat)]);
             let found = run(&mut bus, false).unwrap();
             assert_eq!(found.found, None, "{:?}", found.tried);
-            assert_put_back(&mut bus);
+            assert_restored(&mut bus);
 
             let mut bus = bench(rate, &[(5, heartbeat)]);
             let found = run(&mut bus, true).unwrap();
             assert_eq!(found.found, Some((rate, By::Frames)), "{:?}", found.tried);
-            assert_put_back(&mut bus);
+            assert_restored(&mut bus);
         }
     }
 }
 
 #[test]
-fn nobody_there_is_no_bit_rate() {
+fn empty_bus_has_no_bit_rate() {
     for ask in [false, true] {
         let mut bus = MemoryBus::new(Clock::Virtual);
         let found = run(&mut bus, ask).unwrap();
@@ -97,7 +97,7 @@ fn nobody_there_is_no_bit_rate() {
 }
 
 #[test]
-fn interrupted_at_any_moment_the_old_rate_is_back() {
+fn ctrl_c_at_any_time_restores_the_bit_rate() {
     let devices = || bench(83_333, &[(5, 700), (6, 0)]);
     let mut bus = devices();
     assert_eq!(run(&mut bus, true).unwrap().found, None);
@@ -107,12 +107,12 @@ fn interrupted_at_any_moment_the_old_rate_is_back() {
         let mut bus = devices();
         bus.interrupt_at(moment);
         assert_eq!(run(&mut bus, true).unwrap_err().kind(), Kind::Interrupted, "{moment:?}");
-        assert_put_back(&mut bus);
+        assert_restored(&mut bus);
     }
 }
 
 #[test]
-fn where_the_rate_may_not_be_set_nothing_is_sent() {
+fn nothing_is_sent_without_permission_to_set_the_bit_rate() {
     let text = "clock = \"virtual\"\nretime = false\n[[device]]\nkind = \"mh4\"\nnode = 5\n";
     let mut bus = Bench::from_toml(text, Path::new("")).unwrap().open().unwrap();
     let failure = run(&mut bus, true).unwrap_err();

@@ -1,4 +1,4 @@
-//! A transmit queue that has no room: nothing is lost by it, and nobody is missed.
+//! A full transmit queue: no request is lost, and a scan finds all nodes.
 
 use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{BIT_RATE, Clock, MemoryBus, Outbox, Station};
@@ -38,21 +38,21 @@ fn scan_all(bus: &mut dyn Bus) -> Result<Vec<Found>, Error> {
 
 fn described(found: &[Found]) -> Vec<(u8, Option<u32>, Option<String>, String)> {
     let one = |found: &Found| {
-        let instrument = &found.instrument;
-        let model = instrument.model.as_ref().map(|model| model.description.name.clone()).unwrap_or_default();
-        (found.node.get(), instrument.identity.serial, instrument.identity.name.clone(), model)
+        let device = &found.device;
+        let model = device.model.as_ref().map(|model| model.description.name.clone()).unwrap_or_default();
+        (found.node.get(), device.identity.serial, device.identity.name.clone(), model)
     };
     found.iter().map(one).collect()
 }
 
 #[test]
-fn a_scan_finds_the_same_nodes_however_often_the_queue_is_full() {
+fn scan_finds_all_nodes_although_the_queue_is_full() {
     let all: Vec<u8> = (1..=127).collect();
     for present in [&[1, 64, 127][..], &all] {
         let expected = described(&scan_all(&mut bus(present)).unwrap());
         assert_eq!(expected.iter().map(|node| node.0).collect::<Vec<_>>(), present);
         assert!(expected.iter().all(|node| !node.3.is_empty()), "{expected:?}");
-        // Every second call; runs of 20 ms; nearly always.
+        // Full at each second call; in runs of 20 calls; at six of seven calls.
         let plans: [&dyn Fn(u64) -> bool; 3] =
             [&|call| call % 2 == 0, &|call| call / 20 % 2 == 0, &|call| call % 7 > 0];
         for is_full in plans {
@@ -64,11 +64,11 @@ fn a_scan_finds_the_same_nodes_however_often_the_queue_is_full() {
 }
 
 #[test]
-fn a_short_queue_of_a_slow_bus_is_waited_for() {
+fn scan_waits_for_a_short_queue_on_a_slow_bus() {
     let present: Vec<u8> = (1..=127).collect();
     for queue_length in [1, 2, 10] {
         let mut slow = bus_at(10_000, &present).with_queue_length(queue_length);
-        // The boot-up messages of all of them take their time.
+        // Wait for the boot-up messages of all devices.
         let booted = slow.now().mono + Duration::from_secs(5);
         while slow.receive(booted).unwrap() != Event::Timeout {}
         let found = scan_all(&mut slow).unwrap();
@@ -77,28 +77,28 @@ fn a_short_queue_of_a_slow_bus_is_waited_for() {
 }
 
 #[test]
-fn a_queue_that_never_empties_is_a_fault_of_the_bus_after_a_while() {
+fn queue_that_stays_full_is_a_bus_error() {
     let plan = FaultPlan { queue_full: (3..100_000).collect(), ..FaultPlan::default() };
     let mut faulty = Faulty::new(bus(&[1]), plan);
-    let begun = faulty.now().mono;
+    let start = faulty.now().mono;
     let failure = cangauge::tasks::Failure::from(scan_all(&mut faulty).unwrap_err());
     assert_eq!(failure.kind(), Kind::Bus);
     assert!(ErrorMessage::of(&failure).hint.unwrap().contains("terminators"));
-    let took = faulty.now().mono.since(begun);
+    let took = faulty.now().mono.since(start);
     assert!((Duration::from_secs(1)..Duration::from_secs(2)).contains(&took), "{took:?}");
 }
 
-/// A server that takes a write in segments, and once acknowledges a segment that has not come yet: so it looks where
-/// two devices share a node-ID and one of them lags behind.
+/// A server that acknowledges one segment before it has received it. This happens if two devices have the same node-ID
+/// and one of them is slower.
 #[derive(Default)]
-struct Hasty {
+struct EarlyServer {
     data: Vec<u8>,
     toggle: u8,
     segments: u32,
     due: Option<(Mono, Frame)>,
 }
 
-impl Station for Hasty {
+impl Station for EarlyServer {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
@@ -133,14 +133,14 @@ impl Station for Hasty {
 }
 
 #[test]
-fn an_acknowledge_of_what_still_waits_to_be_sent_takes_no_segment_off() {
+fn early_acknowledge_does_not_skip_a_segment() {
     let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(BIT_RATE);
-    bus.attach(Hasty::default());
-    // The third segment has to wait.
+    bus.attach(EarlyServer::default());
+    // The third segment waits for the queue.
     let mut bus = Faulty::new(bus, FaultPlan { queue_full: (3..8).collect(), ..FaultPlan::default() });
     let data: Vec<u8> = (0..50).collect();
     let node = NodeId::new(5).unwrap();
     let write = Request::write(node, ObjectId::new(0x2000, 0), data.clone(), DownloadSize::Indicated);
     Master::new(&mut bus, Timing::default()).transfer_one(write).unwrap().unwrap();
-    assert_eq!(bus.inner().stations::<Hasty>().next().unwrap().data, data);
+    assert_eq!(bus.inner().stations::<EarlyServer>().next().unwrap().data, data);
 }

@@ -394,8 +394,8 @@ fn interface_goes_down_and_comes_back() {
 fn dropped_frames_are_counted() {
     let (kept, outcome) = record_with_events(&[(1500, Event::Dropped(5)), (2500, Event::Dropped(30))]);
     assert_eq!(outcome.dropped, 5 + 30 + 7);
-    let told: Vec<_> = kept.notes.iter().filter(|note| matches!(note, LogEvent::Dropped(_))).collect();
-    assert_eq!(told, [&LogEvent::Dropped(5), &LogEvent::Dropped(30), &LogEvent::Dropped(7)]);
+    let drops: Vec<_> = kept.notes.iter().filter(|note| matches!(note, LogEvent::Dropped(_))).collect();
+    assert_eq!(drops, [&LogEvent::Dropped(5), &LogEvent::Dropped(30), &LogEvent::Dropped(7)]);
 }
 
 #[test]

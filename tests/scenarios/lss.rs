@@ -1,4 +1,4 @@
-//! LSS services with slaves that answer late, doubled, wrong or not at all.
+//! LSS services with slaves that answer late, twice, wrongly or not at all.
 
 mod fastscan;
 mod services;
@@ -25,7 +25,7 @@ fn bus_of(slaves: impl IntoIterator<Item = Slave>) -> MemoryBus {
     bus
 }
 
-/// Who is in configuration state.
+/// The identities of the slaves in configuration state.
 fn configuring(bus: &MemoryBus) -> Vec<[u32; 4]> {
     bus.stations::<Slave>().filter(|slave| slave.is_configuring).map(|slave| slave.identity).collect()
 }

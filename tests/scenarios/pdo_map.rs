@@ -1,5 +1,5 @@
-//! `pdo map` with something going wrong at every single frame that it sends: the device is left with its old
-//! mapping or the new one, and what is said is what it holds.
+//! `pdo map` with a fault at each frame that it sends. Afterwards the device has its old mapping or the new one, and the
+//! report says which.
 
 use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::bus::{Bus, BusError, Event, Mono, Received};
@@ -22,38 +22,38 @@ const NODE: u8 = 5;
 
 const TIMEOUT: Duration = Duration::from_millis(500);
 
-/// What happens at a frame that is sent.
+/// A fault at one frame that the program sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Mishap {
+enum Fault {
     None,
-    /// It never reaches the device.
+    /// The frame does not reach the device.
     LoseRequest,
-    /// What comes next is lost.
+    /// The next answer is lost.
     LoseAnswer,
-    /// The device refuses it.
+    /// The device rejects the write.
     Refuse(u32),
-    /// The device acknowledges it and does nothing.
+    /// The device acknowledges the write without executing it.
     Pretend,
-    /// The device refuses it, and from then on acknowledges everything and does nothing.
+    /// The device rejects the write, and acknowledges all later writes without executing them.
     Stubborn(u32),
-    /// Ctrl-C, before the answer is there.
+    /// Ctrl-C before the answer.
     Interrupt,
     /// Ctrl-C, and again at the next frame.
     InterruptTwice,
-    /// The device is reset by somebody before it gets the request.
+    /// Another master resets the device before the request.
     ResetBefore,
-    /// The device is reset by somebody right after its answer.
+    /// Another master resets the device after its answer.
     ResetAfter,
-    /// The wire is broken for a while.
+    /// The wire is broken for this time.
     Away(Duration),
-    /// The device is gone.
+    /// The device stays off the bus.
     Gone,
 }
 
-/// A bus on which a mishap happens at the n-th frame sent.
-struct Meddler {
+/// A bus with a fault at the n-th frame that is sent.
+struct FaultyBus {
     bus: MemoryBus,
-    mishap: Mishap,
+    fault: Fault,
     at: usize,
     sent: Vec<Frame>,
     events: VecDeque<Event>,
@@ -62,12 +62,12 @@ struct Meddler {
     away_until: Option<Mono>,
 }
 
-impl Meddler {
+impl FaultyBus {
     fn is_away(&self) -> bool {
         self.away_until.is_some_and(|until| self.bus.now().mono < until)
     }
 
-    /// Answers a write, which the device does not get.
+    /// Acknowledges a write and keeps it from the device.
     fn pretend(&mut self, frame: &Frame) -> Result<(), BusError> {
         let [_, a, b, c, ..] = *frame.data() else { return self.bus.send(frame) };
         let frame = format!("{:03X}#60{a:02X}{b:02X}{c:02X}00000000", 0x580 + u16::from(NODE)).parse().unwrap();
@@ -80,28 +80,28 @@ impl Meddler {
     }
 }
 
-impl cangauge::bus::BitRateControl for Meddler {
+impl cangauge::bus::BitRateControl for FaultyBus {
     cangauge::bus::delegate_bus!(self, self.bus => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
 }
 
-impl Bus for Meddler {
+impl Bus for FaultyBus {
     cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let number = self.sent.len();
         self.sent.push(*frame);
-        let twice = self.mishap == Mishap::InterruptTwice && number == self.at + 1;
-        if matches!(self.mishap, Mishap::Stubborn(_)) && number > self.at && is_write(frame) {
+        let twice = self.fault == Fault::InterruptTwice && number == self.at + 1;
+        if matches!(self.fault, Fault::Stubborn(_)) && number > self.at && is_write(frame) {
             return self.pretend(frame);
         }
         if number != self.at && !twice {
             return if self.is_away() { Ok(()) } else { self.bus.send(frame) };
         }
-        match self.mishap {
-            Mishap::None => {}
-            Mishap::LoseRequest => return Ok(()),
-            Mishap::LoseAnswer => self.lose_next = true,
-            Mishap::Refuse(code) | Mishap::Stubborn(code) => {
+        match self.fault {
+            Fault::None => {}
+            Fault::LoseRequest => return Ok(()),
+            Fault::LoseAnswer => self.lose_next = true,
+            Fault::Refuse(code) | Fault::Stubborn(code) => {
                 let [_, a, b, c, ..] = *frame.data() else { return self.bus.send(frame) };
                 let [d, e, f, g] = code.to_le_bytes();
                 let data = format!("80{a:02X}{b:02X}{c:02X}{d:02X}{e:02X}{f:02X}{g:02X}");
@@ -109,15 +109,15 @@ impl Bus for Meddler {
                 self.events.push_back(Event::Frame(Received { frame, at: self.bus.now() }));
                 return Ok(());
             }
-            Mishap::Pretend => return self.pretend(frame),
-            Mishap::Interrupt | Mishap::InterruptTwice => self.events.push_back(Event::Interrupted),
-            Mishap::ResetBefore => self.reset()?,
-            Mishap::ResetAfter => self.reset_next = true,
-            Mishap::Away(time) => {
+            Fault::Pretend => return self.pretend(frame),
+            Fault::Interrupt | Fault::InterruptTwice => self.events.push_back(Event::Interrupted),
+            Fault::ResetBefore => self.reset()?,
+            Fault::ResetAfter => self.reset_next = true,
+            Fault::Away(time) => {
                 self.away_until = Some(self.bus.now().mono + time);
                 return Ok(());
             }
-            Mishap::Gone => {
+            Fault::Gone => {
                 self.away_until = Some(Mono::at(Duration::MAX));
                 return Ok(());
             }
@@ -152,7 +152,7 @@ fn node() -> NodeId {
     NodeId::new(NODE).unwrap()
 }
 
-/// One device, what its TPDO1 is set to before, and what is wanted of it.
+/// One device, the previous settings of its TPDO1, and the request.
 #[derive(Clone, Copy)]
 struct Case {
     device: &'static str,
@@ -197,7 +197,7 @@ const CASES: [Case; 6] = [
         event_timer_ms: Some(1000),
         cob_id: None,
     },
-    // Parameters alone.
+    // Only parameters.
     Case {
         device: "mh4",
         set: &[],
@@ -240,16 +240,16 @@ impl Case {
         setup.set = self.set.iter().map(|(at, value)| (at.parse().unwrap(), Scalar::Integer(*value))).collect();
         let mut bus = MemoryBus::new(Clock::Virtual);
         bus.attach(Device::new(setup).unwrap());
-        // The boot-up message is none of a restart.
+        // Skip the boot-up message: it must not look like a restart.
         while bus.receive(Mono::at(Duration::from_millis(20))).unwrap() != Event::Timeout {}
         bus
     }
 
-    /// What happens to the request if this happens at the n-th frame.
-    fn run(&self, start: bool, mishap: Mishap, at: usize) -> Outcome {
-        let mut meddler = Meddler {
+    /// Runs the request with a fault at the n-th frame.
+    fn run(&self, start: bool, fault: Fault, at: usize) -> Outcome {
+        let mut faulty = FaultyBus {
             bus: self.bus(start),
-            mishap,
+            fault,
             at,
             sent: Vec::new(),
             events: VecDeque::new(),
@@ -257,19 +257,19 @@ impl Case {
             reset_next: false,
             away_until: None,
         };
-        let mut master = Master::new(&mut meddler, Timing::default());
+        let mut master = Master::new(&mut faulty, Timing::default());
         let result = map(&mut master, &self.request(), false, &Default::default());
         master.settle();
-        let took = meddler.bus.now().mono.since_start();
-        // What is on the wire gets there.
-        let soon = meddler.bus.now().mono + Duration::from_millis(200);
-        while meddler.bus.receive(soon).unwrap() != Event::Timeout {}
-        let state = meddler.bus.stations::<Device>().next().unwrap().state();
-        Outcome { result, held: held(&mut meddler.bus), state, sent: meddler.sent, took }
+        let took = faulty.bus.now().mono.since_start();
+        // Deliver the frames that are still on the wire.
+        let soon = faulty.bus.now().mono + Duration::from_millis(200);
+        while faulty.bus.receive(soon).unwrap() != Event::Timeout {}
+        let state = faulty.bus.stations::<Device>().next().unwrap().state();
+        Outcome { result, held: held(&mut faulty.bus), state, sent: faulty.sent, took }
     }
 }
 
-/// How it ended.
+/// The end of a run.
 struct Outcome {
     result: Result<MapReport, Failure>,
     held: Snapshot,
@@ -288,7 +288,7 @@ fn is_write(frame: &Frame) -> bool {
     frame.id() == CanId::sdo_request(node()) && frame.data().first().is_some_and(|command| command >> 5 == 1)
 }
 
-/// What the device's own memory holds: COB-ID, transmission type, event timer, mapping.
+/// The settings in the memory of the device: COB-ID, transmission type, event timer, mapping.
 #[derive(Debug, PartialEq, Eq)]
 struct Snapshot(u32, u32, u32, Vec<u32>);
 
@@ -304,87 +304,87 @@ fn held(bus: &mut MemoryBus) -> Snapshot {
     Snapshot(number(0x1800, 1), number(0x1800, 2), number(0x1800, 5), mapping)
 }
 
-/// That what is said is what the device holds.
-fn check(case: &Case, start: bool, mishap: Mishap, at: usize, old: &Snapshot, well: &Outcome) {
-    let outcome = case.run(start, mishap, at);
+/// Checks that the report agrees with the memory of the device.
+fn check(case: &Case, start: bool, fault: Fault, at: usize, old: &Snapshot, well: &Outcome) {
+    let outcome = case.run(start, fault, at);
     let (sent, took) = (outcome.writes(), outcome.took);
     let Outcome { result, held, state, .. } = outcome;
     let new = &well.held;
-    let what = format!("{} (started: {start}), {mishap:?} at {at}: {result:?}\n{held:X?}", case.device);
+    let what = format!("{} (started: {start}), {fault:?} at {at}: {result:?}\n{held:X?}", case.device);
     match &result {
         Ok(_) => assert_eq!(&held, new, "{what}"),
         Err(failure) => {
             let message = &ErrorMessage::of(failure).message;
-            let said_to_be_half =
+            let is_reported_partial =
                 message.contains("is only partly changed") || message.contains("it is unknown whether");
-            if said_to_be_half {
-                assert!(matches!(mishap, Mishap::Gone | Mishap::Stubborn(_)), "it could have been restored: {what}");
+            if is_reported_partial {
+                assert!(matches!(fault, Fault::Gone | Fault::Stubborn(_)), "it could have been restored: {what}");
                 let hint = ErrorMessage::of(failure).hint.unwrap_or_default();
                 assert!(hint.starts_with("when it answers again: cangauge "), "{what}");
             } else {
                 assert_eq!(&held, old, "{what}");
             }
-            if matches!(mishap, Mishap::Interrupt | Mishap::InterruptTwice) {
+            if matches!(fault, Fault::Interrupt | Fault::InterruptTwice) {
                 assert_eq!(failure.kind(), Kind::Interrupted, "{what}");
             }
         }
     }
-    // Neither a text in segments nor an NMT command is sent again.
-    let asked = at >= well.sent.iter().position(is_read_back).unwrap() && well.sent[at].id() != CanId::NMT;
-    match mishap {
-        // What is lost is asked for again; a write that has arrived is not sent again.
-        Mishap::LoseRequest | Mishap::LoseAnswer if !asked => {}
-        Mishap::LoseRequest => assert!(result.is_ok(), "{what}"),
-        Mishap::LoseAnswer => assert_eq!((result.is_ok(), sent), (true, well.writes()), "{what}"),
-        // Nothing is waited for in vain.
-        Mishap::Interrupt | Mishap::InterruptTwice => assert!(took < well.took + TIMEOUT, "{took:?}: {what}"),
+    // A segmented text is not read again, and an NMT command is not repeated.
+    let can_repeat = at >= well.sent.iter().position(is_read_back).unwrap() && well.sent[at].id() != CanId::NMT;
+    match fault {
+        // A lost request or answer is repeated. A write that has arrived is not sent again.
+        Fault::LoseRequest | Fault::LoseAnswer if !can_repeat => {}
+        Fault::LoseRequest => assert!(result.is_ok(), "{what}"),
+        Fault::LoseAnswer => assert_eq!((result.is_ok(), sent), (true, well.writes()), "{what}"),
+        // Ctrl-C ends the command without further time-outs.
+        Fault::Interrupt | Fault::InterruptTwice => assert!(took < well.took + TIMEOUT, "{took:?}: {what}"),
         _ => {}
     }
-    // Who is left half changed is started by what mends it.
-    let half = matches!(mishap, Mishap::Gone | Mishap::Stubborn(_));
-    if !half && !matches!(mishap, Mishap::ResetBefore | Mishap::ResetAfter) {
+    // The recovery command starts a device that is only partly changed.
+    let is_partial = matches!(fault, Fault::Gone | Fault::Stubborn(_));
+    if !is_partial && !matches!(fault, Fault::ResetBefore | Fault::ResetAfter) {
         let before = if start { State::Operational } else { State::PreOperational };
-        // An unknown state is not guessed, and a lost NMT command is not repeated: a note says so.
+        // If the state is unknown or the NMT command was lost, a note reports it.
         let words = ["previous state is unknown", "was operational before and is", "without confirmation"];
-        let says = |message: &String| words.iter().any(|words| message.contains(words));
-        let told = match &result {
-            Ok(mapped) => mapped.notes.iter().any(|told| says(&note(told).message)),
-            Err(failure) => says(&ErrorMessage::of(failure).message),
+        let reports_state = |message: &String| words.iter().any(|words| message.contains(words));
+        let has_note = match &result {
+            Ok(mapped) => mapped.notes.iter().any(|fact| reports_state(&note(fact).message)),
+            Err(failure) => reports_state(&ErrorMessage::of(failure).message),
         };
-        assert!(told || state == Some(before), "{state:?}: {what}");
+        assert!(has_note || state == Some(before), "{state:?}: {what}");
     }
 }
 
 /// A TPDO that moves to another identifier.
 const MOVED: Case = Case { cob_id: Some(0x3a5), ..CASES[4] };
 
-/// Runs every case with mishaps at every frame.
-fn everywhere(mishaps: &[Mishap]) {
+/// Runs each case with each fault at each frame.
+fn at_each_frame(faults: &[Fault]) {
     for (number, case) in CASES.iter().chain([&MOVED]).enumerate() {
         let starts: &[bool] = if number < 2 { &[false, true] } else { &[true] };
         for &start in starts {
             let old = held(&mut case.bus(start));
-            let well = case.run(start, Mishap::None, 0);
+            let well = case.run(start, Fault::None, 0);
             assert!(well.result.as_ref().is_ok_and(|mapped| mapped.writes > 0), "{}", case.device);
             assert_ne!(old, well.held);
-            // Finding out what the device is goes alike everywhere: twice is enough.
+            // All cases identify the device in the same way: testing it in two cases is enough.
             let first = well.sent.iter().position(is_read_back).unwrap();
             let begin = if number < 2 { 0 } else { first };
-            for &mishap in mishaps {
+            for &fault in faults {
                 for at in begin..well.sent.len() {
-                    if matches!(mishap, Mishap::Pretend | Mishap::Stubborn(_)) && !is_write(&well.sent[at]) {
+                    if matches!(fault, Fault::Pretend | Fault::Stubborn(_)) && !is_write(&well.sent[at]) {
                         continue;
                     }
-                    // The scan for a free identifier asks who is not there, twice each.
+                    // The scan for a free identifier repeats its request to each absent node anyway.
                     if case.cob_id.is_some() && is_scan(&well.sent[at]) {
                         continue;
                     }
-                    // Who is reset when everything is done is reset by somebody else.
+                    // A reset after the last check is not noticed.
                     let last = well.sent.iter().rposition(is_read_back).unwrap();
-                    if mishap == Mishap::ResetAfter && at >= last || mishap == Mishap::ResetBefore && at > last {
+                    if fault == Fault::ResetAfter && at >= last || fault == Fault::ResetBefore && at > last {
                         continue;
                     }
-                    check(case, start, mishap, at, &old, &well);
+                    check(case, start, fault, at, &old, &well);
                 }
             }
         }
@@ -401,44 +401,44 @@ fn is_scan(frame: &Frame) -> bool {
 }
 
 #[test]
-fn a_frame_that_is_lost() {
-    everywhere(&[Mishap::LoseRequest, Mishap::LoseAnswer]);
+fn lost_frame_at_each_step() {
+    at_each_frame(&[Fault::LoseRequest, Fault::LoseAnswer]);
 }
 
 #[test]
-fn a_refusal_of_every_step() {
-    everywhere(&[Mishap::Refuse(0x0800_0000), Mishap::Refuse(0x0609_0030), Mishap::Refuse(0x0800_0022)]);
+fn rejection_at_each_step() {
+    at_each_frame(&[Fault::Refuse(0x0800_0000), Fault::Refuse(0x0609_0030), Fault::Refuse(0x0800_0022)]);
 }
 
 #[test]
-fn an_acknowledge_without_the_deed_at_every_step() {
-    everywhere(&[Mishap::Pretend, Mishap::Stubborn(0x0609_0030)]);
+fn acknowledge_without_effect_at_each_step() {
+    at_each_frame(&[Fault::Pretend, Fault::Stubborn(0x0609_0030)]);
 }
 
 #[test]
-fn ctrl_c_at_every_step() {
-    everywhere(&[Mishap::Interrupt, Mishap::InterruptTwice]);
+fn ctrl_c_at_each_step() {
+    at_each_frame(&[Fault::Interrupt, Fault::InterruptTwice]);
 }
 
 #[test]
 fn a_reset_at_every_step() {
-    everywhere(&[Mishap::ResetBefore, Mishap::ResetAfter]);
+    at_each_frame(&[Fault::ResetBefore, Fault::ResetAfter]);
 }
 
 #[test]
 fn a_broken_wire_at_every_step() {
-    everywhere(&[Mishap::Away(Duration::from_millis(700)), Mishap::Away(Duration::from_secs(4))]);
+    at_each_frame(&[Fault::Away(Duration::from_millis(700)), Fault::Away(Duration::from_secs(4))]);
 }
 
 #[test]
 fn a_device_that_is_gone_at_every_step() {
-    everywhere(&[Mishap::Gone]);
+    at_each_frame(&[Fault::Gone]);
 }
 
 #[test]
 fn the_right_steps_in_the_right_order() {
     let writes = |case: &Case, start| {
-        let sent = case.run(start, Mishap::None, 0).sent;
+        let sent = case.run(start, Fault::None, 0).sent;
         let is_step = |frame: &&Frame| is_write(frame) || frame.id() == CanId::NMT;
         sent.iter().filter(is_step).map(|frame| frame.to_string()).collect::<Vec<_>>()
     };

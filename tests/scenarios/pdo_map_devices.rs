@@ -1,5 +1,5 @@
-//! `pdo map` on devices unlike the four: no bit 31, a fixed mapping, an inhibit time, a TPDO without an
-//! identifier, an object of unknown width.
+//! `pdo map` on devices that differ from the four simulated ones: bit 31 is rejected, the mapping is fixed, there is an
+//! inhibit time, a TPDO has no identifier, the width of an object is unknown.
 
 use cangauge::bus::memory::{Clock, MemoryBus};
 use cangauge::canopen::id::NodeId;
@@ -15,13 +15,13 @@ use cangauge::tasks::{Failure, Kind};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A transmitter with one channel; what stands at 1800h and 1A00h follows, and above it how it is remapped.
+/// A transmitter with one channel. `pdo` is its remapping method, `parameters` are its objects 1800h and 1A00h.
 fn description(pdo: &str, parameters: &str) -> Arc<Model> {
     let text = format!(
         r#"
         name = "other"
         title = "a device of the tests"
-        vendor = "nobody"
+        vendor = "none"
         source = "none"
         identify = {{ device_type = 0x00020194 }}
         {pdo}
@@ -43,7 +43,7 @@ fn parameter(at: &str, data_type: &str, more: &str) -> String {
     format!("{{ at = \"{at}\", name = \"p{name}\", type = \"{data_type}\", access = \"rw\", {more} }},\n")
 }
 
-/// The usual parameters, `cob_id` with its limits.
+/// The usual parameters. `cob_id` has the default and the limits of the COB-ID.
 fn parameters(cob_id: &str) -> String {
     [
         parameter("0x1800:1", "u32", cob_id),
@@ -91,7 +91,7 @@ impl Bench {
         Bench { bus, model }
     }
 
-    /// Maps, with the description at hand or without.
+    /// Maps, with or without the description.
     fn map(&mut self, request: &PdoRequest, described: bool) -> Result<MapReport, Failure> {
         let given = described.then(|| (node(), Arc::clone(&self.model)));
         let overrides: BTreeMap<_, _> = given.into_iter().collect();
@@ -111,7 +111,7 @@ impl Bench {
 }
 
 #[test]
-fn a_device_that_takes_no_bit_31_is_mapped_without_it() {
+fn device_that_rejects_bit_31_is_mapped_without_it() {
     let refuses_31 = parameters("default = \"$NODEID+0x180\", allow = [\"0-0x7FFFFFFF\"]");
     let mut bench = Bench::new(description("pdo = { remap = \"count-only\" }", &refuses_31));
     let mapped = bench.map(&request(&["ch1", "ch1.status"]), false).unwrap();
@@ -119,12 +119,12 @@ fn a_device_that_takes_no_bit_31_is_mapped_without_it() {
     let warning = "write 0x1800:1: refused by the device (0x06090030, value outside its range): TPDO1 was changed while \
                    it was on";
     assert_eq!(note(&mapped.notes[0]).message, warning);
-    // It has neither heartbeat nor guarding: what nothing told is not guessed.
+    // The device has neither heartbeat nor guarding, so its state is unknown and is not guessed.
     let message = note(&mapped.notes[1]).message;
     assert!(message.contains("previous state is unknown, so it stays there"), "{message}");
     assert_eq!((bench.number("1A00:0"), bench.number("1A00:2")), (2, 0x6150_0108));
     assert_eq!(bench.state(), Some(State::PreOperational));
-    // Of a device whose description says that it takes bit 31, a refusal is one.
+    // If the description says that the device accepts bit 31, a rejection is an error.
     let mut bench = Bench::new(description("", &refuses_31));
     let failure = bench.map(&request(&["ch1", "ch1.status"]), true).unwrap_err();
     assert_eq!((failure.kind(), bench.number("1A00:0")), (Kind::Refused, 1));
@@ -132,7 +132,7 @@ fn a_device_that_takes_no_bit_31_is_mapped_without_it() {
 }
 
 #[test]
-fn a_fixed_mapping_is_as_wanted_or_cannot_be() {
+fn fixed_mapping_accepts_only_itself() {
     let fixed = parameters("default = \"$NODEID+0x40000180\"");
     let fixed = fixed
         .lines()
@@ -153,14 +153,14 @@ fn a_fixed_mapping_is_as_wanted_or_cannot_be() {
             assert_eq!(ErrorMessage::of(&failure).message, message);
         }
         assert_eq!(bench.number("1800:1"), 0x4000_0189);
-        // What is not fixed can be set all the same.
+        // Parameters that are not fixed can still be set.
         let mapped = bench.map(&PdoRequest { trigger: Some(Trigger::Code(1)), ..request(&[]) }, described).unwrap();
         assert_eq!((mapped.writes, bench.number("1800:2")), (1, 1));
     }
 }
 
 #[test]
-fn the_inhibit_time_is_written_while_the_pdo_is_off() {
+fn inhibit_time_is_written_while_the_pdo_is_off() {
     let mut bench = Bench::new(description("", &parameters("default = \"$NODEID+0x180\"")));
     let inhibited = PdoRequest { inhibit_100us: Some(25), ..request(&[]) };
     assert_eq!(bench.map(&inhibited, false).unwrap().writes, 3);
@@ -169,7 +169,7 @@ fn the_inhibit_time_is_written_while_the_pdo_is_off() {
 }
 
 #[test]
-fn a_tpdo_without_an_identifier_is_not_switched_on() {
+fn tpdo_without_identifier_is_not_switched_on() {
     let mut bench = Bench::new(description("", &parameters("default = 0x80000000")));
     let failure = bench.map(&request(&["ch1.status"]), false).unwrap_err();
     assert_eq!(
@@ -177,7 +177,7 @@ fn a_tpdo_without_an_identifier_is_not_switched_on() {
         (Kind::Usage, "node 9: TPDO1 has no identifier yet (0x000)")
     );
     assert_eq!((bench.number("1A00:1"), bench.number("1800:1")), (0x6130_0120, 0x8000_0000));
-    // Parameters alone leave it off; with an identifier of its own it comes on.
+    // Parameters alone leave the TPDO off. With --cob-id it is switched on.
     bench.map(&PdoRequest { event_timer_ms: Some(20), ..request(&[]) }, false).unwrap();
     assert_eq!((bench.number("1800:5"), bench.number("1800:1")), (20, 0x8000_0000));
     let mapped = bench.map(&PdoRequest { cob_id: Some(0x3a5), ..request(&["ch1.status"]) }, false).unwrap();
@@ -185,7 +185,7 @@ fn a_tpdo_without_an_identifier_is_not_switched_on() {
 }
 
 #[test]
-fn the_device_is_asked_for_a_width_that_nothing_tells() {
+fn unknown_width_is_read_from_the_device() {
     let mut bench = Bench::new(description("", &parameters("default = \"$NODEID+0x180\"")));
     bench.map(&request(&["0x2000", "ch1"]), false).unwrap();
     assert_eq!((bench.number("1A00:1"), bench.number("1A00:2")), (0x2000_0010, 0x6130_0120));

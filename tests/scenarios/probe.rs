@@ -1,4 +1,4 @@
-//! A state that is found out by switching the heartbeat on for a moment: whenever it is interrupted, 1017h is put back.
+//! `nmt state --probe` switches the heartbeat on for a moment. Ctrl-C at any time restores 1017h.
 
 use cangauge::bus::Mono;
 use cangauge::bus::memory::{Clock, MemoryBus};
@@ -12,13 +12,12 @@ use cangauge::sim::{Device, Setup};
 use cangauge::tasks::nmt::probe;
 use std::time::Duration;
 
-/// The heartbeat time that is left of none when the user asks to stop at these moments in ms; and whether the probe
-/// ended so.
-fn left(interrupts: &[u64]) -> (Vec<u8>, bool) {
-    left_of(0, interrupts)
+/// The heartbeat time after a probe with Ctrl-C at these times in ms, and whether the probe was interrupted.
+fn after_probe(interrupts: &[u64]) -> (Vec<u8>, bool) {
+    after_probe_with(0, interrupts)
 }
 
-fn left_of(before: i64, interrupts: &[u64]) -> (Vec<u8>, bool) {
+fn after_probe_with(before: i64, interrupts: &[u64]) -> (Vec<u8>, bool) {
     let node = NodeId::new(5).expect("a node-ID");
     let mut setup = Setup::new(catalog::by_name("mh4").expect("built in"), node);
     setup.oddities.latency = Duration::from_millis(40);
@@ -40,13 +39,13 @@ fn left_of(before: i64, interrupts: &[u64]) -> (Vec<u8>, bool) {
 }
 
 #[test]
-fn the_heartbeat_is_put_back_whenever_it_is_interrupted() {
-    // A request and its answer take 42 ms; once the heartbeat has come, nothing is left to be interrupted.
+fn ctrl_c_at_any_time_restores_the_heartbeat() {
+    // A request and its answer take 42 ms. After the heartbeat, the probe cannot be interrupted any more.
     for at in 1..180 {
-        assert_eq!(left(&[at]), (vec![0, 0], at < 142), "interrupted at {at} ms");
-        assert_eq!(left(&[at, at + 9, at + 30]).0, [0, 0], "three times from {at} ms");
+        assert_eq!(after_probe(&[at]), (vec![0, 0], at < 142), "interrupted at {at} ms");
+        assert_eq!(after_probe(&[at, at + 9, at + 30]).0, [0, 0], "three times from {at} ms");
     }
-    assert_eq!(left(&[]), (vec![0, 0], false));
-    // One that is too slow to be waited for.
-    assert_eq!(left_of(10_000, &[]), (10_000u16.to_le_bytes().to_vec(), false));
+    assert_eq!(after_probe(&[]), (vec![0, 0], false));
+    // The node already has a heartbeat, but it is too slow to wait for.
+    assert_eq!(after_probe_with(10_000, &[]), (10_000u16.to_le_bytes().to_vec(), false));
 }

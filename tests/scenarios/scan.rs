@@ -1,4 +1,4 @@
-//! How long a scan takes, and whom it finds.
+//! The duration of a scan, and the nodes that it finds.
 
 use cangauge::bus::Bus;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
@@ -19,11 +19,11 @@ fn ids(nodes: impl IntoIterator<Item = u8>) -> Vec<NodeId> {
     nodes.into_iter().map(|node| NodeId::new(node).unwrap()).collect()
 }
 
-/// What is found, and how long it took.
+/// The nodes found, and the duration.
 fn scanned(bus: &mut MemoryBus, nodes: &[NodeId], wait: Duration) -> (Vec<Found>, Duration) {
-    let begun = bus.now().mono;
+    let start = bus.now().mono;
     let found = scan(&mut Master::new(bus, Timing::default()), nodes, wait, 2, &Default::default()).unwrap();
-    (found, bus.now().mono.since(begun))
+    (found, bus.now().mono.since(start))
 }
 
 fn bench(devices: &str) -> MemoryBus {
@@ -31,21 +31,21 @@ fn bench(devices: &str) -> MemoryBus {
 }
 
 #[test]
-fn when_all_that_were_named_have_answered_nothing_more_is_waited_for() {
+fn scan_ends_when_all_requested_nodes_have_answered() {
     let mut bus = bench("[[device]]\nkind = \"mh4\"\nnode = 5\n");
     for wait in [WAIT, Duration::from_secs(60)] {
         let (found, took) = scanned(&mut bus, &ids([5]), wait);
         assert_eq!(found.len(), 1);
         assert!(took < Duration::from_millis(300), "{took:?}");
     }
-    // The silent ones are waited for twice: once shortly, once as long as was asked for.
+    // Silent nodes are asked twice: the first wait is short, the second is the time-out.
     let (found, took) = scanned(&mut bus, &ids(1..=127), WAIT);
     assert_eq!(found.len(), 1);
     assert!((WAIT..WAIT * 3).contains(&took), "{took:?}");
 }
 
 #[test]
-fn heartbeats_tell_states() {
+fn state_comes_from_the_heartbeat() {
     let mut bus = bench("[[device]]\nkind = \"mh4\"\nnode = 5\nset = { \"0x1017\" = 150 }\n");
     let (found, took) = scanned(&mut bus, &ids([5]), WAIT);
     assert_eq!(found[0].state, Some(NmtState::PreOperational));
@@ -87,13 +87,13 @@ impl Station for Late {
 }
 
 #[test]
-fn who_is_switched_on_in_the_middle_is_asked_all_the_same() {
+fn node_switched_on_during_the_scan_is_found() {
     for millis in [1, 30, 100, 200, 240] {
         let device = Device::new(Setup::new(by_name("mh4").unwrap(), NodeId::new(5).unwrap())).unwrap();
         let mut bus = MemoryBus::new(Clock::Virtual);
         bus.attach(Late { device, at: Mono::at(Duration::from_millis(millis)), is_on: false });
         let (found, _) = scanned(&mut bus, &ids(1..=127), WAIT);
-        let names: Vec<_> = found.iter().map(|found| found.instrument.identity.name.as_deref()).collect();
+        let names: Vec<_> = found.iter().map(|found| found.device.identity.name.as_deref()).collect();
         assert_eq!(names, [Some("MH-4-CAN")], "switched on after {millis} ms");
     }
 }

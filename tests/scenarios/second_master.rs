@@ -1,4 +1,4 @@
-//! Another master that reads the same nodes, on the same SDO channels.
+//! Another master reads the same nodes on the same SDO channels.
 
 use cangauge::bus::Mono;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
@@ -21,7 +21,7 @@ fn device() -> Device {
     let description = r#"
         name = "two-masters"
         title = "a device of the tests"
-        vendor = "nobody"
+        vendor = "none"
         source = "none"
         identify = { device_type = 0x00020194 }
         object = [
@@ -36,32 +36,32 @@ fn device() -> Device {
     Device::new(Setup::new(model, NodeId::new(5).unwrap())).unwrap()
 }
 
-/// Reads objects one after the other, again and again, with a pause before every frame.
+/// Reads objects in a loop, with a pause before each frame.
 struct Rival {
     objects: Vec<ObjectId>,
     at: usize,
     toggle: u8,
     pause: Duration,
-    /// What to send, and when.
+    /// The next frame, and its time.
     next: Option<(Mono, [u8; 8])>,
-    /// When the device is taken for silent.
-    patience: Mono,
+    /// When the read times out.
+    deadline: Mono,
     read: usize,
 }
 
-const PATIENCE: Duration = Duration::from_millis(100);
+const SDO_TIMEOUT: Duration = Duration::from_millis(100);
 
 impl Rival {
     fn new(objects: &[ObjectId], start: Duration, pause: Duration) -> Rival {
         let mut rival =
-            Rival { objects: objects.to_vec(), at: 0, toggle: 0, pause, next: None, patience: Mono::START, read: 0 };
+            Rival { objects: objects.to_vec(), at: 0, toggle: 0, pause, next: None, deadline: Mono::START, read: 0 };
         rival.begin(Mono::START + start);
         rival
     }
 
     fn plan(&mut self, now: Mono, data: [u8; 8]) {
         self.next = Some((now + self.pause, data));
-        self.patience = now + self.pause + PATIENCE;
+        self.deadline = now + self.pause + SDO_TIMEOUT;
     }
 
     fn begin(&mut self, now: Mono) {
@@ -101,13 +101,13 @@ impl Station for Rival {
                 self.next = None;
             }
             Some(_) => {}
-            None if self.patience <= now => self.following(now),
+            None if self.deadline <= now => self.following(now),
             None => {}
         }
     }
 
     fn next_wake(&self) -> Option<Mono> {
-        Some(self.next.map_or(self.patience, |(at, _)| at))
+        Some(self.next.map_or(self.deadline, |(at, _)| at))
     }
 
     fn sent(&mut self, _: Mono, _: &Frame) {}
@@ -124,7 +124,7 @@ fn read(object: ObjectId) -> Request {
     Request::read(NodeId::new(5).unwrap(), object)
 }
 
-/// What is read, as text; of an error what it is called.
+/// The bytes that are read, or the failure.
 fn outcome(master: &mut Master<'_>, request: Request) -> Result<Vec<u8>, SdoFailure> {
     let answer = master.transfer_one(request).unwrap();
     answer
@@ -133,7 +133,7 @@ fn outcome(master: &mut Master<'_>, request: Request) -> Result<Vec<u8>, SdoFail
 }
 
 #[test]
-fn whatever_the_other_reads_and_when_ours_is_what_the_device_holds() {
+fn reads_are_correct_although_another_master_reads_too() {
     let (mut clean, mut disturbed, mut others) = (0, 0, 0);
     for objects in [&[NUMBER][..], &[NAME], &[TEXT], &[NUMBER, TEXT, NUMBER, NAME]] {
         for start in (0..4000).step_by(130) {
@@ -147,7 +147,7 @@ fn whatever_the_other_reads_and_when_ours_is_what_the_device_holds() {
                         (NAME, Ok(bytes)) => assert_eq!(bytes, b"a name of some segments"),
                         (_, Ok(bytes)) => assert_eq!(bytes, b"THE TEXT, OF THE SAME L"),
                         (object, Err(error)) => {
-                            // Whoever leaves no room for anybody is named.
+                            // If the other master leaves no time, the read fails and the reason is reported.
                             assert_eq!((error, object == NUMBER), (SdoFailure::Disturbed, false));
                             disturbed += 1;
                             continue;
@@ -162,12 +162,12 @@ fn whatever_the_other_reads_and_when_ours_is_what_the_device_holds() {
     }
     assert!(
         disturbed * 10 < clean && others > clean / 10,
-        "{clean} came through, {disturbed} never, {others} of theirs"
+        "{clean} reads succeeded, {disturbed} failed, the other master made {others}"
     );
 }
 
 #[test]
-fn what_is_written_in_segments_is_written_whole() {
+fn segmented_write_is_complete_or_fails() {
     let setting = b"a setting of several segments";
     for start in (0..6000).step_by(170) {
         let mut bus = bus(Rival::new(&[NUMBER, TEXT], Duration::from_micros(start), Duration::from_micros(700)));

@@ -1,4 +1,4 @@
-//! Settings while single frames are lost, doubled and late: whatever is reported as done, the device holds.
+//! Settings while single frames are lost, doubled or delayed. A change that is reported as done is in the device.
 
 use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
@@ -26,20 +26,20 @@ fn node() -> NodeId {
     NodeId::new(5).expect("a node-ID")
 }
 
-/// What is done, and what the device must then hold.
-struct Deed {
+/// A change of settings, and the values that the device must then have.
+struct Change {
     name: &'static str,
     run: fn(&mut Master<'_>, &mut Node) -> Result<(), Failure>,
     held: &'static [(u16, u8, DataType, Value)],
 }
 
-const DEEDS: [Deed; 4] = [
-    Deed {
+const CHANGES: [Change; 4] = [
+    Change {
         name: "unit",
         run: |master, device| unit::set(master, device, Some("pressure"), PSI).map(|_| ()),
         held: &[(0x6131, 1, DataType::Unsigned(4), Value::Unsigned(0x00ab_0000))],
     },
-    Deed {
+    Change {
         name: "filter",
         run: |master, device| {
             let wanted = FilterRequest { kind: Some(FilterType::Moving), constant: Some(8), damping: None };
@@ -50,7 +50,7 @@ const DEEDS: [Deed; 4] = [
             (0x61a1, 1, DataType::Unsigned(2), Value::Unsigned(8)),
         ],
     },
-    Deed {
+    Change {
         name: "limits",
         run: |master, device| {
             let wanted = [(Limit::Lower, 12.0), (Limit::Upper, 14.0)];
@@ -58,7 +58,7 @@ const DEEDS: [Deed; 4] = [
         },
         held: &[(0x6134, 1, DataType::Real32, Value::Real32(12.0)), (0x6135, 1, DataType::Real32, Value::Real32(14.0))],
     },
-    Deed {
+    Change {
         name: "errors",
         run: |master, device| errors::clear(master, device).map(|_| ()),
         held: &[(0x1003, 0, DataType::Unsigned(1), Value::Unsigned(0))],
@@ -75,33 +75,33 @@ fn bus(plan: FaultPlan) -> Faulty<MemoryBus> {
     Faulty::new(bus, plan)
 }
 
-/// Does it, and tells how it ended; what is reported as done is held.
-fn run(deed: &Deed, plan: FaultPlan, retries: u32) -> Result<(), Failure> {
-    let told = format!("{} {plan:?}", deed.name);
+/// Makes a change with these faults. If it succeeds, checks the values in the device.
+fn run(change: &Change, plan: FaultPlan, retries: u32) -> Result<(), Failure> {
+    let context = format!("{} {plan:?}", change.name);
     let mut bus = bus(plan);
     let mut master = Master::new(&mut bus, Timing { timeout: Duration::from_millis(100), retries });
     let result = settings::open(&mut master, node(), &BTreeMap::new())
-        .and_then(|mut device| (deed.run)(&mut master, &mut device));
+        .and_then(|mut device| (change.run)(&mut master, &mut device));
     let late = master.now() + Duration::from_secs(2);
     while master.now() < late {
         master.next(late).expect("the bus works");
     }
     if result.is_ok() {
-        for (index, sub, data_type, value) in deed.held {
+        for (index, sub, data_type, value) in change.held {
             let object = ObjectId::new(*index, *sub);
             let found = master.read(node(), object, *data_type).expect("the bus works");
-            // A frame of the plan may lie in this reading; then it is asked once more.
+            // A fault of the plan may hit this read: read again.
             let found = found.or_else(|_| master.read(node(), object, *data_type).expect("the bus works"));
-            assert_eq!(found.as_ref(), Ok(value), "{told}: {object}");
+            assert_eq!(found.as_ref(), Ok(value), "{context}: {object}");
         }
     }
     result
 }
 
-/// With one repeat it succeeds, unless the fault lies in the device's name: segments are not repeated.
-fn succeeds(deed: &Deed, plan: FaultPlan) {
-    if let Err(failure) = run(deed, plan, 1) {
-        assert!(in_the_name(&failure), "{}: {failure}", deed.name);
+/// With one retry the change succeeds, unless the fault hits the device name: segments are not repeated.
+fn succeeds(change: &Change, plan: FaultPlan) {
+    if let Err(failure) = run(change, plan, 1) {
+        assert!(in_the_name(&failure), "{}: {failure}", change.name);
     }
 }
 
@@ -109,36 +109,36 @@ fn in_the_name(failure: &Failure) -> bool {
     failure.object == Some(ObjectId::new(0x1008, 0))
 }
 
-/// Plans that hit one frame each, until one lies behind the end.
-fn each(make: impl Fn(u64) -> FaultPlan, mut judge: impl FnMut(&Deed, FaultPlan)) {
-    for deed in &DEEDS {
+/// Runs each change with a fault at each frame in turn.
+fn each(make: impl Fn(u64) -> FaultPlan, mut test: impl FnMut(&Change, FaultPlan)) {
+    for change in &CHANGES {
         for number in 25..75 {
-            judge(deed, make(number));
+            test(change, make(number));
         }
     }
 }
 
 #[test]
-fn undisturbed_they_all_succeed() {
-    for deed in &DEEDS {
-        run(deed, FaultPlan::default(), 0).expect(deed.name);
+fn changes_succeed_without_faults() {
+    for change in &CHANGES {
+        run(change, FaultPlan::default(), 0).expect(change.name);
     }
 }
 
 #[test]
-fn a_lost_frame_is_asked_for_again() {
+fn lost_frame_is_requested_again() {
     each(|number| FaultPlan { lose: [number].into(), ..FaultPlan::default() }, succeeds);
     each(|number| FaultPlan { lose_sent: [number].into(), ..FaultPlan::default() }, succeeds);
 }
 
 #[test]
-fn without_repeats_silence_is_no_success() {
+fn without_retries_a_lost_answer_is_an_error() {
     let mut failed = 0;
     each(
         |number| FaultPlan { lose: [number].into(), ..FaultPlan::default() },
-        |deed, plan| {
-            if let Err(failure) = run(deed, plan, 0) {
-                assert_eq!(failure.kind(), Kind::NoAnswer, "{}: {failure}", deed.name);
+        |change, plan| {
+            if let Err(failure) = run(change, plan, 0) {
+                assert_eq!(failure.kind(), Kind::NoAnswer, "{}: {failure}", change.name);
                 failed += 1;
             }
         },
@@ -147,35 +147,35 @@ fn without_repeats_silence_is_no_success() {
 }
 
 #[test]
-fn doubled_and_late_frames_are_no_answers_to_something_else() {
+fn doubled_and_late_frames_do_not_answer_another_request() {
     each(
         |number| FaultPlan { duplicate: [number].into(), ..FaultPlan::default() },
-        |deed, plan| {
-            // The acknowledge of a write that comes twice is taken for a wrong answer to the reading behind it.
-            if let Err(failure) = run(deed, plan, 1) {
-                assert_eq!(failure.kind(), Kind::Unexpected, "{}: {failure}", deed.name);
+        |change, plan| {
+            // The second acknowledge of a write looks like a wrong answer to the next read.
+            if let Err(failure) = run(change, plan, 1) {
+                assert_eq!(failure.kind(), Kind::Unexpected, "{}: {failure}", change.name);
             }
         },
     );
     each(
         |number| FaultPlan { delay: [(number, Duration::from_millis(150))].into(), ..FaultPlan::default() },
-        |deed, plan| {
-            if let Err(failure) = run(deed, plan, 1)
+        |change, plan| {
+            if let Err(failure) = run(change, plan, 1)
                 && !in_the_name(&failure)
             {
-                assert_eq!(failure.kind(), Kind::NoAnswer, "{}: {failure}", deed.name);
+                assert_eq!(failure.kind(), Kind::NoAnswer, "{}: {failure}", change.name);
             }
         },
     );
 }
 
 #[test]
-fn the_signature_of_a_reset_is_sent_once_and_its_silence_is_looked_into() {
+fn minmax_signature_is_sent_once_and_its_effect_is_read_back() {
     let reset = |plan: FaultPlan| {
         let mut bus = bus(plan);
         let mut master = Master::new(&mut bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
         let device = settings::open(&mut master, node(), &BTreeMap::new())?;
-        // Something to forget.
+        // Let the device measure a minimum and a maximum.
         for _ in 0..5 {
             minmax::show(&mut master, &device)?;
         }
@@ -184,24 +184,24 @@ fn the_signature_of_a_reset_is_sent_once_and_its_silence_is_looked_into() {
     assert_eq!(reset(FaultPlan::default()).unwrap().len(), 2);
     let mut lost = 0;
     for number in 40..110 {
-        // The answer is lost: what the device reads then shows that it has been reset.
+        // The answer is lost: the values that are read afterwards prove the reset.
         if let Err(failure) = reset(FaultPlan { lose: [number].into(), ..FaultPlan::default() }) {
             assert!(in_the_name(&failure), "answer {number}: {failure}");
         }
-        // The request is lost: nothing has been reset, and that is no success.
+        // The request is lost: nothing was reset, which is an error.
         if let Err(failure) = reset(FaultPlan { lose_sent: [number].into(), ..FaultPlan::default() }) {
             assert_eq!(failure.kind(), Kind::NoAnswer, "request {number}: {failure}");
             assert!(in_the_name(&failure) || ErrorMessage::of(&failure).message.contains("write 0x2022"), "{failure}");
             lost += u32::from(!in_the_name(&failure));
         }
     }
-    assert!((1..=2).contains(&lost), "one request a channel: {lost}");
+    assert!((1..=2).contains(&lost), "one request for each channel: {lost}");
 }
 
-/// A device that acknowledges every write and keeps nothing.
-struct Deaf;
+/// A device that acknowledges each write without executing it.
+struct WriteIgnoring;
 
-impl Station for Deaf {
+impl Station for WriteIgnoring {
     fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
 
     fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
@@ -233,33 +233,33 @@ impl Station for Deaf {
 }
 
 #[test]
-fn an_acknowledge_is_no_proof() {
-    let refused = |deed: fn(&mut Master<'_>, &mut Node) -> Result<(), Failure>| {
+fn acknowledged_write_is_read_back() {
+    let rejected = |change: fn(&mut Master<'_>, &mut Node) -> Result<(), Failure>| {
         let mut bus = MemoryBus::new(Clock::Virtual);
-        bus.attach(Deaf);
+        bus.attach(WriteIgnoring);
         let mut master = Master::new(&mut bus, Timing::default());
         let mut device = settings::open(&mut master, node(), &BTreeMap::new()).expect("it answers");
-        let failure = deed(&mut master, &mut device).expect_err("nothing is kept");
+        let failure = change(&mut master, &mut device).expect_err("the write has no effect");
         assert_eq!(failure.kind(), Kind::Unexpected, "{failure}");
         ErrorMessage::of(&failure).message
     };
     assert_eq!(
-        refused(|master, device| unit::set(master, device, None, PSI).map(|_| ())),
+        rejected(|master, device| unit::set(master, device, None, PSI).map(|_| ())),
         "node 5: 0x6131:1 was acknowledged and reads 5111808 instead of 11206656"
     );
     assert_eq!(
-        refused(|master, device| {
+        rejected(|master, device| {
             let wanted = FilterRequest { kind: Some(FilterType::Moving), ..FilterRequest::default() };
             filter::set(master, device, None, wanted).map(|_| ())
         }),
         "node 5: 0x61A0:1 was acknowledged and reads 0 instead of 1"
     );
     assert_eq!(
-        refused(|master, device| limits::set(master, device, "ch1", &[(Limit::Delta, 0.5)]).map(|_| ())),
+        rejected(|master, device| limits::set(master, device, "ch1", &[(Limit::Delta, 0.5)]).map(|_| ())),
         "node 5: 0x6133:1 was acknowledged and reads 0 instead of 0.5; the previous limits are set again"
     );
     assert_eq!(
-        refused(|master, device| errors::clear(master, device).map(|_| ())),
+        rejected(|master, device| errors::clear(master, device).map(|_| ())),
         "node 5: it acknowledged the write of 0x1003:0, but the history still has 1 error"
     );
 }

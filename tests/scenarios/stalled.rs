@@ -1,5 +1,5 @@
-//! A program that was stopped for a while (Ctrl-Z, a laptop that slept, a host under load) goes on as if it
-//! had been there, and makes up for nothing that cannot be made up for.
+//! A program that did not run for some time (Ctrl-Z, a suspended laptop, a busy host). It reads the frames that the kernel
+//! kept, and does not send the SYNCs that it missed.
 
 use super::Kept;
 use super::answers::Slow;
@@ -19,15 +19,15 @@ use std::ops::Range;
 use std::path::Path;
 use std::time::Duration;
 
-/// A bus whose reader is away from `from` until `until`: what comes meanwhile waits, as in the kernel.
+/// A bus whose reader does not run from `from` until `until`. Frames wait for it, as in the kernel.
 struct Stalled {
     inner: MemoryBus,
     from: Mono,
     until: Mono,
     waiting: VecDeque<Event>,
-    /// The user asks to stop meanwhile, and the kernel's times can be placed only after that.
+    /// The user presses Ctrl-C during the stall; the frames have later times than that.
     stopped: bool,
-    /// When SYNC was handed over.
+    /// The times at which SYNC was sent.
     syncs: Vec<Mono>,
 }
 
@@ -77,10 +77,10 @@ impl Bus for Stalled {
 
 fn stalled(text: &str, milliseconds: Range<u64>, stopped: bool) -> Stalled {
     let inner = Bench::from_toml(text, Path::new("")).expect("a bench").open().expect("a bus");
-    away(inner, milliseconds, stopped)
+    stall(inner, milliseconds, stopped)
 }
 
-fn away(inner: MemoryBus, milliseconds: Range<u64>, stopped: bool) -> Stalled {
+fn stall(inner: MemoryBus, milliseconds: Range<u64>, stopped: bool) -> Stalled {
     let at = |milliseconds| Mono::at(Duration::from_millis(milliseconds));
     let (from, until) = (at(milliseconds.start), at(milliseconds.end));
     Stalled { inner, from, until, waiting: VecDeque::new(), stopped, syncs: Vec::new() }
@@ -110,9 +110,9 @@ fn missed_syncs_are_omitted() {
     let syncs = bus.syncs;
     let begin = syncs[0];
     let gaps: Vec<Duration> = syncs.windows(2).map(|pair| pair[1].since(pair[0])).collect();
-    assert!(gaps.iter().all(|gap| *gap >= period / 2), "none closer together than half a period: {gaps:?}");
+    assert!(gaps.iter().all(|gap| *gap >= period / 2), "an interval is shorter than half a period: {gaps:?}");
     assert_eq!(gaps.iter().filter(|gap| **gap > period * 2).count(), 1, "one pause");
-    // What comes after it stands in the rhythm of before.
+    // After the pause, SYNC keeps its old phase.
     let off = syncs.iter().filter(|sync| sync.since(begin).as_nanos() % period.as_nanos() != 0).count();
     assert!(off <= 1, "{syncs:?}");
     assert!((149..=151).contains(&syncs.len()), "{}", syncs.len());
@@ -122,7 +122,7 @@ fn missed_syncs_are_omitted() {
 }
 
 #[test]
-fn frames_before_the_end_are_recorded_whatever_their_time() {
+fn frames_received_before_ctrl_c_are_recorded() {
     let text = "clock = \"virtual\"\n[[device]]\nkind = \"dps\"\nnode = 5\n";
     let mut bus = stalled(text, 1000..1503, true);
     let plan = plan(Mode::AsSent, Duration::from_secs(60));
@@ -130,13 +130,13 @@ fn frames_before_the_end_are_recorded_whatever_their_time() {
     let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut kept).expect("a recording");
     assert!(outcome.interrupted);
     assert_eq!(bus.waiting.len(), 0);
-    // In half a second it sends five times.
+    // The device sends five times in half a second.
     let late = kept.rows.iter().filter(|row| row.starts_with("1603000,"));
     assert!((5..=6).contains(&late.count()), "{:?}", kept.rows);
-    assert!(bus.inner.now().mono < Mono::at(Duration::from_millis(1700)), "and nothing is waited for");
+    assert!(bus.inner.now().mono < Mono::at(Duration::from_millis(1700)), "the recording ends without waiting");
 }
 
-/// What the object 2000h of node 5 reads.
+/// Reads object 2000h of node 5.
 fn read(master: &mut Master<'_>) -> Result<Option<u64>, SdoError> {
     let node = NodeId::new(5).expect("a node-ID");
     let value = master.read(node, ObjectId::new(0x2000, 0), DataType::Unsigned(4)).expect("the bus works");
@@ -144,22 +144,22 @@ fn read(master: &mut Master<'_>) -> Result<Option<u64>, SdoError> {
 }
 
 #[test]
-fn what_was_received_before_the_question_is_no_answer() {
+fn frame_received_before_the_request_is_not_its_answer() {
     let mut inner = MemoryBus::new(Clock::Virtual);
     inner.attach(Slow::new(&[1]));
     inner.attach(Other::new(&[(20, "705#05"), (30, "585#4300200063000000")]));
-    let mut bus = away(inner, 0..500, false);
+    let mut bus = stall(inner, 0..500, false);
     let mut master = Master::new(&mut bus, Timing::default());
     let first = master.next(Mono::at(Duration::from_secs(1))).expect("the bus works");
-    assert!(matches!(first, Happening::Frame(_)), "{first:?}: one waits still");
-    assert_eq!(read(&mut master).expect("an answer"), Some(1), "and not 99");
+    assert!(matches!(first, Happening::Frame(_)), "{first:?}: the answer still waits");
+    assert_eq!(read(&mut master).expect("an answer"), Some(1), "99 is the old frame");
 }
 
 #[test]
-fn an_answer_that_came_too_late_is_late_whenever_it_is_read() {
+fn late_answer_stays_late_although_it_is_read_later() {
     let mut inner = MemoryBus::new(Clock::Virtual);
     inner.attach(Slow::new(&[150]));
-    let mut bus = away(inner, 0..500, false);
+    let mut bus = stall(inner, 0..500, false);
     let timeout = Duration::from_millis(100);
     let error = read(&mut Master::new(&mut bus, Timing { timeout, retries: 0 })).expect_err("no answer in time");
     assert_eq!(error.failure, SdoFailure::NoAnswer { waited: timeout, started: false });

@@ -16,8 +16,8 @@ fn bus(test: &str) -> String {
     format!("test-{}-{test}", std::process::id())
 }
 
-fn take(bus: &str, claim: &Claim, patience: u64) -> Result<Claims, ClaimError> {
-    Claims::take(bus, claim, IfHeld::Wait(Duration::from_millis(patience)), &mut |_| {})
+fn take(bus: &str, claim: &Claim, timeout: u64) -> Result<Claims, ClaimError> {
+    Claims::take(bus, claim, IfHeld::Wait(Duration::from_millis(timeout)), &mut |_| {})
 }
 
 fn address(bus: &str, part: &str) -> SocketAddr {
@@ -181,7 +181,7 @@ fn a_holder_empties_its_queue() {
 }
 
 #[test]
-fn a_holder_is_described_as_far_as_it_is_known() {
+fn holder_is_described_as_far_as_known() {
     let holder = |process, user: Option<&str>, program: Option<&str>| {
         Holder { process, user: user.map(str::to_owned), program: program.map(str::to_owned) }.to_string()
     };

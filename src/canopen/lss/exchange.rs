@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn several_are_told_from_one() {
+    fn several_answers_are_detected() {
         let serial = Request::Inquire(Part::Serial);
         let (a, b) = ("7E4#5D01000000000000", "7E4#5D02000000000000");
         let several = |frames: &[&str]| {

@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_and_one_who_answers_everything() {
+    fn no_slave_and_a_slave_that_answers_each_frame() {
         assert_eq!(scan(&mut [], &mut |_| false), (Progress::NoneFound, 2));
         let mut probe_answers = Fastscan::new(1);
         let mut ends = (0..1000).map(|_| probe_answers.on_end(1));
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn one_who_falls_silent_in_the_middle() {
+    fn slave_that_stops_answering() {
         let address = LssAddress::new([0x362, 0x0044_3150, 0x0001_0000, 20002]);
         for last in 2..150 {
             let mut slave = Slave::new(address);

@@ -3,7 +3,7 @@
 use super::{NamedDescriptions, print_note};
 use crate::canopen::id::NodeId;
 use crate::cli::Global;
-use crate::cli::args::{BusSpec, Nodes, Rate as BitRate};
+use crate::cli::args::{BitRate, BusSpec, Nodes};
 use crate::cli::exit::several;
 use crate::output::failure::ErrorMessage;
 use crate::output::lss::AssignReport;
@@ -21,13 +21,13 @@ use std::str::FromStr;
 pub(super) struct SetId {
     /// Device: 5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured
     target: Target,
-    /// New node-ID. For "unconfigured" also several (12-14), one device after the other
+    /// New node-ID. For "unconfigured" also a range (12-14): one for each device
     new: Nodes,
     #[command(flatten)]
     options: Options,
 }
 
-/// Set the bit rate of a device, by its own bit rate table
+/// Set the bit rate of a device
 ///
 /// It takes effect at the next start of the device, or at once with --retime.
 #[derive(Debug, Args)]
@@ -221,6 +221,6 @@ fn report(
     if let Some(confirmation) = report.confirmation() {
         console.note(&confirmation);
     }
-    report.notes().iter().for_each(|told| notes::print_told(&console, told));
+    report.notes().iter().for_each(|note| notes::print_text(&console, note));
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Errors of LSS services.
 
-use crate::bus::{BusError, time::spoken};
+use crate::bus::{BusError, time::format_duration};
 use crate::canopen::frame::Frame;
 use crate::canopen::lss::{ErrorCode, FastscanError, LssAddress, Service, Violation};
 use crate::master::Error;
@@ -18,7 +18,7 @@ pub enum LssError {
         code: ErrorCode,
     },
     /// No slave answered in time.
-    #[error("LSS {service}: no answer within {}", spoken(*.waited))]
+    #[error("LSS {service}: no answer within {}", format_duration(*.waited))]
     NoAnswer {
         /// The service.
         service: Service,

@@ -1,4 +1,4 @@
-//! Reads one instrument anew while everything else goes on.
+//! Reads one node again in the background, for example after it restarted during a recording.
 
 use super::{Ask, Overrides, survey_nodes};
 use crate::canopen::id::NodeId;
@@ -10,19 +10,19 @@ use std::collections::BTreeMap;
 
 /// A survey of one node that never waits.
 ///
-/// The survey itself is written as if it waited for every answer. It is carried out as often as it stands
-/// still: with the answers that have come so far it runs until it asks for something new, which is requested,
-/// and when that has come it runs from the start again. It takes some eight steps.
+/// [`survey_nodes`] is written as if it waited for each answer. Here it runs with the answers received so far, and
+/// stops at the first object without an answer. That object is requested. When its answer arrives, the survey runs
+/// again from the start. A complete survey needs about eight runs.
 pub struct BackgroundSurvey {
     node: NodeId,
     overrides: Overrides,
     answers: BTreeMap<ObjectId, Result<Answer, SdoError>>,
-    under_way: BTreeMap<Ticket, ObjectId>,
+    pending: BTreeMap<Ticket, ObjectId>,
 }
 
-/// Why the survey stands still.
+/// Why a run of the survey stopped.
 enum Stop {
-    /// These are to be asked for.
+    /// These objects have no answer yet.
     Wanted(Vec<ObjectId>),
     Failed(Error),
 }
@@ -33,7 +33,7 @@ impl From<Error> for Stop {
     }
 }
 
-/// What has been answered so far.
+/// The answers received so far.
 struct Known<'a, 'bus> {
     answers: &'a BTreeMap<ObjectId, Result<Answer, SdoError>>,
     master: &'a mut Master<'bus>,
@@ -58,53 +58,53 @@ impl Ask for Known<'_, '_> {
 }
 
 impl BackgroundSurvey {
-    /// Begins to read `node` anew.
-    pub fn begin(node: NodeId, overrides: &Overrides, master: &mut Master<'_>) -> BackgroundSurvey {
+    /// Starts to read `node` again.
+    pub fn start(node: NodeId, overrides: &Overrides, master: &mut Master<'_>) -> BackgroundSurvey {
         let own = overrides.iter().filter(|(other, _)| **other == node);
         let overrides = own.map(|(&node, model)| (node, model.clone())).collect();
-        let mut again = BackgroundSurvey { node, overrides, answers: BTreeMap::new(), under_way: BTreeMap::new() };
-        // Nothing is known, and so it asks.
-        let _ = again.go_on(master);
-        again
+        let mut survey = BackgroundSurvey { node, overrides, answers: BTreeMap::new(), pending: BTreeMap::new() };
+        // The first run has no answers: it only sends requests.
+        let _ = survey.run(master);
+        survey
     }
 
-    /// Takes the end of a transfer; `None` where it was none of these, or more is to come.
+    /// Takes the result of a transfer. `None` if the transfer is not part of this survey, or the survey is not complete.
     pub fn take(
         &mut self,
         ticket: Ticket,
         result: &Result<Answer, SdoError>,
         master: &mut Master<'_>,
     ) -> Option<Result<Node, Error>> {
-        let object = self.under_way.remove(&ticket)?;
-        // Who is silent to one question is not asked the others.
+        let object = self.pending.remove(&ticket)?;
+        // A node that does not answer one request is not sent the others.
         if let Err(error) = result
             && matches!(error.failure, SdoFailure::NoAnswer { .. })
         {
-            master.forget(std::mem::take(&mut self.under_way).into_keys());
+            master.forget(std::mem::take(&mut self.pending).into_keys());
             return Some(Err(Error::Sdo(error.clone())));
         }
         self.answers.insert(object, result.clone());
-        if self.under_way.is_empty() { self.go_on(master) } else { None }
+        if self.pending.is_empty() { self.run(master) } else { None }
     }
 
-    /// Whether this transfer is one of these.
+    /// Whether this transfer is part of the survey.
     pub fn has(&self, ticket: Ticket) -> bool {
-        self.under_way.contains_key(&ticket)
+        self.pending.contains_key(&ticket)
     }
 
-    /// Gives up what is under way.
+    /// Cancels the pending transfers.
     pub fn cancel(self, master: &mut Master<'_>) {
-        master.forget(self.under_way.into_keys());
+        master.forget(self.pending.into_keys());
     }
 
-    fn go_on(&mut self, master: &mut Master<'_>) -> Option<Result<Node, Error>> {
+    fn run(&mut self, master: &mut Master<'_>) -> Option<Result<Node, Error>> {
         let mut known = Known { answers: &self.answers, master };
         match survey_nodes(&mut known, &[self.node], &self.overrides) {
             Ok(mut read) => read.pop().map(Ok),
             Err(Stop::Failed(error)) => Some(Err(error)),
             Err(Stop::Wanted(objects)) => {
                 for object in objects {
-                    self.under_way.insert(master.start(Request::read(self.node, object)), object);
+                    self.pending.insert(master.start(Request::read(self.node, object)), object);
                 }
                 None
             }

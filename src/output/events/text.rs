@@ -1,7 +1,7 @@
 //! The text of the events of a recording.
 
 use super::{EventText, Weight};
-use crate::bus::time::spoken;
+use crate::bus::time::format_duration;
 use crate::bus::{Fault, ReceiveBuffer};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
@@ -19,8 +19,11 @@ pub fn event_text(event: &LogEvent) -> EventText {
             of_node(*node, "emcy", Warning, format!("node {node}: {}", emergency_text(*emergency, meaning)))
         }
         LogEvent::Share(interval, share) => {
-            let text =
-                format!("SYNC every {} with its TPDOs takes {:.1} % of the bus", spoken(*interval), share * 100.0);
+            let text = format!(
+                "SYNC every {} with its TPDOs takes {:.1} % of the bus",
+                format_duration(*interval),
+                share * 100.0
+            );
             EventText { event: None, node: None, text, weight: Info }
         }
         LogEvent::Restarted(node) => of_node(*node, "reboot", Warning, format!("node {node} restarted")),
@@ -38,7 +41,7 @@ pub fn event_text(event: &LogEvent) -> EventText {
             of_node(*node, "unreadable", Warning, text)
         }
         LogEvent::HeartbeatLost(node, since) => {
-            let text = format!("node {node}: heartbeat lost, none for {}", spoken(*since));
+            let text = format!("node {node}: heartbeat lost, none for {}", format_duration(*since));
             of_node(*node, "heartbeat-lost", Warning, text)
         }
         LogEvent::HeartbeatBack(node) => {
@@ -46,10 +49,10 @@ pub fn event_text(event: &LogEvent) -> EventText {
         }
         LogEvent::State(node, state) => of_node(*node, "state", Warning, format!("node {node} is {state} now")),
         LogEvent::Gap(node, length) => {
-            of_node(*node, "gap", Detail, format!("node {node}: a gap of {}", spoken(*length)))
+            of_node(*node, "gap", Detail, format!("node {node}: a gap of {}", format_duration(*length)))
         }
         LogEvent::Silent(node, since) => {
-            of_node(*node, "lost", Warning, format!("node {node}: silent for {}", spoken(*since)))
+            of_node(*node, "lost", Warning, format!("node {node}: silent for {}", format_duration(*since)))
         }
         LogEvent::Back(node) => of_node(*node, "back", Info, format!("node {node} is back")),
         LogEvent::WrongLength(node, mapped, received) => {
@@ -125,7 +128,7 @@ pub fn remark_text(remark: &Remark) -> String {
         }
         Remark::PollFailed(error) => format!("node {}: {error}", error.node),
         Remark::ChangedWhileFramesLost(node, before) => {
-            let before = spoken(*before);
+            let before = format_duration(*before);
             format!("node {node} changed while frames were lost: its rows of the {before} before may be wrong")
         }
         Remark::NotReadAgain(node) => format!("node {node} could not be read again: its later frames made no rows"),

@@ -2,7 +2,7 @@
 
 use super::Words;
 use crate::canopen::id::NodeId;
-use crate::output::notes::Told;
+use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::autozero::{AutozeroEffect, AutozeroFact, AutozeroFailure, Objection, OffsetChange, Quantity, Undo};
 use crate::tasks::store::Group;
@@ -41,7 +41,7 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
             words.hint(way_out(objection, &format!("cangauge autozero {node}{choice}")))
         }
         AutozeroFailure::RestartedAfter => {
-            Words::new("the device accepted the signature and restarted: a zero that is not stored is lost")
+            Words::new("the device accepted the signature and restarted: a zero that was not stored is lost")
         }
         AutozeroFailure::NotZero { signal, reading, has_acted, offset } => {
             let reads = match reading {
@@ -119,69 +119,69 @@ fn way_out(objection: &Objection, command: &str) -> String {
 }
 
 /// The text for an effect.
-pub(in crate::output) fn effect(node: &str, effect: &AutozeroEffect) -> Told {
-    let look = |told: Told, offset: &Option<String>, signal: &str| match offset {
-        Some(object) => told.command("show the present offset", format!("cangauge sdo read {node} {object}")),
-        None => told.command("show the present reading", format!("cangauge read {node} {signal}")),
+pub(in crate::output) fn effect(node: &str, effect: &AutozeroEffect) -> NoteText {
+    let look = |text: NoteText, offset: &Option<String>, signal: &str| match offset {
+        Some(object) => text.command("show the present offset", format!("cangauge sdo read {node} {object}")),
+        None => text.command("show the present reading", format!("cangauge read {node} {signal}")),
     };
     match effect {
         AutozeroEffect::SignatureSent { object } => {
-            Told::new("signature-sent", format!("the signature was sent to {object} once and is not repeated"))
+            NoteText::new("signature-sent", format!("the signature was sent to {object} once and is not repeated"))
         }
         AutozeroEffect::OffsetBefore { offset, signal } => {
             let text = match offset {
                 Some((object, number)) => format!("the offset {object} was {number}"),
                 None => "no offset can be read here".to_owned(),
             };
-            look(Told::new("offset-before", text), &offset.map(|(object, _)| object.to_string()), signal)
+            look(NoteText::new("offset-before", text), &offset.map(|(object, _)| object.to_string()), signal)
         }
         AutozeroEffect::NoChangeSeen { offset, signal } => {
             let text = match offset {
                 Some(_) => "the offset is as before",
                 None => "no offset can be read here, and the reading is not zero",
             };
-            look(Told::new("no-change-seen", text), &offset.map(|object| object.to_string()), signal)
+            look(NoteText::new("no-change-seen", text), &offset.map(|object| object.to_string()), signal)
         }
         AutozeroEffect::Moved(Some(shift)) => {
-            Told::new("zero-moved", format!("the zero was moved by {}", quantity(*shift)))
+            NoteText::new("zero-moved", format!("the zero was moved by {}", quantity(*shift)))
         }
-        AutozeroEffect::Moved(None) => Told::new("zero-moved", "the zero was set"),
-        AutozeroEffect::Stored => Told::new("stored", "it was stored"),
+        AutozeroEffect::Moved(None) => NoteText::new("zero-moved", "the zero was set"),
+        AutozeroEffect::Stored => NoteText::new("stored", "it was stored"),
         AutozeroEffect::Undo(undo) => undo_text(node, undo),
     }
 }
 
 /// The text for a note.
-pub(in crate::output) fn fact(node: Option<NodeId>, fact: &AutozeroFact) -> Told {
+pub(in crate::output) fn fact(node: Option<NodeId>, fact: &AutozeroFact) -> NoteText {
     let node = node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
     match fact {
-        AutozeroFact::Forced(objection) => Told::new("forced", format!("forced: {}", reason(objection))),
-        AutozeroFact::NothingChanged => Told::new("nothing-changed", "nothing was changed"),
+        AutozeroFact::Forced(objection) => NoteText::new("forced", format!("forced: {}", reason(objection))),
+        AutozeroFact::NothingChanged => NoteText::new("nothing-changed", "nothing was changed"),
         AutozeroFact::ProvedBy { offset } => {
             let proof = if *offset { "the offset" } else { "the reading" };
-            Told::new(
+            NoteText::new(
                 "no-answer",
-                format!("no answer came to the signature; {proof} proves that the device acted on it"),
+                format!("no answer to the signature; {proof} proves that the device executed it"),
             )
         }
         AutozeroFact::Undo(undo) => undo_text(&node, undo),
-        AutozeroFact::NotStored { group } => Told::new("not-stored", "not stored: lost at power off")
+        AutozeroFact::NotStored { group } => NoteText::new("not-stored", "not stored: lost at power off")
             .command("store it", format!("cangauge store {node} --group {}", group.as_str())),
-        AutozeroFact::Stored { groups } => Told::new("stored", format!("stored: {}", Group::names(groups))),
+        AutozeroFact::Stored { groups } => NoteText::new("stored", format!("stored: {}", Group::names(groups))),
     }
 }
 
-fn undo_text(node: &str, undo: &Undo) -> Told {
+fn undo_text(node: &str, undo: &Undo) -> NoteText {
     match undo {
         Undo::Write { object, value, data_type, store } => {
             let store =
                 store.map_or_else(String::new, |group| format!(" && cangauge store {node} --group {}", group.as_str()));
-            Told::new("undo", "the previous offset is known")
+            NoteText::new("undo", "the previous offset is known")
                 .command("undo", format!("cangauge sdo write {node} {object} {value} --type {data_type}{store}"))
         }
-        Undo::Restore => Told::new("undo", "no offset can be written; the factory defaults undo it")
+        Undo::Restore => NoteText::new("undo", "no offset can be written; the factory defaults undo it")
             .command("undo", format!("cangauge restore {node} --reset")),
-        Undo::Reset => Told::new("undo", "the zero is not stored, so a reset undoes it")
+        Undo::Reset => NoteText::new("undo", "the zero is not stored, so a reset undoes it")
             .command("undo", format!("cangauge nmt reset {node}")),
     }
 }

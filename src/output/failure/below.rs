@@ -21,7 +21,7 @@ pub(super) fn bus(error: &BusError) -> Words {
             words.hint("list the interfaces: cangauge bus list; without hardware: --bus sim")
         }
         BusError::ReceiveOnly(_) => words.hint("commands that only listen work on it: log, scan --passive, nmt watch"),
-        BusError::InUse(_) => words.hint("wait until it ends, or end it; to work beside it, add --ignore-lock"),
+        BusError::InUse(_) => words.hint("wait until it ends, or stop it; to ignore it, add --ignore-lock"),
         BusError::Recording { file, error, .. } => match recording_hint(file, error) {
             Some(hint) => words.hint(hint),
             None => words,

@@ -12,7 +12,7 @@ pub(super) fn words(cause: &DetectFailure) -> Words {
             let (message, hint) = match (active, has_errors) {
                 (false, true) => (
                     "errors but no valid frame at any bit rate",
-                    format!("a device that is alone on the bus gets no acknowledge, so it cannot be heard; {ask}"),
+                    format!("the frames of a single device are not acknowledged, so they are not valid; {ask}"),
                 ),
                 (false, false) => (
                     "no frame at any bit rate",

@@ -1,7 +1,7 @@
 //! Text for causes: nothing was recorded, or a recording ended early.
 
 use super::Words;
-use crate::bus::time::spoken;
+use crate::bus::time::format_duration;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
 use crate::output::diagnosis;
@@ -82,7 +82,7 @@ fn count(rows: u64) -> String {
 const MAX_LISTED: usize = 3;
 
 fn no_measurements(within: Duration, nodes: &[(NodeId, Silence)]) -> Words {
-    let within = spoken(within);
+    let within = format_duration(within);
     let words = match nodes {
         [(_, silence)] => Words::new(format!("no measurements within {within}: {}", diagnosis::reason(silence))),
         _ => {
@@ -111,7 +111,7 @@ fn nothing_received(
     let Some(interface) = interface else {
         return Words::new("the recording contains no TPDO of these nodes");
     };
-    let within = spoken(within);
+    let within = format_duration(within);
     if !has_traffic {
         return Words::new(format!("no measurements within {within}: no frame was received at all"))
             .hint(format!("check the cable and the bit rate: cangauge bus detect {interface}"));

@@ -2,9 +2,9 @@
 
 use super::Words;
 use super::below;
-use crate::bus::time::spoken;
+use crate::bus::time::format_duration;
 use crate::output::lss::{another, duplicate, progress, short};
-use crate::output::notes::Told;
+use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::failure::LssError;
 use crate::tasks::lss::{
@@ -37,12 +37,11 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
                  cangauge lss set-id VENDOR:PRODUCT:REVISION:SERIAL NEW",
             )
         }
-        LssCause::NoAnswer(waited) => {
-            Words::new(format!("no answer within {}", spoken(*waited))).hint("list the devices: cangauge lss scan")
-        }
+        LssCause::NoAnswer(waited) => Words::new(format!("no answer within {}", format_duration(*waited)))
+            .hint("list the devices: cangauge lss scan"),
         LssCause::OtherNodeIdByLss(found) => {
             let found = found.map_or_else(|| "has no node-ID".to_owned(), |found| format!("has node-ID {found}"));
-            Words::new(format!("by LSS a device with the same identity {found}")).hint(CONNECT_ALONE)
+            Words::new(format!("a device with the same identity answers LSS and {found}")).hint(CONNECT_ALONE)
         }
         LssCause::SameIdentity(other) => Words::new(format!("node {other} has the same identity")).hint(CONNECT_ALONE),
         LssCause::SeveralWithIdentity => Words::new("more than one device answers to its identity").hint(CONNECT_ALONE),
@@ -157,7 +156,7 @@ fn after_reset(failure: &Failure, cause: &LssCause) -> Words {
                 NotReset::SharedNodeId(node) => format!("another device has node-ID {node} too"),
                 NotReset::NodeIdUnknown => "its present node-ID is unknown".to_owned(),
             };
-            Words::new(format!("not reset, since {why}; so it was not seen as node {new}"))
+            Words::new(format!("not reset, because {why}: node-ID {new} is not confirmed"))
         }
         LssCause::OtherDeviceAnswers(found) => Words::new(format!("another device answers there: {found}")),
         LssCause::NotIdentified => Words::new("the device there reports no identity"),
@@ -165,13 +164,14 @@ fn after_reset(failure: &Failure, cause: &LssCause) -> Words {
             Words::new(format!("{}: several devices have this node-ID", duplicate(*sign)))
         }
         LssCause::SilentAfterBootUp(waited) => {
-            Words::new(format!("boot-up seen, then no answer within {}", spoken(*waited)))
+            Words::new(format!("boot-up seen, then no answer within {}", format_duration(*waited)))
         }
         LssCause::StillOldNodeId { old, new } => {
             Words::new(format!("it was reset and still has node-ID {old}, not {new}"))
         }
         LssCause::NotSeen { new, waited } => {
-            let words = Words::new(format!("no boot-up and no answer from node {new} within {}", spoken(*waited)));
+            let words =
+                Words::new(format!("no boot-up and no answer from node {new} within {}", format_duration(*waited)));
             match failure.node {
                 Some(_) => words.hint("list the devices: cangauge lss scan"),
                 None => words,
@@ -216,35 +216,34 @@ fn retime(cause: &LssCause) -> Words {
 }
 
 /// The text for an effect.
-pub(in crate::output) fn effect(effect: &LssEffect) -> Told {
+pub(in crate::output) fn effect(effect: &LssEffect) -> NoteText {
     match effect {
         LssEffect::MayBeConfiguring => {
-            Told::new("may-be-configuring", "the device may still be in the LSS configuration state")
+            NoteText::new("may-be-configuring", "the device may still be in the LSS configuration state")
                 .command("a power cycle ends it; then", "cangauge lss scan")
         }
-        LssEffect::HostIsBack { bit_rate, device_answers: false, .. } => Told::new(
+        LssEffect::HostIsBack { bit_rate, device_answers: false, .. } => NoteText::new(
             "host-restored",
             format!("the host is back at {}", short(*bit_rate)),
         )
         .command("nothing was stored: power the device off and on, then see whether it answers", "cangauge lss scan"),
         LssEffect::HostIsBack { bit_rate, new, device_answers: true } => {
             let (old, new) = (short(*bit_rate), short(*new));
-            let message =
-                format!("it still answers at {old}, and the host is back there; its manual says whether it has {new}");
-            Told::new("host-restored", message).command("see its state", "cangauge lss scan")
+            let message = format!("it still answers at {old}, and the host is back at {old}; see its manual for {new}");
+            NoteText::new("host-restored", message).command("see its state", "cangauge lss scan")
         }
         LssEffect::Progress(device, done, next) => {
-            let told = Told::new("progress", progress(done));
+            let text = NoteText::new("progress", progress(done));
             match next {
-                NextStep::Cause => told,
+                NextStep::Cause => text,
                 NextStep::SeeAfterPowerCycle => {
-                    told.command("power it off and on, then see its node-ID", "cangauge lss scan")
+                    text.command("power it off and on, then see its node-ID", "cangauge lss scan")
                 }
-                NextStep::StoreAgain => told.command(
+                NextStep::StoreAgain => text.command(
                     "store it again, or power it off and on and see what it has kept",
                     format!("cangauge lss store {}", argument(device)),
                 ),
-                NextStep::PowerCycle => told
+                NextStep::PowerCycle => text
                     .command("power off and on discards what is not stored; then see its node-ID", "cangauge lss scan"),
             }
         }

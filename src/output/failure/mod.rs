@@ -19,7 +19,7 @@ pub(super) mod settings;
 pub(super) mod store;
 
 use super::json;
-use super::notes::{Told, effect};
+use super::notes::{NoteText, effect};
 use crate::canopen::id::NodeId;
 use crate::tasks::failure::{BusError, Cause};
 use crate::tasks::{Failure, Kind};
@@ -45,7 +45,7 @@ pub struct ErrorMessage {
     /// The place in the text that the user typed.
     pub place: Option<Place>,
     /// What was changed before, and what state was left behind.
-    pub effects: Vec<Told>,
+    pub effects: Vec<NoteText>,
 }
 
 /// A character in a text that the user typed.
@@ -135,8 +135,8 @@ impl ErrorMessage {
             hint: Option<&'a str>,
             #[serde(skip_serializing_if = "Option::is_none")]
             column: Option<usize>,
-            #[serde(skip_serializing_if = "<[Told]>::is_empty")]
-            effects: &'a [Told],
+            #[serde(skip_serializing_if = "<[NoteText]>::is_empty")]
+            effects: &'a [NoteText],
         }
         let error = Fields {
             kind: kind_name(self.kind),
@@ -183,11 +183,11 @@ impl From<&Failure> for ErrorMessage {
         let mut hint = words.hint;
         let mut effects = Vec::new();
         for item in &failure.effects {
-            let told = effect(failure.node, item);
-            message = format!("{message}; {}", told.message);
+            let text = effect(failure.node, item);
+            message = format!("{message}; {}", text.message);
             // A command that undoes an effect or finishes the job is better than the general hint of the cause.
-            hint = told.hint().or(hint);
-            effects.push(told);
+            hint = text.hint().or(hint);
+            effects.push(text);
         }
         // "node 5 is in use by …" names the node itself.
         let is_named = matches!(&failure.cause, Cause::Bus(error) if matches!(**error, BusError::InUse(_)));

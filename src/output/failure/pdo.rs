@@ -3,7 +3,7 @@
 use super::Words;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::pdo::{MappingEntry, Transmission};
-use crate::output::notes::Told;
+use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::pdo::{
     Incomplete, Occupant, Parameter, PdoEffect, PdoFact, PdoFailure, Settings, StepError, StepWrite,
@@ -143,17 +143,20 @@ fn number(write: &StepWrite) -> String {
 }
 
 /// The text for an effect.
-pub(in crate::output) fn effect(node: &str, effect: &PdoEffect) -> Told {
+pub(in crate::output) fn effect(node: &str, effect: &PdoEffect) -> NoteText {
     match effect {
-        PdoEffect::Restored { number } => Told::new("restored", format!("{number} has its old mapping and parameters")),
-        PdoEffect::Incomplete(incomplete) => incomplete_text(node, incomplete),
-        PdoEffect::SetNotStored { number } => {
-            Told::new("set-not-stored", format!("{number} has the requested settings, but they are lost at power off"))
+        PdoEffect::Restored { number } => {
+            NoteText::new("restored", format!("{number} has its old mapping and parameters"))
         }
+        PdoEffect::Incomplete(incomplete) => incomplete_text(node, incomplete),
+        PdoEffect::SetNotStored { number } => NoteText::new(
+            "set-not-stored",
+            format!("{number} has the requested settings, but they are lost at power off"),
+        ),
     }
 }
 
-fn incomplete_text(node: &str, incomplete: &Incomplete) -> Told {
+fn incomplete_text(node: &str, incomplete: &Incomplete) -> NoteText {
     let Incomplete { last, restore, previous, needs_preop, was_operational } = incomplete;
     let tpdo = previous.number;
     let mut message = match last {
@@ -165,31 +168,33 @@ fn incomplete_text(node: &str, incomplete: &Incomplete) -> Told {
     }
     let start = if *was_operational { format!(" && cangauge nmt start {node}") } else { String::new() };
     let command = format!("{}{start}", recovery_command(node, previous, *needs_preop));
-    Told::new("incomplete", message).command("when it answers again", command)
+    NoteText::new("incomplete", message).command("when it answers again", command)
 }
 
 /// The text for a note.
-pub(in crate::output) fn fact(fact: &PdoFact) -> Told {
+pub(in crate::output) fn fact(fact: &PdoFact) -> NoteText {
     match fact {
         PdoFact::AlreadySet { number } => {
-            Told::new("already-set", format!("{number} has these settings already: nothing was written"))
+            NoteText::new("already-set", format!("{number} has these settings already: nothing was written"))
         }
-        PdoFact::Stored { groups } => Told::new("stored", format!("stored ({}), acknowledged", Group::names(groups))),
+        PdoFact::Stored { groups } => {
+            NoteText::new("stored", format!("stored ({}), acknowledged", Group::names(groups)))
+        }
         PdoFact::MaybeNotMappable { object } => {
-            Told::new("maybe-not-mappable", format!("{object} cannot be mapped according to the description"))
+            NoteText::new("maybe-not-mappable", format!("{object} cannot be mapped according to the description"))
         }
         PdoFact::ChangedWhileOn { number, error } => {
-            Told::new("changed-while-on", format!("{error}: {number} was changed while it was on"))
+            NoteText::new("changed-while-on", format!("{error}: {number} was changed while it was on"))
         }
         PdoFact::SetDespite { number, error, write } => {
             let step = step(error, write.as_ref());
-            Told::new("set-despite", format!("{step}; {number} has the requested settings all the same"))
+            NoteText::new("set-despite", format!("{step}; {number} has the requested settings all the same"))
         }
         PdoFact::Off { number } => {
-            Told::new("off", format!("{number} is off: map signals or set --cob-id to switch it on"))
+            NoteText::new("off", format!("{number} is off: map signals or set --cob-id to switch it on"))
         }
-        PdoFact::WaitsForSync { number } => Told::new("waits-for-sync", format!("{number} waits for SYNC")),
-        PdoFact::OnlyOnChange { number } => Told::new(
+        PdoFact::WaitsForSync { number } => NoteText::new("waits-for-sync", format!("{number} waits for SYNC")),
+        PdoFact::OnlyOnChange { number } => NoteText::new(
             "only-on-change",
             format!(
                 "the event timer of {number} is 0: it is sent only if a value changes by its delta (x133h) or passes a \
@@ -197,7 +202,7 @@ pub(in crate::output) fn fact(fact: &PdoFact) -> Told {
             ),
         ),
         PdoFact::TimerUnused { transmission } => {
-            Told::new("timer-unused", format!("transmission type {transmission} does not use the event timer"))
+            NoteText::new("timer-unused", format!("transmission type {transmission} does not use the event timer"))
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Words;
 use crate::device::unit::Unit;
-use crate::output::notes::Told;
+use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::settings::unit::list;
 use crate::tasks::settings::{QuantityError, SettingsEffect, SettingsFact, SettingsFailure};
@@ -119,7 +119,7 @@ fn of_filter(cause: &SettingsFailure) -> Words {
 }
 
 /// The text for an effect.
-pub(in crate::output) fn effect(node: &str, effect: &SettingsEffect) -> Told {
+pub(in crate::output) fn effect(node: &str, effect: &SettingsEffect) -> NoteText {
     let (code, message, signal) = match effect {
         SettingsEffect::LimitsRestored { signal } => ("limits-restored", "the previous limits are set again", signal),
         SettingsEffect::LimitsNotRestored { signal } => {
@@ -127,25 +127,25 @@ pub(in crate::output) fn effect(node: &str, effect: &SettingsEffect) -> Told {
         }
         SettingsEffect::LimitsUnknown { signal } => ("limits-unknown", "the present limits are unknown", signal),
     };
-    Told::new(code, message).command("show the limits", format!("cangauge limits {node} {signal}"))
+    NoteText::new(code, message).command("show the limits", format!("cangauge limits {node} {signal}"))
 }
 
 /// The text for a note.
-pub(in crate::output) fn fact(fact: &SettingsFact) -> Told {
+pub(in crate::output) fn fact(fact: &SettingsFact) -> NoteText {
     match fact {
         SettingsFact::AlreadyInUnit { signal, unit } => {
-            Told::new("already-in-unit", format!("{signal} is already in {unit}"))
+            NoteText::new("already-in-unit", format!("{signal} is already in {unit}"))
         }
         SettingsFact::NotConverted { name, now } => {
             let now = now.map_or_else(String::new, |now| format!(": it is now {now}"));
-            Told::new("not-converted", format!("the device did not convert {name}{now}"))
+            NoteText::new("not-converted", format!("the device did not convert {name}{now}"))
         }
         SettingsFact::DampingNotShown { constant } => {
             let constant = constant.map_or_else(|| "unknown".to_owned(), |constant| constant.to_string());
             let message = format!("it acknowledged the damping, but the filter constant did not change ({constant})");
-            Told::new("damping-not-shown", message)
+            NoteText::new("damping-not-shown", message)
         }
-        SettingsFact::MayNeverSend { tpdo } => Told::new(
+        SettingsFact::MayNeverSend { tpdo } => NoteText::new(
             "may-never-send",
             format!("{tpdo} is sent on events, and its event timer and the delta are 0: it may never be sent"),
         ),

@@ -3,7 +3,7 @@
 use super::Words;
 use super::node::shown;
 use crate::canopen::id::NodeId;
-use crate::output::notes::Told;
+use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::store::{Difference, Group, Snapshot, StoreEffect, StoreFact, StoreFailure, Verb};
 
@@ -58,7 +58,7 @@ pub(super) fn words(failure: &Failure, cause: &StoreFailure) -> Words {
 }
 
 /// The text for an effect.
-pub(in crate::output) fn effect(node: &str, effect: &StoreEffect) -> Told {
+pub(in crate::output) fn effect(node: &str, effect: &StoreEffect) -> NoteText {
     match effect {
         StoreEffect::SignatureSent { verb, group } => {
             let (signature, object) = (verb.signature(), verb.object(*group));
@@ -69,19 +69,20 @@ pub(in crate::output) fn effect(node: &str, effect: &StoreEffect) -> Told {
             let message =
                 format!("\"{signature}\" was sent to {object} once and is not repeated; it is unknown {unknown}");
             let command = format!("cangauge {} {node} --group {} {verify}", name(*verb), group.as_str());
-            Told::new("signature-sent", message).command("repeat and verify", command)
+            NoteText::new("signature-sent", message).command("repeat and verify", command)
         }
-        StoreEffect::Answers(true) => Told::new("answers", "the device answers other requests"),
-        StoreEffect::Answers(false) => Told::new("no-answer", "the device does not answer any more"),
-        StoreEffect::Stored(groups) => Told::new("stored", format!("stored: {}", Group::names(groups))),
-        StoreEffect::NotVerified(verb) => {
-            Told::new("not-verified", format!("the device acknowledged the {}, and it is not verified", name(*verb)))
-        }
+        StoreEffect::Answers(true) => NoteText::new("answers", "the device answers other requests"),
+        StoreEffect::Answers(false) => NoteText::new("no-answer", "the device does not answer any more"),
+        StoreEffect::Stored(groups) => NoteText::new("stored", format!("stored: {}", Group::names(groups))),
+        StoreEffect::NotVerified(verb) => NoteText::new(
+            "not-verified",
+            format!("the device acknowledged the {}, and it is not verified", name(*verb)),
+        ),
     }
 }
 
 /// The text for a note.
-pub(in crate::output) fn fact(node: Option<NodeId>, fact: &StoreFact) -> Told {
+pub(in crate::output) fn fact(node: Option<NodeId>, fact: &StoreFact) -> NoteText {
     let node = node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
     match fact {
         StoreFact::InsteadOfAll(cob_ids) => {
@@ -89,7 +90,7 @@ pub(in crate::output) fn fact(node: Option<NodeId>, fact: &StoreFact) -> Told {
                 Some(value) => format!("{object} (0x{value:08X})"),
                 None => format!("{object} (not readable)"),
             };
-            Told::new(
+            NoteText::new(
                 "instead-of-all",
                 format!(
                     "comm and app are stored instead of all, which would reset these to their defaults: {}",
@@ -97,11 +98,11 @@ pub(in crate::output) fn fact(node: Option<NodeId>, fact: &StoreFact) -> Told {
                 ),
             )
         }
-        StoreFact::OnlyInAll(names) => Told::new(
+        StoreFact::OnlyInAll(names) => NoteText::new(
             "only-in-all",
             format!("only group \"all\" stores these; they were not saved: {}", names.join(", ")),
         ),
-        StoreFact::NotStored(settings) => Told::new(
+        StoreFact::NotStored(settings) => NoteText::new(
             "not-stored",
             format!(
                 "the device does not store these; they return to their defaults at power off: {}",
@@ -110,16 +111,16 @@ pub(in crate::output) fn fact(node: Option<NodeId>, fact: &StoreFact) -> Told {
         ),
         StoreFact::AfterReset(group) => {
             let group = if *group == Group::All { String::new() } else { format!(" --group {}", group.as_str()) };
-            Told::new(
+            NoteText::new(
                 "after-reset",
                 "the defaults are used after the next reset; a store before that may keep the old values",
             )
             .command("reset and compare", format!("cangauge restore {node}{group} --reset"))
         }
         StoreFact::NothingCompared => {
-            Told::new("nothing-compared", "the device was reset; there is no known value to compare")
+            NoteText::new("nothing-compared", "the device was reset; there is no known value to compare")
         }
-        StoreFact::Unchanged(settings) => Told::new(
+        StoreFact::Unchanged(settings) => NoteText::new(
             "unchanged",
             format!(
                 "the device was reset; these are as before and differ from the usual defaults. They were delivered so, \

@@ -116,8 +116,8 @@ impl Station for Device {
     fn tuning(&self) -> Tuning {
         match self.memory.settings.active.rate {
             _ if self.phase == Phase::Off => Tuning::Off,
-            Rate::At(rate) => Tuning::At(rate),
-            Rate::Auto => Tuning::Follows,
+            BitRate::At(rate) => Tuning::At(rate),
+            BitRate::Auto => Tuning::Follows,
         }
     }
 

@@ -28,7 +28,7 @@ fn ms(milliseconds: u64) -> Mono {
 }
 
 /// A built-in device whose channels are constant at `base`.
-fn still(kind: &str, node_id: u8, base: f64) -> Setup {
+fn constant(kind: &str, node_id: u8, base: f64) -> Setup {
     let mut setup = Setup::new(catalog::by_name(kind).expect("built in"), node(node_id));
     for channel in &mut setup.channels {
         (channel.base, channel.amplitude, channel.noise) = (base, 0.0, 0.0);
@@ -42,20 +42,20 @@ fn bus(setups: impl IntoIterator<Item = Setup>) -> MemoryBus {
     bus
 }
 
-/// Every frame up to `until`.
-fn hear(bus: &mut MemoryBus, until: Mono) -> Vec<String> {
+/// The frames up to `until`.
+fn receive(bus: &mut MemoryBus, until: Mono) -> Vec<String> {
     timed(bus, until).into_iter().map(|(_, frame)| frame).collect()
 }
 
-/// Every frame up to `until`, with the millisecond in which it was complete. Bus errors are ignored.
+/// The frames up to `until`, each with the millisecond of its end. Bus errors are ignored.
 fn timed(bus: &mut MemoryBus, until: Mono) -> Vec<(u128, String)> {
-    let mut heard = Vec::new();
+    let mut frames = Vec::new();
     loop {
         match bus.receive(until).expect("a memory bus never fails") {
             Event::Frame(received) => {
-                heard.push((received.at.mono.since_start().as_millis(), received.frame.to_string()));
+                frames.push((received.at.mono.since_start().as_millis(), received.frame.to_string()));
             }
-            Event::Timeout => return heard,
+            Event::Timeout => return frames,
             Event::Fault(..) => {}
             other => panic!("{other:?}"),
         }
@@ -66,14 +66,14 @@ fn timed(bus: &mut MemoryBus, until: Mono) -> Vec<(u128, String)> {
 fn ask(bus: &mut MemoryBus, frame: &str) -> Vec<String> {
     bus.send(&frame.parse().expect("a frame")).expect("room");
     let until = bus.now().mono + Duration::from_millis(5);
-    hear(bus, until)
+    receive(bus, until)
 }
 
 /// Sends frames and checks all answers of the next 5 ms; `-` means none.
 fn play(bus: &mut MemoryBus, lines: &[(&str, &str)]) {
     for (sent, expected) in lines {
-        let heard = ask(bus, sent).join(" ");
-        assert_eq!(if heard.is_empty() { "-" } else { &heard }, *expected, "after {sent}");
+        let received = ask(bus, sent).join(" ");
+        assert_eq!(if received.is_empty() { "-" } else { &received }, *expected, "after {sent}");
     }
 }
 
@@ -89,14 +89,14 @@ fn state(bus: &mut MemoryBus) -> Option<State> {
 fn each_device_boots_to_pre_operational_and_stays_silent() {
     for kind in ["mh4", "d20", "dps", "mc1609"] {
         let mut bus = bus([Setup::new(catalog::by_name(kind).expect("built in"), node(1))]);
-        assert_eq!(hear(&mut bus, ms(60_000)), ["701#00"], "{kind}");
+        assert_eq!(receive(&mut bus, ms(60_000)), ["701#00"], "{kind}");
         assert_eq!(state(&mut bus), Some(State::PreOperational), "{kind}");
     }
 }
 
 #[test]
 fn nmt_states_allow_their_services_only() {
-    let mut bus = bus([still("mh4", 5, 5.0)]);
+    let mut bus = bus([constant("mh4", 5, 5.0)]);
     play(
         &mut bus,
         &[
@@ -126,8 +126,17 @@ fn nmt_states_allow_their_services_only() {
 }
 
 #[test]
+fn nmt_frame_without_data_is_ignored() {
+    for kind in ["mh4", "d20", "dps", "mc1609"] {
+        let mut bus = bus([constant(kind, 5, 5.0)]);
+        play(&mut bus, &[("000#", "705#00"), ("000#0105", "-"), ("000#", "-")]);
+        assert_eq!(state(&mut bus), Some(State::Operational), "{kind}");
+    }
+}
+
+#[test]
 fn resets_end_with_a_boot_up() {
-    let mut bus = bus([still("mh4", 5, 5.0)]);
+    let mut bus = bus([constant("mh4", 5, 5.0)]);
     play(
         &mut bus,
         &[
@@ -139,7 +148,7 @@ fn resets_end_with_a_boot_up() {
             ("000#0105", "-"),
         ],
     );
-    assert_eq!(hear(&mut bus, ms(500)), ["705#00"]);
+    assert_eq!(receive(&mut bus, ms(500)), ["705#00"]);
     play(
         &mut bus,
         &[
@@ -152,7 +161,7 @@ fn resets_end_with_a_boot_up() {
         ],
     );
     let until = bus.now().mono + Duration::from_millis(20);
-    assert_eq!(hear(&mut bus, until), ["705#00"]);
+    assert_eq!(receive(&mut bus, until), ["705#00"]);
     play(
         &mut bus,
         &[("605#4017100000000000", "585#4B17100000000000"), ("605#4031610100000000", "585#433161010000AB00")],
@@ -161,21 +170,21 @@ fn resets_end_with_a_boot_up() {
 
 #[test]
 fn heartbeat_without_drift() {
-    let mut bus = bus([still("dps", 127, 5.0)]);
+    let mut bus = bus([constant("dps", 127, 5.0)]);
     play(&mut bus, &[("67F#2217100064000000", "77F#00 5FF#6017100000000000 77F#7F")]);
     let beats: Vec<u128> = timed(&mut bus, ms(1010)).into_iter().map(|(at, _)| at).collect();
     assert_eq!(beats, [100, 200, 300, 400, 500, 600, 700, 800, 900, 1000]);
     // 05 when started, 04 when stopped, nothing when switched off.
     bus.send(&"000#027F".parse().expect("a frame")).expect("room");
-    assert_eq!(hear(&mut bus, ms(1110)), ["77F#04"]);
+    assert_eq!(receive(&mut bus, ms(1110)), ["77F#04"]);
     bus.send(&"000#807F".parse().expect("a frame")).expect("room");
     play(&mut bus, &[("67F#2217100000000000", "5FF#6017100000000000")]);
-    assert_eq!(hear(&mut bus, ms(5000)), Vec::<String>::new());
+    assert_eq!(receive(&mut bus, ms(5000)), Vec::<String>::new());
 }
 
 #[test]
 fn guarding_answers_toggle_if_guarding_is_supported() {
-    let mut d20 = bus([still("d20", 2, 5.0)]);
+    let mut d20 = bus([constant("d20", 2, 5.0)]);
     play(
         &mut d20,
         &[
@@ -199,9 +208,9 @@ fn guarding_answers_toggle_if_guarding_is_supported() {
     play(&mut d20, &[("602#2217100000000000", "582#6017100000000000"), ("702#R1", "702#05")]);
     play(&mut d20, &[("000#8202", "-")]);
     let until = d20.now().mono + Duration::from_millis(20);
-    assert_eq!(hear(&mut d20, until), ["702#00"]);
+    assert_eq!(receive(&mut d20, until), ["702#00"]);
     play(&mut d20, &[("702#R1", "702#7F"), ("702#R1", "702#FF")]);
-    let mut mh4 = bus([still("mh4", 5, 5.0)]);
+    let mut mh4 = bus([constant("mh4", 5, 5.0)]);
     play(&mut mh4, &[("705#R1", "705#00"), ("705#R1", "-")]);
 }
 
@@ -210,10 +219,10 @@ fn overload_sets_status_value_and_emergency() {
     let overload = |from, until, direction| {
         (1, Overload { from: Duration::from_millis(from), until: Duration::from_millis(until), direction })
     };
-    let mut setup = still("mh4", 5, 5.0);
+    let mut setup = constant("mh4", 5, 5.0);
     setup.overloads = vec![overload(1000, 2000, Direction::High), overload(3000, 4000, Direction::Low)];
     let mut bus = bus([setup]);
-    let heard = timed(&mut bus, ms(5000));
+    let received = timed(&mut bus, ms(5000));
     let expected = [
         (0, "705#00"),
         (1000, "085#01F0810103000000"),
@@ -221,8 +230,8 @@ fn overload_sets_status_value_and_emergency() {
         (3000, "085#01F0810105000000"),
         (4000, "085#0000000000000000"),
     ];
-    assert_eq!(heard.len(), expected.len(), "{heard:?}");
-    for ((at, frame), (expected_at, expected)) in heard.iter().zip(expected) {
+    assert_eq!(received.len(), expected.len(), "{received:?}");
+    for ((at, frame), (expected_at, expected)) in received.iter().zip(expected) {
         assert_eq!(frame, expected);
         assert!((expected_at..=expected_at + 1).contains(at), "{at} {frame}");
     }
@@ -241,14 +250,14 @@ fn overload_sets_status_value_and_emergency() {
 }
 
 #[test]
-fn an_overload_while_running() {
-    let mut setup = still("mh4", 5, 5.0);
+fn overload_during_operation() {
+    let mut setup = constant("mh4", 5, 5.0);
     let half = Duration::from_millis(500);
     setup.overloads = vec![(1, Overload { from: half, until: Duration::MAX, direction: Direction::High })];
     setup.start = true;
     let mut bus = bus([setup]);
     play(&mut bus, &[("080#", "705#00 185#0000A04000")]);
-    assert_eq!(hear(&mut bus, ms(600)), ["085#01F0810103000000"]);
+    assert_eq!(receive(&mut bus, ms(600)), ["085#01F0810103000000"]);
     play(
         &mut bus,
         &[
@@ -260,19 +269,19 @@ fn an_overload_while_running() {
             ("000#8205", "-"),
         ],
     );
-    assert_eq!(hear(&mut bus, ms(700)), ["705#00"]);
+    assert_eq!(receive(&mut bus, ms(700)), ["705#00"]);
     // After a reset of the node it is sent again.
     play(&mut bus, &[("605#4001100000000000", "585#4F01100081000000"), ("000#8105", "-")]);
-    assert_eq!(hear(&mut bus, ms(1000)), ["705#00", "085#01F0810103000000"]);
+    assert_eq!(receive(&mut bus, ms(1000)), ["705#00", "085#01F0810103000000"]);
 }
 
 #[test]
 fn dps_has_its_emergency_and_no_status() {
-    let mut setup = still("dps", 127, 50.0);
+    let mut setup = constant("dps", 127, 50.0);
     setup.overloads =
         vec![(1, Overload { from: Duration::from_millis(500), until: Duration::MAX, direction: Direction::Low })];
     let mut bus = bus([setup]);
-    assert_eq!(hear(&mut bus, ms(600)), ["77F#00", "0FF#0132050000000000"]);
+    assert_eq!(receive(&mut bus, ms(600)), ["77F#00", "0FF#0132050000000000"]);
     play(
         &mut bus,
         // -5 psi: without a marker, the value is sent.
@@ -282,7 +291,7 @@ fn dps_has_its_emergency_and_no_status() {
 
 #[test]
 fn dps_counts_overloads_by_direction() {
-    let mut setup = still("dps", 127, 50.0);
+    let mut setup = constant("dps", 127, 50.0);
     let overload = |from, until, direction| {
         (1, Overload { from: Duration::from_millis(from), until: Duration::from_millis(until), direction })
     };
@@ -292,7 +301,7 @@ fn dps_counts_overloads_by_direction() {
         overload(500, 600, Direction::High),
     ];
     let mut bus = bus([setup]);
-    hear(&mut bus, ms(700));
+    receive(&mut bus, ms(700));
     // 2004h: above the span twice; 2005h: below it once; 1003h:0: three errors.
     play(
         &mut bus,
@@ -306,19 +315,19 @@ fn dps_counts_overloads_by_direction() {
 
 #[test]
 fn mc1609_sends_16_temperatures_in_four_tpdos() {
-    let mut setup = still("mc1609", 3, 0.0);
+    let mut setup = constant("mc1609", 3, 0.0);
     for channel in &mut setup.channels {
         channel.base = f64::from(channel.channel) * 10.0;
     }
     let mut bus = bus([setup]);
     assert_eq!(ask(&mut bus, "000#0103"), ["703#00"]);
     let once = ["183#6400C8002C019001", "283#F4015802BC022003", "383#8403E8034C04B004", "483#14057805DC054006"];
-    assert_eq!(hear(&mut bus, ms(150)), once);
-    assert_eq!(hear(&mut bus, ms(250)), once);
+    assert_eq!(receive(&mut bus, ms(150)), once);
+    assert_eq!(receive(&mut bus, ms(250)), once);
     for pdo in 0..4 {
         assert_eq!(ask(&mut bus, &format!("603#2F0{pdo}180201000000")), [format!("583#600{pdo}180200000000")]);
     }
-    assert_eq!(hear(&mut bus, ms(1000)), Vec::<String>::new());
+    assert_eq!(receive(&mut bus, ms(1000)), Vec::<String>::new());
     assert_eq!(ask(&mut bus, "080#"), once);
     // 255 with an event time of at least 100 ms; 254 is not offered.
     play(
@@ -332,11 +341,11 @@ fn mc1609_sends_16_temperatures_in_four_tpdos() {
 }
 
 #[test]
-fn strings_come_in_segments_or_at_once() {
-    let mut setups = vec![still("mh4", 1, 5.0), still("d20", 2, 5.0), still("dps", 127, 5.0)];
+fn strings_are_segmented_or_expedited() {
+    let mut setups = vec![constant("mh4", 1, 5.0), constant("d20", 2, 5.0), constant("dps", 127, 5.0)];
     setups.iter_mut().for_each(|setup| setup.serial = 0x01020304);
     let mut bus = bus(setups);
-    hear(&mut bus, ms(5));
+    receive(&mut bus, ms(5));
     play(
         &mut bus,
         &[
@@ -354,7 +363,7 @@ fn strings_come_in_segments_or_at_once() {
     play(&mut bus, &[("601#4008100000000000", "581#4108100008000000")]);
     let later = |bus: &mut MemoryBus| {
         let until = bus.now().mono + Duration::from_millis(700);
-        hear(bus, until)
+        receive(bus, until)
     };
     assert_eq!(later(&mut bus), Vec::<String>::new());
     play(&mut bus, &[("601#6000000000000000", "581#004D482D342D4341")]);
@@ -373,33 +382,33 @@ fn strings_come_in_segments_or_at_once() {
     // A transfer without requests is aborted after a second.
     play(&mut bus, &[("601#4008100000000000", "581#4108100008000000")]);
     let until = bus.now().mono + Duration::from_secs(5);
-    assert_eq!(hear(&mut bus, until), ["581#8008100000000405"]);
+    assert_eq!(receive(&mut bus, until), ["581#8008100000000405"]);
 }
 
 #[test]
 fn autonomous_start() {
-    let mut setup = still("mh4", 5, 5.0);
+    let mut setup = constant("mh4", 5, 5.0);
     setup.set = vec![(id("1F80"), Scalar::Integer(8))];
     let mut autonomous = bus([setup]);
     play(&mut autonomous, &[("080#", "705#00 185#0000A04000")]);
-    let mut setup = still("dps", 127, 5.0);
+    let mut setup = constant("dps", 127, 5.0);
     setup.start = true;
     let mut started = bus([setup]);
-    assert_eq!(hear(&mut started, ms(250)), ["77F#00", "1FF#88130000", "1FF#88130000"]);
+    assert_eq!(receive(&mut started, ms(250)), ["77F#00", "1FF#88130000", "1FF#88130000"]);
 }
 
 #[test]
 fn objects_that_cannot_be_set_give_an_error() {
-    let mut setup = still("mh4", 5, 5.0);
+    let mut setup = constant("mh4", 5, 5.0);
     setup.set = vec![(id("5000"), Scalar::Integer(1))];
     assert_eq!(Device::new(setup).err().as_deref(), Some("mh4 has no object 0x5000:0"));
-    let mut setup = still("mh4", 5, 5.0);
+    let mut setup = constant("mh4", 5, 5.0);
     setup.set = vec![(id("1017"), Scalar::Integer(70_000))];
     assert_eq!(Device::new(setup).err().as_deref(), Some("0x1017:0: 70000 does not fit u16 (0 to 65535)"));
 }
 
 #[test]
-fn the_same_seed_gives_the_same_frames_and_another_gives_others() {
+fn the_seed_decides_the_frames() {
     let run = |seed| {
         let mut setups = Vec::new();
         for (kind, id) in [("mh4", 1), ("d20", 2), ("mc1609", 3), ("dps", 127)] {
@@ -408,12 +417,12 @@ fn the_same_seed_gives_the_same_frames_and_another_gives_others() {
             setups.push(setup);
         }
         let mut bus = bus(setups);
-        let mut heard = Vec::new();
+        let mut received = Vec::new();
         for round in 1..=50 {
             bus.send(&"080#".parse().expect("a frame")).expect("room");
-            heard.extend(timed(&mut bus, ms(round * 10)));
+            received.extend(timed(&mut bus, ms(round * 10)));
         }
-        heard
+        received
     };
     let first = run(1);
     // 4 boot-ups, 2 TPDOs for each of 50 SYNCs, 4 rounds of 4 + 1 by event timers; those at 500 ms are not complete

@@ -1,7 +1,7 @@
 use super::*;
 use crate::device::catalog;
 use crate::sim::objects::Objects;
-use crate::sim::settings::{Pair, Rate};
+use crate::sim::settings::{BitRate, Pair};
 
 const IDENTITY: Identity = [0x362, 0x443150, 0x10000, 20002];
 
@@ -16,7 +16,7 @@ impl Bed {
         let model = catalog::by_name(kind).expect("built in");
         let node = node.map(|node| NodeId::new(node).expect("a node-ID"));
         let objects = Objects::new(&model, NodeId::MIN);
-        let settings = Settings::new(&model.description, &objects, Pair { node, rate: Rate::At(250_000) });
+        let settings = Settings::new(&model.description, &objects, Pair { node, rate: BitRate::At(250_000) });
         Bed { slave: Slave::new(supported, BTreeMap::new(), false), settings, identity: IDENTITY }
     }
 
@@ -73,7 +73,7 @@ fn configuration_state_supports_every_service() {
     ]);
     assert_eq!(bed.settings.persistent.node, NodeId::new(5).ok(), "not stored yet");
     bed.play(&[("17", "17")]);
-    assert_eq!(bed.settings.persistent, Pair { node: NodeId::new(127).ok(), rate: Rate::At(125_000) });
+    assert_eq!(bed.settings.persistent, Pair { node: NodeId::new(127).ok(), rate: BitRate::At(125_000) });
     assert_eq!(bed.ask("15E803").then, Then::Activate(Duration::from_secs(1)));
     bed.play(&[("11FF", "11"), ("0400", "-"), ("5A", "-")]);
     assert_eq!(bed.settings.pending.node, None);
@@ -83,14 +83,14 @@ fn configuration_state_supports_every_service() {
 fn bit_rate_codes_follow_the_device_table() {
     let mut bed = Bed::new("dps", Some(5), all());
     bed.play(&[("0401", "-"), ("130005", "13"), ("130001", "1301"), ("130009", "1301")]);
-    assert_eq!(bed.settings.pending.rate, Rate::At(100_000));
+    assert_eq!(bed.settings.pending.rate, BitRate::At(100_000));
     let mut bed = Bed::new("mh4", Some(5), all());
     bed.play(&[("0401", "-"), ("130009", "13")]);
-    assert_eq!(bed.settings.pending.rate, Rate::Auto);
+    assert_eq!(bed.settings.pending.rate, BitRate::Auto);
     // Without a known table: the table of CiA 305.
     let mut bed = Bed::new("d20", Some(5), all());
     bed.play(&[("0401", "-"), ("130008", "13"), ("130005", "1301"), ("130009", "1301")]);
-    assert_eq!(bed.settings.pending.rate, Rate::At(10_000));
+    assert_eq!(bed.settings.pending.rate, BitRate::At(10_000));
 }
 
 #[test]
@@ -209,5 +209,5 @@ fn services_can_be_refused() {
     bed.slave = Slave::new(all(), BTreeMap::from([(0x11, 0xff), (0x17, 1)]), false);
     bed.play(&[("0401", "-"), ("1107", "11FF"), ("130004", "13"), ("17", "1701")]);
     assert_eq!(bed.settings.pending.node, NodeId::new(5).ok());
-    assert_eq!(bed.settings.persistent.rate, Rate::At(250_000));
+    assert_eq!(bed.settings.persistent.rate, BitRate::At(250_000));
 }

@@ -152,7 +152,7 @@ fn save_stores_the_requested_group_only() {
     objects.save(Group::All, node(5));
     objects.reset(Area::All, node(9));
     assert_eq!(objects.number(id("0x1017")), 100);
-    assert_eq!(objects.number(id("0x1800:1")), 0x4000_0189, "as delivered: follows the node-ID");
+    assert_eq!(objects.number(id("0x1800:1")), 0x4000_0189, "the default follows the node-ID");
     // Restoring takes effect with the reset.
     objects.restore(Group::Communication);
     assert_eq!(objects.number(id("0x1017")), 100);

@@ -138,7 +138,7 @@ impl From<AutozeroFailure> for Cause {
     }
 }
 
-/// What a failed autozero had done.
+/// The state after a failed autozero.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AutozeroEffect {
     /// The signature was sent once. It is unknown whether the device acted on it.
@@ -200,7 +200,7 @@ impl Undo {
     }
 }
 
-/// What to report about a zero that was set.
+/// A note about a zero that was set.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AutozeroFact {
     /// A safety check failed and was skipped.

@@ -125,7 +125,7 @@ impl Rereads {
     pub(super) fn start_due(&mut self, now: Mono, master: &mut Master<'_>) {
         for (&node, pending) in &mut self.pending {
             if pending.survey.is_none() && pending.due <= now {
-                pending.survey = Some(BackgroundSurvey::begin(node, &self.overrides, master));
+                pending.survey = Some(BackgroundSurvey::start(node, &self.overrides, master));
             }
         }
     }

@@ -24,7 +24,7 @@ use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What is to be set.
+/// The settings to change.
 #[derive(Clone, Debug)]
 pub struct Job<'a> {
     /// The device.

@@ -1,4 +1,4 @@
-//! What is reported while a task runs: steps and warnings, as types. The texts are in `output`.
+//! Steps and warnings that a running task reports, as types. The texts are in `output`.
 
 use super::device::DeviceName;
 use super::progress::Progress;
@@ -17,7 +17,7 @@ pub struct LssFact {
     pub event: LssEvent,
 }
 
-/// What happened in an LSS task.
+/// A step of an LSS task.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LssEvent {
     /// The target was found.
@@ -51,7 +51,7 @@ pub enum LssEvent {
     ObjectsInsteadOfLss,
     /// No document confirms the method.
     UnverifiedMethod {
-        /// What is doubtful, from the description.
+        /// The doubt in the description.
         doubt: String,
     },
     /// Storing also stores all other values, and resets the COB-IDs to their defaults.

@@ -118,7 +118,7 @@ pub enum LssCause {
     },
 }
 
-/// What is to be set.
+/// The setting to change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
     /// The node-ID.
@@ -160,7 +160,7 @@ pub enum Neighbour {
     Sender(CanId),
 }
 
-/// What was changed before an LSS task failed, or what was left behind.
+/// A change that was made before an LSS task failed, or a state that it left behind.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LssEffect {
     /// How far the change has come.
@@ -178,7 +178,7 @@ pub enum LssEffect {
     },
 }
 
-/// What the user can do after a change that did not succeed completely.
+/// The next step after a change that did not succeed completely.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NextStep {
     /// Follow the hint of the cause.

@@ -33,8 +33,8 @@ pub fn scan(master: &mut Master<'_>, notify: Notify<'_>) -> Result<Vec<FoundSlav
         .into_iter()
         .map(|found| FoundSlave {
             node: Some(found.node),
-            address: nodes::address_of(&found.instrument),
-            model: found.instrument.model,
+            address: nodes::address_of(&found.device),
+            model: found.device.model,
         })
         .collect();
     master.listen(&Filters::All)?;

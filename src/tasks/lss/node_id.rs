@@ -1,4 +1,4 @@
-//! What answers under a node-ID: one device, none, or several.
+//! Counts the devices that answer under a node-ID: none, one or several.
 
 use super::device::DeviceName;
 use super::failure::{LssCause, LssFailure};
@@ -51,7 +51,7 @@ pub enum TakenSign {
     Heartbeat,
 }
 
-/// What answers under a node-ID.
+/// The devices that answer under a node-ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Occupant {
     /// One device with this identity.

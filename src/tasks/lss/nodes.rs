@@ -52,7 +52,7 @@ pub(super) fn address_of(node: &Node) -> Option<LssAddress> {
 /// Bus errors and Ctrl-C.
 pub(super) fn with_identity(master: &mut Master<'_>, address: LssAddress) -> Result<Vec<NodeId>, Failure> {
     let found = identified(master)?;
-    Ok(found.iter().filter(|found| address_of(&found.instrument) == Some(address)).map(|found| found.node).collect())
+    Ok(found.iter().filter(|found| address_of(&found.device) == Some(address)).map(|found| found.node).collect())
 }
 
 /// Refuses an identity that another node has as well: LSS would address both. Some vendors give all devices the same

@@ -32,7 +32,7 @@ pub struct StartupReport {
     pub starts: Starts,
     /// The number in the object.
     pub raw: u64,
-    /// What the manual contradicts or leaves open.
+    /// The doubt: the manual contradicts itself or leaves it open.
     pub doubt: String,
 }
 

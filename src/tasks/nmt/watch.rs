@@ -27,7 +27,7 @@ pub enum Change {
 
 /// A change with its moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Seen {
+pub struct StateEvent {
     /// The moment.
     pub at: Stamp,
     /// The node.
@@ -50,7 +50,7 @@ pub fn watch(
     nodes: &[NodeId],
     ask: bool,
     until: Option<Mono>,
-    on_change: &mut dyn FnMut(&Seen) -> ControlFlow<()>,
+    on_change: &mut dyn FnMut(&StateEvent) -> ControlFlow<()>,
 ) -> Result<(), Error> {
     let mut heartbeats: BTreeMap<NodeId, Heartbeat> = nodes.iter().map(|&node| (node, Heartbeat::default())).collect();
     if ask {
@@ -69,7 +69,7 @@ pub fn watch(
 struct Watcher<'a> {
     heartbeats: BTreeMap<NodeId, Heartbeat>,
     end: Mono,
-    on_change: &'a mut dyn FnMut(&Seen) -> ControlFlow<()>,
+    on_change: &'a mut dyn FnMut(&StateEvent) -> ControlFlow<()>,
 }
 
 impl Watcher<'_> {
@@ -79,13 +79,13 @@ impl Watcher<'_> {
     }
 
     /// The node whose heartbeat is overdue.
-    fn lost(&mut self, at: Stamp) -> Option<Seen> {
+    fn lost(&mut self, at: Stamp) -> Option<StateEvent> {
         let now = self.deadline();
         let is_overdue = |heartbeat: &Heartbeat| heartbeat.lost_at().is_some_and(|due| due <= now);
         let (&node, heartbeat) = self.heartbeats.iter_mut().find(|(_, heartbeat)| is_overdue(heartbeat))?;
         heartbeat.is_lost = true;
         let silence = heartbeat.last.map_or(Duration::ZERO, |last| now.since(last));
-        Some(Seen { at, node, change: Change::Lost(silence) })
+        Some(StateEvent { at, node, change: Change::Lost(silence) })
     }
 }
 
@@ -101,7 +101,7 @@ impl Waiter for Watcher<'_> {
         let seen = match event {
             Happening::Frame(received) => Life::parse(&received.frame).and_then(|(node, life)| {
                 let change = self.heartbeats.get_mut(&node)?.on_life(life, received.at.mono)?;
-                Some(Seen { at: received.at, node, change })
+                Some(StateEvent { at: received.at, node, change })
             }),
             Happening::Deadline if self.deadline() >= self.end => return Ok(ControlFlow::Break(())),
             Happening::Deadline => self.lost(master.bus().now()),
@@ -134,7 +134,7 @@ impl Heartbeat {
     fn on_life(&mut self, life: Life, at: Mono) -> Option<Change> {
         let state = match life {
             Life::BootUp => {
-                // The time from the last heartbeat to the first one after a restart is no interval.
+                // The time from the last heartbeat to the first one after a restart is not an interval.
                 *self = Heartbeat { period: self.period, ..Heartbeat::default() };
                 return Some(Change::BootUp);
             }
@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(heartbeat.on_life(operational, at(1000)), None);
         assert_eq!(heartbeat.lost_at(), Some(at(3050)));
         heartbeat.is_lost = true;
-        // The silence of a lost node is no interval.
+        // The silence of a lost node is not an interval.
         assert_eq!(heartbeat.on_life(operational, at(60_000)), Some(Change::Back(NmtState::Operational)));
         assert_eq!(heartbeat.lost_at(), Some(at(62_050)));
         assert_eq!(heartbeat.on_life(Life::BootUp, at(61_000)), Some(Change::BootUp));

@@ -47,7 +47,7 @@ pub enum SettingsFailure {
         wanted: FilterType,
         /// Code and meaning of the types that it has.
         available: Vec<(u64, String)>,
-        /// What is doubtful about them, from the description; may be empty.
+        /// The doubt about them in the description; may be empty.
         doubt: String,
     },
     /// No object is known that accepts a damping.
@@ -147,7 +147,7 @@ pub enum QuantityError {
     Value(ValueError),
 }
 
-/// What a change of limits that failed left behind.
+/// The limits after a failed change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SettingsEffect {
     /// The previous limits of the signal are set again.
@@ -167,7 +167,7 @@ pub enum SettingsEffect {
     },
 }
 
-/// What there is to report about a setting.
+/// A note about a setting.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SettingsFact {
     /// The signal already has this unit.

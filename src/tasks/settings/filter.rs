@@ -19,7 +19,7 @@ pub struct FilterReport {
     pub filter: FilterOf,
     /// Whether 61A1h shows the new damping; `None` if no damping was set.
     pub damping_shown: Option<bool>,
-    /// What else there is to report.
+    /// Further notes.
     pub notes: Vec<Note>,
 }
 

@@ -63,7 +63,7 @@ pub struct Limits {
     pub values: Vec<(Limit, ObjectId, Quantity)>,
     /// TPDOs that may never be sent because the delta is 0.
     pub silent: Vec<String>,
-    /// What else there is to report.
+    /// Further notes.
     pub notes: Vec<Note>,
 }
 

@@ -35,7 +35,7 @@ pub struct UnitChange {
     pub now: UnitOf,
     /// The objects in this unit, before and after.
     pub rescaled: Vec<Rescaled>,
-    /// What else there is to report.
+    /// Further notes.
     pub notes: Vec<Note>,
 }
 

@@ -9,24 +9,24 @@ pub(super) fn kinds(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     if run.bus.overran {
         return;
     }
-    let told = || format!("{:?}: {failure} (hint: {:?})", failure.kind(), ErrorMessage::of(failure).hint);
+    let details = || format!("{:?}: {failure} (hint: {:?})", failure.kind(), ErrorMessage::of(failure).hint);
     let tap = &run.bus;
     if tap.interrupted.is_some() && !tap.was_down && !tap.was_off {
         // The failure may have happened before the interruption.
         let was_full = spec.faults.iter().any(|fault| matches!(fault, Fault::Full { .. } | Fault::BusOff { .. }));
         if failure.kind() == Kind::Bus && !was_full {
-            violations.push(("names the cause", format!("interrupted: {}", told())));
+            violations.push(("names the cause", format!("interrupted: {}", details())));
         }
         let quiet = spec.faults.is_empty() && spec.others.is_empty() && spec.device_faults().next().is_none();
         // A recording may have ended before, for lack of rows, and was restoring states when it was interrupted.
         let in_time = tap.interrupted < tap.frames.last().map(|(at, _)| *at) || !records(spec);
         if quiet && failure.kind() == Kind::NoAnswer && all_there(spec) && in_time {
-            violations.push(("names the cause", format!("interrupted: {}", told())));
+            violations.push(("names the cause", format!("interrupted: {}", details())));
         }
         return;
     }
     if failure.kind() == Kind::Interrupted && tap.interrupted.is_none() {
-        violations.push(("names the cause", format!("not interrupted: {}", told())));
+        violations.push(("names the cause", format!("not interrupted: {}", details())));
     }
     if tap.was_down && tap.interrupted.is_none() && !records(spec) && failure.kind() != Kind::Bus {
         // The command may have failed before.
@@ -37,7 +37,7 @@ pub(super) fn kinds(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
         if down_at.min() == Some(0)
             || spec.faults.len() == 1 && !matches!(failure.kind(), Kind::Usage | Kind::Refused) && quiet(spec)
         {
-            violations.push(("names the cause", format!("the interface was down: {}", told())));
+            violations.push(("names the cause", format!("the interface was down: {}", details())));
         }
     }
     let bus_is_well = spec
@@ -60,7 +60,7 @@ pub(super) fn kinds(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
                 )
             })
         {
-            violations.push(("names the cause", format!("the bus works: {}", told())));
+            violations.push(("names the cause", format!("the bus works: {}", details())));
         }
     }
     if !spec.is_clean() {
@@ -68,15 +68,15 @@ pub(super) fn kinds(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     }
     // Without faults every device answers and follows the protocol.
     if failure.kind() == Kind::NoAnswer && all_there(spec) && !may_be_silent(spec) {
-        violations.push(("names the cause", format!("all devices answer: {}", told())));
+        violations.push(("names the cause", format!("all devices answer: {}", details())));
     }
     if failure.kind() == Kind::Unexpected && !may_be_odd(spec, &ErrorMessage::of(failure).message) {
-        violations.push(("names the cause", format!("nothing is unexpected: {}", told())));
+        violations.push(("names the cause", format!("nothing is unexpected: {}", details())));
     }
     if failure.kind() == Kind::Refused
         && matches!(spec.command, Command::Scan { .. } | Command::Info { .. } | Command::Nmt { .. })
     {
-        violations.push(("names the cause", format!("no device refuses: {}", told())));
+        violations.push(("names the cause", format!("no device refuses: {}", details())));
     }
 }
 

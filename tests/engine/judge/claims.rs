@@ -12,7 +12,7 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Claim, after: &[DeviceSt
                 spec.devices.iter().filter_map(|device| Some((device.node?, device.serial))).collect();
             for (node, serial) in found {
                 match (there.get(node), serial) {
-                    (None, _) => violations.push(("finds the devices", format!("nobody has node {node}"))),
+                    (None, _) => violations.push(("finds the devices", format!("no device has node-ID {node}"))),
                     (Some(right), Some(serial)) if right != serial && has_serial(spec, *node) => {
                         violations.push(("finds the devices", format!("node {node} is {right}, not {serial}")));
                     }
@@ -118,7 +118,7 @@ pub(super) fn claims(spec: &Spec, run: &mut Run, said: &Claim, after: &[DeviceSt
                 && !spec.is_disordered()
                 && !spec.devices.iter().any(|device| device.bit_rate == Some(*rate)) =>
         {
-            violations.push(("finds the devices", format!("nobody is at {rate} bit/s")));
+            violations.push(("finds the devices", format!("no device is at {rate} bit/s")));
         }
         (Claim::Identified(answered), Command::LssIdentify { .. }) if spec.is_clean() => {
             let replied = run.bus.frames.iter().any(|(_, passed)| {

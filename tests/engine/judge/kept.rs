@@ -32,8 +32,9 @@ pub(super) fn after_power(spec: &Spec, run: &mut Run, violations: &mut Vec<Viola
             if !spec.falsifies_data() && !spec.is_changed_by_others() && !spec.shares_node_ids() =>
         {
             // The properties of a device are known only if it reports its identity.
-            let tells = !spec.device_faults().any(|device_fault| matches!(device_fault, DeviceFault::Refuse { .. }));
-            if let (Command::Map { node, keep: true, .. }, true) = (&spec.command, tells) {
+            let is_identified =
+                !spec.device_faults().any(|device_fault| matches!(device_fault, DeviceFault::Refuse { .. }));
+            if let (Command::Map { node, keep: true, .. }, true) = (&spec.command, is_identified) {
                 for station in bus.stations_mut::<FaultyDevice>() {
                     if spec.devices[station.place].node == Some(*node)
                         && let Some(difference) = mapped_otherwise(station, settings, settled)

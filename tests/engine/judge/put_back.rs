@@ -41,13 +41,14 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[DeviceState], violat
     if keeps && clean_answers {
         for (place, (before, after)) in run.before.iter().zip(after).enumerate() {
             let device = &spec.devices[place];
-            let told = device.heartbeat_ms.is_some_and(|time| time <= 200) && device.unsaved_heartbeat.is_none();
+            let has_fast_heartbeat =
+                device.heartbeat_ms.is_some_and(|time| time <= 200) && device.unsaved_heartbeat.is_none();
             let refuses = device
                 .device_faults
                 .iter()
                 .any(|device_fault| matches!(device_fault, DeviceFault::Refuse { index: 0x1017, .. }));
             let shared = spec.shares_node_ids();
-            if told
+            if has_fast_heartbeat
                 && !refuses
                 && !shared
                 && device.kind != "jumo"

@@ -13,7 +13,7 @@ pub(super) fn check_cause(spec: &Spec, run: &Run, violations: &mut Vec<Violation
         Kind::NoAnswer if !spec.falsifies_data() && !spec.shares_node_ids() => {
             was_silent(spec, run, failure, violations)
         }
-        // What cannot be done is not even requested.
+        // A refusal by the program itself sends no request.
         Kind::Refused if ErrorMessage::of(failure).message.contains("refused by the device") => {
             was_refused(run, failure, violations)
         }
@@ -129,6 +129,6 @@ fn was_refused(run: &Run, failure: &Failure, violations: &mut Vec<Violation>) {
     };
     let came = run.bus.frames.iter().any(|(_, passed)| matches!(passed, Passed::Received(frame) if refuses(frame)));
     if !came {
-        violations.push(("names the cause", format!("nobody refused: {failure} {:?}", failure.abort())));
+        violations.push(("names the cause", format!("no device rejected a request: {failure} {:?}", failure.abort())));
     }
 }

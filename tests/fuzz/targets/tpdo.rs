@@ -20,8 +20,8 @@ const TPDO: u32 = 0x185;
 fuzz_target!(|data: &[u8]| {
     let mut bytes = Bytes(data);
     let head = bytes.byte();
-    let mut instrument = Node::new(node());
-    instrument.signals.push(Signal {
+    let mut device = Node::new(node());
+    device.signals.push(Signal {
         name: "pressure".into(),
         channel: 1,
         value: (ObjectId::new(0x9130, 1), Some(DataType::Integer(4))),
@@ -36,9 +36,9 @@ fuzz_target!(|data: &[u8]| {
     let bits: usize = mapping.iter().map(|entry| usize::from(entry.bits)).sum();
     let number = TpdoNumber::new(1).expect("1 to 512");
     let mapped = mapping.len();
-    instrument.tpdos.push(Tpdo { number, cob_id: CobId(TPDO), transmission: None, event_timer_ms: None, mapping });
+    device.tpdos.push(Tpdo { number, cob_id: CobId(TPDO), transmission: None, event_timer_ms: None, mapping });
     let mut decoder = Decoder::default();
-    decoder.add(instrument.layout(), &[]);
+    decoder.add(device.layout(), &[]);
     assert!(decoder.sources().len() <= mapped);
     let at = Stamp { mono: Mono::START, wall: Wall::at(Duration::ZERO) };
     while !bytes.is_empty() {

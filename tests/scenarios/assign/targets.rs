@@ -279,8 +279,8 @@ fn two_devices_with_one_identity() {
     assert_eq!(all_snapshots(&bus), before);
     // Devices without 5Eh.
     for kind in ["dps", "d20"] {
-        let twin = |node: u8| format!("{{ kind = '{kind}', node = {node}, serial = 7 }}");
-        let mut bus = super::bus(&format!("device = [{}, {}]", twin(5), twin(6)));
+        let device = |node: u8| format!("{{ kind = '{kind}', node = {node}, serial = 7 }}");
+        let mut bus = super::bus(&format!("device = [{}, {}]", device(5), device(6)));
         let before = all_snapshots(&bus);
         assert_eq!(run(&mut bus, "5", &id(12)).failure().0, Kind::CheckFailed, "{kind}");
         assert_eq!(all_snapshots(&bus), before, "{kind}");

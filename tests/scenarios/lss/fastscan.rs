@@ -1,4 +1,4 @@
-//! Fastscan against slaves that are slow, many, forgetful or talkative.
+//! Fastscan with slaves that are slow, that lose answers, or that send too many, and with several slaves.
 
 use super::slave::Slave;
 use super::{address, bus_of, configuring, ms};
@@ -11,13 +11,13 @@ use std::time::Duration;
 
 const DPS: [u32; 4] = [0x362, 0x0044_3150, 0x0001_0000, 20002];
 
-/// Runs a scan and, where somebody is found, says who is in configuration state then.
+/// Runs a scan, and returns its result and the slaves that are then in configuration state.
 fn scan(bus: &mut MemoryBus) -> (Result<Option<LssAddress>, LssError>, Vec<[u32; 4]>) {
     let mut master = Master::new(bus, Timing::default());
     let mut lss = master.lss();
     let found = lss.fastscan();
     let is_configuring = lss.is_configuring();
-    // Kept from tidying up, to look at how it is.
+    // Without `drop`, which would switch the slaves to waiting state.
     std::mem::forget(lss);
     let configuring = configuring(bus);
     assert!(is_configuring || configuring.is_empty());
@@ -25,7 +25,7 @@ fn scan(bus: &mut MemoryBus) -> (Result<Option<LssAddress>, LssError>, Vec<[u32;
 }
 
 #[test]
-fn whoever_is_alone_is_found_within_a_second() {
+fn single_slave_is_found_within_a_second() {
     for identity in [DPS, [0; 4], [u32::MAX; 4], [0x1234_5678, 0x9abc_def0, 1, 0x8000_0000]] {
         for latency in [0, 100, 1000, 1500] {
             let mut bus = bus_of([Slave::new(identity, 0xff).slow(&[latency])]);
@@ -38,14 +38,14 @@ fn whoever_is_alone_is_found_within_a_second() {
 }
 
 #[test]
-fn nobody_without_a_node_id() {
+fn configured_slave_is_not_found() {
     let mut bus = bus_of([Slave::new(DPS, 5)]);
     let (found, configuring) = scan(&mut bus);
     assert_eq!((found.unwrap(), configuring.len()), (None, 0));
 }
 
 #[test]
-fn slow_devices_are_found_in_their_own_time() {
+fn slow_slaves_are_found() {
     for latencies in [&[20_000][..], &[100_000], &[100, 100, 9000], &[100, 20_000, 100], &[40_000, 100, 100, 100]] {
         let mut bus = bus_of([Slave::new(DPS, 0xff).slow(latencies)]);
         let (found, configuring) = scan(&mut bus);
@@ -55,7 +55,7 @@ fn slow_devices_are_found_in_their_own_time() {
 }
 
 #[test]
-fn three_are_found_and_none_is_changed() {
+fn three_slaves_are_found_without_changing_them() {
     let identities = [DPS, [0x362, 0x0044_3150, 0x0001_0000, 20003], [0x47, 1, 0x0001_0007, 99]];
     for latencies in [[300, 300, 300], [200, 900, 1600], [100, 3000, 200], [5000, 100, 100]] {
         let slaves = identities.iter().zip(latencies).map(|(&it, latency)| Slave::new(it, 0xff).slow(&[latency]));
@@ -75,12 +75,12 @@ fn three_are_found_and_none_is_changed() {
         found.sort_by_key(|it| it.parts());
         assert_eq!(found, expected, "{latencies:?}");
         assert_eq!(bus.stations::<Slave>().map(|slave| slave.node).collect::<Vec<_>>(), [0xff, 0xff, 0xff, 5]);
-        assert_eq!(configuring(&bus), [[0; 4]; 0], "all are back in waiting state");
+        assert_eq!(configuring(&bus), [[0; 4]; 0], "all are in waiting state again");
     }
 }
 
 #[test]
-fn three_are_found_one_after_the_other() {
+fn three_slaves_are_configured_in_turn() {
     let identities = [DPS, [0x362, 0x0044_3150, 0x0001_0000, 20003], [0x47, 1, 0x0001_0007, 99]];
     for latencies in [[300, 300, 300], [200, 900, 1600], [100, 3000, 200], [5000, 100, 100]] {
         let slaves = identities.iter().zip(latencies).map(|(&it, latency)| Slave::new(it, 0xff).slow(&[latency]));
@@ -101,24 +101,24 @@ fn three_are_found_one_after_the_other() {
             .map(|identity| bus.stations::<Slave>().find(|slave| slave.identity == *identity).unwrap().node)
             .collect();
         assert_eq!(nodes, [10, 11, 12], "{latencies:?}");
-        assert!(bus.stations::<Slave>().all(|slave| slave.told == 5), "each is told once, and asked for its address");
+        assert!(bus.stations::<Slave>().all(|slave| slave.commands == 5), "one node-ID and four inquiries for each");
     }
 }
 
 #[test]
-fn a_device_that_answers_everything_is_no_address() {
-    let mut babbler = Slave::new(DPS, 0xff);
-    babbler.babbles = Some(false);
-    let mut bus = bus_of([babbler]);
+fn slave_that_answers_each_frame_is_an_error() {
+    let mut slave = Slave::new(DPS, 0xff);
+    slave.answers_all_fastscans = Some(false);
+    let mut bus = bus_of([slave]);
     let (found, configuring) = scan(&mut bus);
     assert!(matches!(found, Err(LssError::Fastscan(FastscanError::AnswersEverything))), "{found:?}");
     assert_eq!(configuring.len(), 0);
 }
 
 #[test]
-fn one_that_answers_everything_in_configuration_state_is_taken_out_of_it() {
+fn slave_that_answers_each_frame_in_configuration_state_is_switched_to_waiting() {
     let mut left_behind = Slave::new(DPS, 5);
-    left_behind.babbles = Some(true);
+    left_behind.answers_all_fastscans = Some(true);
     left_behind.is_configuring = true;
     let other = [0x47, 1, 0x0001_0007, 99];
     let mut bus = bus_of([left_behind, Slave::new(other, 0xff)]);
@@ -127,38 +127,38 @@ fn one_that_answers_everything_in_configuration_state_is_taken_out_of_it() {
 }
 
 #[test]
-fn two_with_one_address_are_no_device() {
+fn two_slaves_with_one_identity_are_an_error() {
     let mut bus = bus_of([Slave::new(DPS, 0xff).slow(&[200]), Slave::new(DPS, 0xff).slow(&[800])]);
     let (found, _) = scan(&mut bus);
     assert!(matches!(found, Err(LssError::Several { service: Service::Inquire(_), .. })), "{found:?}");
 }
 
 #[test]
-fn without_inquiry_the_address_itself_confirms() {
+fn slave_without_inquiries_is_confirmed_by_its_address() {
     let mut bus = bus_of([Slave::new(DPS, 0xff).without(0x5a..=0x5e)]);
     let (found, configuring) = scan(&mut bus);
     assert_eq!((found.unwrap(), configuring), (Some(address(DPS)), vec![DPS]));
-    let mut mistaken = Slave::new(DPS, 0xff);
-    mistaken.says.insert(0x5d, vec![0x5d, 1, 2, 3, 4, 0, 0, 0]);
-    let (found, _) = scan(&mut bus_of([mistaken]));
+    let mut wrong = Slave::new(DPS, 0xff);
+    wrong.answers.insert(0x5d, vec![0x5d, 1, 2, 3, 4, 0, 0, 0]);
+    let (found, _) = scan(&mut bus_of([wrong]));
     assert!(matches!(found, Err(LssError::AddressMismatch { .. })), "{found:?}");
 }
 
-/// Whatever gets lost: who is found is there, and alone in configuration state.
+/// A slave that is found exists, and is the only one in configuration state.
 #[test]
-fn lost_answers_make_up_nobody() {
+fn lost_answers_never_produce_a_wrong_address() {
     let (mut found, mut given_up) = (0, 0);
     for first in 0..150 {
         for more in [None, Some(first + 1), Some(first + 40)] {
-            let mut forgetful = Slave::new(DPS, 0xff);
-            forgetful.loses = more.into_iter().chain([first]).collect();
-            let (end, configuring) = scan(&mut bus_of([forgetful]));
+            let mut slave = Slave::new(DPS, 0xff);
+            slave.loses = more.into_iter().chain([first]).collect();
+            let (end, configuring) = scan(&mut bus_of([slave]));
             match end {
                 Ok(Some(address)) => {
                     assert_eq!((address.parts(), configuring), (DPS, vec![DPS]));
                     found += 1;
                 }
-                // It was asked twice whether it is there.
+                // The first frame is sent twice: both answers were lost.
                 Ok(None) => assert_eq!((first, more), (0, Some(1))),
                 Err(_) => given_up += 1,
             }
@@ -167,10 +167,9 @@ fn lost_answers_make_up_nobody() {
     assert!(given_up * 10 < found, "{found} found, {given_up} given up");
 }
 
-/// Answers that come when they like, of one to three slaves: whoever is found is there, and alone in configuration
-/// state.
+/// One to three slaves with random delays. A slave that is found exists, and is the only one in configuration state.
 #[test]
-fn answers_at_leisure_make_up_nobody() {
+fn random_delays_never_produce_a_wrong_address() {
     let (mut found, mut given_up) = (0, 0);
     let mut random = 1u64;
     let mut next = |below: u64| {
@@ -183,7 +182,7 @@ fn answers_at_leisure_make_up_nobody() {
         let slaves: Vec<Slave> = slaves
             .iter()
             .map(|&identity| {
-                // Mostly at once; now and then the host has something else to do.
+                // Mostly short delays, and some long ones.
                 let latencies: Vec<u64> =
                     (0..97).map(|_| if next(30) == 0 { next(40_000) } else { next(1500) }).collect();
                 Slave::new(identity, 0xff).slow(&latencies)
@@ -195,17 +194,16 @@ fn answers_at_leisure_make_up_nobody() {
                 assert_eq!(configuring, [address.parts()], "{run}");
                 found += 1;
             }
-            Ok(None) => panic!("{run}: somebody is there"),
-            Err(LssError::Fastscan(FastscanError::AnswersEverything)) => panic!("{run}: nobody talks too much"),
+            Ok(None) => panic!("{run}: no slave found"),
+            Err(LssError::Fastscan(FastscanError::AnswersEverything)) => panic!("{run}: no slave answers each frame"),
             Err(_) => given_up += 1,
         }
     }
     assert!(given_up * 10 < found, "{found} found, {given_up} given up");
 }
 
-/// Ctrl-C at any moment leaves nobody in configuration state.
 #[test]
-fn nobody_is_left_in_configuration_state() {
+fn ctrl_c_leaves_no_slave_in_configuration_state() {
     let mut interrupted = 0;
     for moment in (0..400).step_by(3) {
         let mut bus = bus_of([Slave::new(DPS, 0xff)]);

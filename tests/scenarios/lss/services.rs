@@ -1,4 +1,4 @@
-//! The services one by one: who answers, how often, in time or not, and who is touched.
+//! Single LSS services: which slaves answer, how often, in time or late, and which slaves are changed.
 
 use super::slave::Slave;
 use super::{address, bus_of, configuring, ms};
@@ -20,7 +20,7 @@ fn node(number: u8) -> NodeId {
     NodeId::new(number).unwrap()
 }
 
-/// What comes of some services, and who is in configuration state when all is over.
+/// Runs services. Afterwards no slave may be in configuration state.
 fn run<T>(bus: &mut MemoryBus, services: impl FnOnce(&mut Lss) -> Result<T, LssError>) -> Result<T, LssError> {
     let mut master = Master::new(bus, Timing::default());
     let mut lss = master.lss();
@@ -33,7 +33,7 @@ fn run<T>(bus: &mut MemoryBus, services: impl FnOnce(&mut Lss) -> Result<T, LssE
     result
 }
 
-/// A node-ID for the slave with an address, as a task would do it.
+/// Sets the node-ID of the slave with this address, as the task does.
 fn assign(lss: &mut Lss, identity: [u32; 4], to: NodeId) -> Result<(), LssError> {
     lss.switch_global(Mode::Waiting)?;
     lss.switch_selective(&address(identity))?;
@@ -42,21 +42,21 @@ fn assign(lss: &mut Lss, identity: [u32; 4], to: NodeId) -> Result<(), LssError>
 }
 
 #[test]
-fn only_the_slave_that_was_addressed_is_told_anything() {
+fn only_the_addressed_slave_receives_commands() {
     for order in [[ONE, OTHER], [OTHER, ONE]] {
         let mut bus = bus_of(order.map(|identity| Slave::new(identity, 5)));
-        // Somebody has left everybody in configuration state.
+        // Another master has left all slaves in configuration state.
         bus.stations_mut::<Slave>().for_each(|slave| slave.is_configuring = true);
         run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();
         for slave in bus.stations::<Slave>() {
             let expected = if slave.identity == ONE { (12, Some(12), 2) } else { (5, None, 0) };
-            assert_eq!((slave.node, slave.stored, slave.told), expected);
+            assert_eq!((slave.node, slave.stored, slave.commands), expected);
         }
     }
 }
 
 #[test]
-fn an_address_is_repeated_from_its_first_part() {
+fn address_is_repeated_from_its_first_part() {
     let mut slave = Slave::new(ONE, 5);
     slave.loses = [0].into();
     let mut bus = bus_of([slave, Slave::new(OTHER, 6)]);
@@ -65,24 +65,24 @@ fn an_address_is_repeated_from_its_first_part() {
     let mut bus = bus_of([Slave::new(OTHER, 6)]);
     let error = run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap_err();
     assert_eq!(error.to_string(), "LSS switch state selective: no answer within 500 ms");
-    assert_eq!(bus.stations::<Slave>().map(|slave| slave.told).sum::<usize>(), 0);
+    assert_eq!(bus.stations::<Slave>().map(|slave| slave.commands).sum::<usize>(), 0);
 }
 
 #[test]
-fn a_store_may_take_its_time_and_is_asked_for_once() {
+fn store_has_a_long_timeout_and_is_sent_once() {
     let mut bus = bus_of([Slave::new(ONE, 5).slow(&[300, 300, 2_900_000])]);
     run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();
     let mut slave = Slave::new(ONE, 5);
-    slave.says.insert(0x17, vec![]);
+    slave.answers.insert(0x17, vec![]);
     let mut bus = bus_of([slave]);
     let error = run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap_err();
     assert_eq!(error.to_string(), "LSS store configuration: no answer within 3 s");
-    assert_eq!(bus.stations::<Slave>().map(|slave| slave.told).sum::<usize>(), 2);
+    assert_eq!(bus.stations::<Slave>().map(|slave| slave.commands).sum::<usize>(), 2);
 }
 
 #[test]
-fn what_the_slave_says_is_what_it_said() {
-    for (said, expected, kind) in [
+fn answer_to_store_is_reported() {
+    for (answer, expected, kind) in [
         (&[0x17, 0, 0, 0, 0, 0, 0, 0][..], "", None),
         (&[0x17, 0], "", None),
         (
@@ -96,19 +96,19 @@ fn what_the_slave_says_is_what_it_said() {
             Some(Kind::Refused),
         ),
         (&[0x17], "LSS store configuration: frame too short: 7E4#17", Some(Kind::Unexpected)),
-        // The answer to something else is none.
+        // The answer to another service is ignored.
         (&[0x11, 0, 0, 0, 0, 0, 0, 0], "LSS store configuration: no answer within 3 s", Some(Kind::NoAnswer)),
         (&[0x44, 0, 0, 0, 0, 0, 0, 0], "LSS store configuration: no answer within 3 s", Some(Kind::NoAnswer)),
     ] {
         let mut slave = Slave::new(ONE, 5);
-        slave.says.insert(0x17, said.to_vec());
+        slave.answers.insert(0x17, answer.to_vec());
         let result = run(&mut bus_of([slave]), |lss| assign(lss, ONE, node(12)));
         assert_eq!(result.as_ref().err().map(ToString::to_string).unwrap_or_default(), expected);
-        assert_eq!(result.err().map(|error| Failure::from(error).kind()), kind, "{said:X?}");
+        assert_eq!(result.err().map(|error| Failure::from(error).kind()), kind, "{answer:X?}");
     }
     let code = ErrorCode { code: 1, specific: 0 };
     let mut slave = Slave::new(ONE, 5);
-    slave.says.insert(0x13, vec![0x13, 1, 0, 0, 0, 0, 0, 0]);
+    slave.answers.insert(0x13, vec![0x13, 1, 0, 0, 0, 0, 0, 0]);
     let refused = run(&mut bus_of([slave]), |lss| {
         lss.switch_global(Mode::Configuration)?;
         lss.configure_bit_timing(0, 5)
@@ -118,7 +118,7 @@ fn what_the_slave_says_is_what_it_said() {
 }
 
 #[test]
-fn several_in_configuration_state_are_told_from_one() {
+fn several_slaves_in_configuration_state_are_detected() {
     let all = |bus: &mut MemoryBus| {
         run(bus, |lss| {
             lss.switch_global(Mode::Configuration)?;
@@ -128,7 +128,7 @@ fn several_in_configuration_state_are_told_from_one() {
     let (serial, vendor, id) = all(&mut bus_of([Slave::new(ONE, 5)])).unwrap();
     assert_eq!((serial.is_one(), vendor.is_one(), id.is_one()), (true, true, true));
     assert_eq!((serial.answers, vendor.answers, id.answers), (vec![20002], vec![0x362], vec![Some(node(5))]));
-    // However late the second one is.
+    // The second answer may be late.
     for latency in [2000, 20_000, 400_000] {
         let (serial, vendor, id) =
             all(&mut bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 5).slow(&[latency])])).unwrap();
@@ -136,10 +136,10 @@ fn several_in_configuration_state_are_told_from_one() {
         assert_eq!((serial.is_one(), vendor.is_one(), id.is_one()), (false, false, false), "{latency}");
         assert_eq!((vendor.answers, id.answers), (vec![0x362], vec![Some(node(5))]));
     }
-    // Answers at the very same time are one frame if they are the same, else an error frame and then two.
+    // Simultaneous answers merge into one frame if they are equal; otherwise there is an error frame, then both are sent.
     let (serial, vendor, _) = all(&mut bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 5)])).unwrap();
     assert_eq!((serial.is_one(), vendor.is_one()), (false, true));
-    // What is meant for one was taken by two: no success.
+    // Two slaves executed a service for one slave: an error.
     let mut bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 5).slow(&[2000])]);
     let both = run(&mut bus, |lss| {
         lss.switch_global(Mode::Configuration)?;
@@ -149,7 +149,7 @@ fn several_in_configuration_state_are_told_from_one() {
 }
 
 #[test]
-fn others_of_the_kind() {
+fn other_slaves_of_the_same_product_are_found() {
     let others = |more: Vec<Slave>| {
         let slaves = [Slave::new(ONE, 5)].into_iter().chain(more);
         run(&mut bus_of(slaves), |lss| lss.others(&address(ONE))).unwrap()
@@ -162,14 +162,14 @@ fn others_of_the_kind() {
     assert_eq!(others(vec![Slave::new(older, 5)]), range("0x362:0x443150:0-0xFFFFFFFF:0-20001"));
     let newer = [ONE[0], ONE[1], 0x0001_0001, ONE[3]];
     assert_eq!(others(vec![Slave::new(newer, 5)]), range("0x362:0x443150:0x10001-0xFFFFFFFF:20002"));
-    // The very same twice, if not at the very same time.
+    // Two slaves with the same identity, if they do not answer simultaneously.
     assert_eq!(others(vec![Slave::new(ONE, 5).slow(&[900])]), range("0x362:0x443150:0x10000:20002"));
     let mut bus = bus_of([Slave::new(ONE, 5).without(0x46..=0x4b)]);
     assert_eq!(run(&mut bus, |lss| lss.others(&address(ONE))).unwrap(), Others::Unproven);
 }
 
 #[test]
-fn who_has_no_node_id() {
+fn slave_without_node_id_is_identified() {
     for (id, expected) in [(5, false), (0xff, true)] {
         let mut bus = bus_of([Slave::new(ONE, id)]);
         assert_eq!(run(&mut bus, |lss| lss.identify_unconfigured()).unwrap(), expected);
@@ -177,7 +177,7 @@ fn who_has_no_node_id() {
 }
 
 #[test]
-fn an_interruption_ends_in_waiting_state_and_changes_nothing_more() {
+fn ctrl_c_ends_in_waiting_state_without_further_changes() {
     let mut interrupted = 0;
     for moment in 0..60 {
         let mut bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 6)]);
@@ -188,12 +188,12 @@ fn an_interruption_ends_in_waiting_state_and_changes_nothing_more() {
             Err(other) => panic!("{other}"),
         }
         let other = bus.stations::<Slave>().find(|slave| slave.identity == OTHER).unwrap();
-        assert_eq!((other.node, other.stored, other.told), (6, None, 0));
+        assert_eq!((other.node, other.stored, other.commands), (6, None, 0));
     }
     assert!(interrupted > 20, "{interrupted}");
 }
 
-/// Another LSS master that sends to everybody, once.
+/// Another LSS master that sends one global command.
 struct Rival(Option<Mono>);
 
 impl Station for Rival {
@@ -214,33 +214,33 @@ impl Station for Rival {
 }
 
 #[test]
-fn another_master_ends_the_work() {
+fn command_of_another_master_is_an_error() {
     let mut bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 6)]);
     bus.attach(Rival(Some(ms(9))));
     let error = run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap_err();
     assert_eq!(error.to_string(), "another LSS master sends at the same time: 7E5#0401000000000000");
     assert_eq!(bus.stations::<Slave>().filter(|slave| slave.node == 12).count(), 0);
-    // Before the work began it was none of our business.
+    // A command before the first service is ignored.
     let mut bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 6)]);
     bus.attach(Rival(Some(ms(9))));
     while bus.receive(ms(10)).unwrap() != Event::Timeout {}
     run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();
 }
 
-/// A wire that does something to the slaves' answers, or has one on it before anything is asked.
-struct Odd {
+/// A bus that destroys answers, or that has an answer before the request.
+struct OddBus {
     bus: MemoryBus,
-    /// Two answers at a time are an error frame.
+    /// Answers become error frames.
     collides: bool,
-    /// What was received before.
+    /// An answer that was received before the request.
     stale: Option<Frame>,
 }
 
-impl cangauge::bus::BitRateControl for Odd {
+impl cangauge::bus::BitRateControl for OddBus {
     cangauge::bus::delegate_bus!(self, self.bus => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
 }
 
-impl Bus for Odd {
+impl Bus for OddBus {
     cangauge::bus::delegate_bus!(self, self.bus => name timestamps is_live waits now mono listen receive_buffer late_drops finish);
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
@@ -261,9 +261,9 @@ impl Bus for Odd {
 }
 
 #[test]
-fn answers_that_destroy_each_other_are_no_silence() {
+fn colliding_answers_are_not_silence() {
     let bus = bus_of([Slave::new(ONE, 5), Slave::new(OTHER, 6)]);
-    let mut bus = Odd { bus, collides: true, stale: None };
+    let mut bus = OddBus { bus, collides: true, stale: None };
     let mut master = Master::new(&mut bus, Timing::default());
     let mut lss = master.lss();
     lss.switch_global(Mode::Configuration).unwrap();
@@ -273,16 +273,15 @@ fn answers_that_destroy_each_other_are_no_silence() {
 }
 
 #[test]
-fn what_was_answered_before_the_question_is_no_answer() {
+fn answer_before_the_request_is_ignored() {
     let stale = "7E4#1700000000000000".parse().ok();
-    let mut bus = Odd { bus: bus_of([]), collides: false, stale };
+    let mut bus = OddBus { bus: bus_of([]), collides: false, stale };
     let mut master = Master::new(&mut bus, Timing::default());
     assert!(matches!(master.lss().store(), Err(LssError::NoAnswer { service: Service::Store, .. })));
 }
 
-/// What could not be sent before Ctrl-C is not sent after it.
 #[test]
-fn what_waited_to_be_sent_is_given_up() {
+fn request_waiting_for_the_queue_is_dropped_at_ctrl_c() {
     let mut slave = Slave::new(ONE, 5);
     slave.is_configuring = true;
     let mut bus = bus_of([slave]);
@@ -294,12 +293,11 @@ fn what_waited_to_be_sent_is_given_up() {
     master.lss().switch_global(Mode::Waiting).unwrap();
     drop(master);
     let slave = bus.inner().stations::<Slave>().next().unwrap();
-    assert_eq!((slave.is_configuring, slave.told), (false, 0));
+    assert_eq!((slave.is_configuring, slave.commands), (false, 0));
 }
 
-/// However often the queue is full: an answer that comes at once is heard.
 #[test]
-fn an_answer_is_heard_however_the_request_went_out() {
+fn immediate_answer_is_received_after_a_full_queue() {
     for full in 0..12 {
         let mut slave = Slave::new(ONE, 5).slow(&[0]);
         slave.is_configuring = true;
@@ -311,9 +309,9 @@ fn an_answer_is_heard_however_the_request_went_out() {
 }
 
 #[test]
-fn half_a_number_is_no_number() {
+fn short_inquiry_answer_is_a_violation() {
     let mut slave = Slave::new(ONE, 5);
-    slave.says.insert(0x5d, vec![0x5d, 0x22, 0x4e]);
+    slave.answers.insert(0x5d, vec![0x5d, 0x22, 0x4e]);
     let result = run(&mut bus_of([slave]), |lss| {
         lss.switch_global(Mode::Configuration)?;
         lss.inquire(Part::Serial)
@@ -322,7 +320,7 @@ fn half_a_number_is_no_number() {
 }
 
 #[test]
-fn one_answer_beside_a_collision_is_not_one() {
+fn answer_with_a_bus_error_may_be_several() {
     let gathered = |faults: &[Fault]| Gathered { answers: vec![1], crowded: false, faults: faults.to_vec() };
     assert!(gathered(&[]).is_one() && gathered(&[Fault::NoAcknowledge]).is_one());
     for fault in [Fault::Protocol, Fault::ErrorWarning, Fault::ErrorPassive, Fault::BusOff, Fault::Other] {

@@ -1,4 +1,4 @@
-//! The simulated devices, found, given a node-ID and sent on their way.
+//! LSS with the simulated devices.
 
 use cangauge::bus::memory::MemoryBus;
 use cangauge::canopen::id::NodeId;
@@ -13,7 +13,7 @@ fn bus(toml: &str) -> MemoryBus {
 }
 
 #[test]
-fn three_without_a_node_id_one_after_the_other() {
+fn three_unconfigured_devices_are_configured_in_turn() {
     let mut bus = bus(r#"
         device = [
             { kind = "mh4", serial = 99 },
@@ -30,7 +30,7 @@ fn three_without_a_node_id_one_after_the_other() {
         lss.configure_node_id(NodeId::new(node).ok()).unwrap();
         lss.store().unwrap();
         lss.leave().unwrap();
-        // It boots with it.
+        // The device boots with the new node-ID.
         lss.identify_unconfigured().unwrap();
         assert!(lss.boot_ups().contains_key(&NodeId::new(node).unwrap()), "{node}");
         found.push((vendor, product, serial));
@@ -39,7 +39,7 @@ fn three_without_a_node_id_one_after_the_other() {
 }
 
 #[test]
-fn who_answers_every_fastscan_frame_in_configuration_state() {
+fn device_with_endless_fastscan_does_not_hide_another() {
     let mut bus = bus(r#"
         device = [
             { kind = "mh4", serial = 99, lss = { endless_fastscan = true } },
@@ -48,19 +48,19 @@ fn who_answers_every_fastscan_frame_in_configuration_state() {
     "#);
     let mut master = Master::new(&mut bus, Timing::default());
     let mut lss = master.lss();
-    // It was found, and nothing was done with it; it is found again, and not all zeros.
+    // The device was found but not configured: it is found again, with its own serial number.
     for _ in 0..2 {
         assert_eq!(lss.fastscan().unwrap().map(|address| address.serial), Some(99));
     }
     lss.configure_node_id(NodeId::new(20).ok()).unwrap();
-    // Left in configuration state by somebody else, it does not hide the other one.
+    // In configuration state, it does not hide the other device.
     lss.leave().unwrap();
     lss.switch_global(Mode::Configuration).unwrap();
     assert_eq!(lss.fastscan().unwrap().map(|address| address.serial), Some(100));
 }
 
 #[test]
-fn a_store_that_is_refused_lost_or_late() {
+fn refused_lost_and_late_answers() {
     for (oddity, expected) in [
         (
             "refuse = { \"0x17\" = 1 }",

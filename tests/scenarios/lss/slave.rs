@@ -1,4 +1,4 @@
-//! An LSS slave that a test can make slow, forgetful, talkative or plain wrong.
+//! An LSS slave that a test can make slow, and that can lose answers, send too many, or send wrong ones.
 
 use cangauge::bus::Mono;
 use cangauge::bus::memory::{Outbox, Station};
@@ -9,26 +9,26 @@ use std::time::Duration;
 
 pub(super) struct Slave {
     pub(super) identity: [u32; 4],
-    /// FFh: none.
+    /// FFh: no node-ID.
     pub(super) node: u8,
     pub(super) stored: Option<u8>,
     pub(super) is_configuring: bool,
-    /// Between request and answer, one after the other, again and again.
+    /// The delays of its answers, used in turn.
     pub(super) latencies: Vec<Duration>,
-    /// Services that it does not know.
+    /// Services that it does not support.
     pub(super) unknown: BTreeSet<u8>,
-    /// What it says to a service instead of what it should; empty: nothing.
-    pub(super) says: BTreeMap<u8, Vec<u8>>,
-    /// Whether it answers every fastscan frame, whatever is asked, in this state of being configured.
-    pub(super) babbles: Option<bool>,
-    /// Which of its answers never reach the wire, counted from 0.
+    /// Wrong answers by service; an empty answer is not sent.
+    pub(super) answers: BTreeMap<u8, Vec<u8>>,
+    /// It answers each fastscan frame: in configuration state (`true`) or in waiting state (`false`).
+    pub(super) answers_all_fastscans: Option<bool>,
+    /// The numbers of the answers that are lost, counted from 0.
     pub(super) loses: BTreeSet<usize>,
-    /// How often it was told to do something that is for one slave only.
-    pub(super) told: usize,
+    /// The number of services it received that address one slave.
+    pub(super) commands: usize,
     selected: usize,
     identified: usize,
     compares: u8,
-    answers: usize,
+    answer_count: usize,
     waiting: VecDeque<(Mono, Frame)>,
 }
 
@@ -41,32 +41,32 @@ impl Slave {
             is_configuring: false,
             latencies: vec![Duration::from_micros(300)],
             unknown: BTreeSet::new(),
-            says: BTreeMap::new(),
-            babbles: None,
+            answers: BTreeMap::new(),
+            answers_all_fastscans: None,
             loses: BTreeSet::new(),
-            told: 0,
+            commands: 0,
             selected: 0,
             identified: 0,
             compares: 0,
-            answers: 0,
+            answer_count: 0,
             waiting: VecDeque::new(),
         }
     }
 
-    /// The same with these latencies in microseconds.
+    /// Sets its latencies in microseconds.
     pub(super) fn slow(mut self, latencies: &[u64]) -> Slave {
         self.latencies = latencies.iter().map(|&latency| Duration::from_micros(latency)).collect();
         self
     }
 
-    /// What it does not know; the DPS manual names 04h, 40h to 44h, 11h, 13h, 15h and 17h only.
+    /// Removes services. The DPS manual names only 04h, 40h to 44h, 11h, 13h, 15h and 17h.
     pub(super) fn without(mut self, services: impl IntoIterator<Item = u8>) -> Slave {
         self.unknown.extend(services);
         self
     }
 
     fn fastscan(&mut self, number: u32, [bit_check, sub, next]: [u8; 3]) -> bool {
-        if self.babbles == Some(self.is_configuring) {
+        if self.answers_all_fastscans == Some(self.is_configuring) {
             return true;
         }
         if self.node != 0xff || self.is_configuring {
@@ -98,9 +98,9 @@ impl Slave {
             return None;
         }
         if for_one {
-            self.told += 1;
-            if let Some(said) = self.says.get(&service) {
-                return Some(said.clone()).filter(|said| !said.is_empty());
+            self.commands += 1;
+            if let Some(answer) = self.answers.get(&service) {
+                return Some(answer.clone()).filter(|answer| !answer.is_empty());
             }
         }
         match service {
@@ -112,9 +112,9 @@ impl Slave {
                 let part = usize::from(service - 0x40);
                 let fits = self.identity[part] == number && (part == 0 || self.selected == part);
                 self.selected = if fits { part + 1 } else { 0 };
-                let is_meant = self.selected == 4 && !self.is_configuring;
-                self.is_configuring |= is_meant;
-                is_meant.then(|| vec![0x44])
+                let is_selected = self.selected == 4 && !self.is_configuring;
+                self.is_configuring |= is_selected;
+                is_selected.then(|| vec![0x44])
             }
             0x46..=0x4b => {
                 let limit = usize::from(service - 0x46);
@@ -155,15 +155,15 @@ impl Station for Slave {
     fn receive(&mut self, now: Mono, frame: &Frame, _: &mut Outbox) {
         let (true, Some(data)) = (frame.id() == CanId::LSS_MASTER, frame.all_eight()) else { return };
         let Some(mut answer) = self.answer(data) else { return };
-        if !self.says.contains_key(&data[0]) {
+        if !self.answers.contains_key(&data[0]) {
             answer.resize(8, 0);
         }
-        let latency = self.latencies[self.answers % self.latencies.len()];
+        let latency = self.latencies[self.answer_count % self.latencies.len()];
         let at = self.waiting.back().map_or(now + latency, |(last, _)| (now + latency).max(*last));
-        if !self.loses.contains(&self.answers) {
+        if !self.loses.contains(&self.answer_count) {
             self.waiting.push_back((at, Frame::new(CanId::LSS_SLAVE, &answer).unwrap()));
         }
-        self.answers += 1;
+        self.answer_count += 1;
     }
 
     fn wake(&mut self, now: Mono, out: &mut Outbox) {

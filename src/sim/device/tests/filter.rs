@@ -6,12 +6,12 @@ use super::*;
 fn on_sync(bus: &mut MemoryBus, id: &str, count: usize) -> Vec<i16> {
     let mut values = Vec::new();
     for _ in 0..count {
-        let heard = ask(bus, "080#");
-        let tpdo = heard.iter().find(|frame| frame.starts_with(id)).expect("a TPDO");
+        let received = ask(bus, "080#");
+        let tpdo = received.iter().find(|frame| frame.starts_with(id)).expect("a TPDO");
         let frame: Frame = tpdo.parse().expect("a frame");
         values.push(i16::from_le_bytes(frame.data()[..2].try_into().expect("two bytes")));
         let until = bus.now().mono + Duration::from_millis(95);
-        hear(bus, until);
+        receive(bus, until);
     }
     values
 }
@@ -22,7 +22,7 @@ fn spread(values: &[i16]) -> i16 {
 
 /// An MC1609 whose channel 1 is at 500.0 degC with a noise of 50.0 K.
 fn mc1609(set: &[(&str, i64)]) -> MemoryBus {
-    let mut setup = still("mc1609", 5, 500.0);
+    let mut setup = constant("mc1609", 5, 500.0);
     setup.channels[0].noise = 50.0;
     setup.set = set.iter().map(|(object, value)| (id(object), Scalar::Integer(*value))).collect();
     setup.set.push((id("1800:2"), Scalar::Integer(1)));
@@ -47,7 +47,7 @@ fn the_mean_since_the_last_pdo_is_quieter_than_the_samples() {
 
 #[test]
 fn filter_acts_as_soon_as_it_is_written() {
-    let mut setup = still("mh4", 5, 5.0);
+    let mut setup = constant("mh4", 5, 5.0);
     setup.channels[0].noise = 1.0;
     let mut bus = bus([setup]);
     let read = |bus: &mut MemoryBus| {
@@ -55,7 +55,7 @@ fn filter_acts_as_soon_as_it_is_written() {
         let frame: Frame = answer.parse().expect("a frame");
         f32::from_le_bytes(frame.data()[4..].try_into().expect("four bytes"))
     };
-    hear(&mut bus, ms(1));
+    receive(&mut bus, ms(1));
     let raw: Vec<f32> = (0..20).map(|_| read(&mut bus)).collect();
     assert!(raw.iter().any(|value| (value - raw[0]).abs() > 0.5), "{raw:?}");
     // 61A1h:1 = 1024, 61A0h:1 = 1.
@@ -69,7 +69,7 @@ fn filter_acts_as_soon_as_it_is_written() {
     // After a reset there is no filter: nothing was stored.
     ask(&mut bus, "000#8105");
     let until = bus.now().mono + Duration::from_millis(200);
-    hear(&mut bus, until);
+    receive(&mut bus, until);
     let raw: Vec<f32> = (0..20).map(|_| read(&mut bus)).collect();
     assert!(raw.iter().any(|value| (value - raw[0]).abs() > 0.5), "{raw:?}");
 }

@@ -25,18 +25,18 @@ proptest! {
     #[test]
     fn any_traffic_is_survived(frames in prop::collection::vec(frame(), 1..60)) {
         let kinds = [("mh4", 1), ("d20", 2), ("mc1609", 3), ("dps", 127)];
-        let mut bus = bus(kinds.map(|(kind, id)| still(kind, id, 5.0)));
+        let mut bus = bus(kinds.map(|(kind, id)| constant(kind, id, 5.0)));
         for frame in frames {
             bus.send(&frame).expect("room");
             let until = bus.now().mono + Duration::from_millis(7);
-            prop_assert!(hear(&mut bus, until).len() < 100);
+            prop_assert!(receive(&mut bus, until).len() < 100);
         }
         bus.send(&"000#8100".parse().expect("a frame")).expect("room");
         let until = bus.now().mono + Duration::from_millis(400);
-        let heard = hear(&mut bus, until);
+        let received = receive(&mut bus, until);
         for (_, id) in kinds {
             let boot_up = Frame::byte(CanId::heartbeat(node(id)), 0).to_string();
-            prop_assert!(heard.contains(&boot_up), "{boot_up} in {heard:?}");
+            prop_assert!(received.contains(&boot_up), "{boot_up} in {received:?}");
         }
     }
 }

@@ -8,16 +8,16 @@ const AWAY: Duration = Duration::from_millis(200);
 /// The frames until the device has booted again.
 fn later(bus: &mut MemoryBus) -> Vec<String> {
     let until = bus.now().mono + AWAY;
-    hear(bus, until)
+    receive(bus, until)
 }
 
 fn unconfigured(kind: &str) -> Setup {
-    Setup { node: None, ..still(kind, 1, 0.0) }
+    Setup { node: None, ..constant(kind, 1, 0.0) }
 }
 
 #[test]
 fn the_frames_of_a_dps_point_to_point() {
-    let mut bus = bus([still("dps", 127, 1.0)]);
+    let mut bus = bus([constant("dps", 127, 1.0)]);
     play(
         &mut bus,
         &[
@@ -38,7 +38,7 @@ fn the_frames_of_a_dps_point_to_point() {
 
 #[test]
 fn the_frames_of_a_dps_on_a_network() {
-    let mut bus = bus([still("dps", 126, 1.0), still("mh4", 1, 1.0)]);
+    let mut bus = bus([constant("dps", 126, 1.0), constant("mh4", 1, 1.0)]);
     play(
         &mut bus,
         &[
@@ -58,7 +58,7 @@ fn the_frames_of_a_dps_on_a_network() {
 
 #[test]
 fn bit_rate_changes_after_two_silent_delays() {
-    let mut bus = bus([Setup { set: vec![(id("1017"), Scalar::Integer(100))], ..still("mh4", 5, 1.0) }]);
+    let mut bus = bus([Setup { set: vec![(id("1017"), Scalar::Integer(100))], ..constant("mh4", 5, 1.0) }]);
     play(
         &mut bus,
         &[
@@ -77,13 +77,13 @@ fn bit_rate_changes_after_two_silent_delays() {
 
 #[test]
 fn unstored_bit_rate_is_lost_at_power_off() {
-    let mut bus = bus([still("mh4", 5, 1.0)]);
+    let mut bus = bus([constant("mh4", 5, 1.0)]);
     play(
         &mut bus,
         &[("7E5#0401", "705#00"), ("7E5#0401000000000000", "-"), ("7E5#1300040000000000", "7E4#1300000000000000")],
     );
     play(&mut bus, &[("7E5#150A000000000000", "-")]);
-    hear(&mut bus, ms(100));
+    receive(&mut bus, ms(100));
     assert_eq!((device(&mut bus).bit_rate(), device(&mut bus).stored().1), (Some(125_000), Some(250_000)));
     bus.power_cycle();
     assert_eq!(device(&mut bus).bit_rate(), Some(250_000));
@@ -91,7 +91,7 @@ fn unstored_bit_rate_is_lost_at_power_off() {
 
 #[test]
 fn unstored_node_id_is_lost_at_power_off() {
-    let mut bus = bus([still("mh4", 5, 1.0)]);
+    let mut bus = bus([constant("mh4", 5, 1.0)]);
     play(&mut bus, &[("7E5#0401000000000000", "705#00"), ("7E5#1107000000000000", "7E4#1100000000000000")]);
     // The old node-ID is active until the reset.
     play(&mut bus, &[("605#4020230000000000", "585#4320230005000000"), ("000#8205", "-")]);
@@ -131,7 +131,7 @@ fn unconfigured_device_answers_lss_only() {
 
 #[test]
 fn node_id_can_be_removed() {
-    let mut bus = bus([still("mh4", 5, 1.0)]);
+    let mut bus = bus([constant("mh4", 5, 1.0)]);
     play(&mut bus, &[("7E5#0401000000000000", "705#00"), ("7E5#11FF000000000000", "7E4#1100000000000000")]);
     play(&mut bus, &[("7E5#1700000000000000", "7E4#1700000000000000"), ("000#8205", "-")]);
     assert_eq!(later(&mut bus), [""; 0]);
@@ -140,7 +140,7 @@ fn node_id_can_be_removed() {
 
 #[test]
 fn lss_works_in_the_listed_states_only() {
-    let mut bus = bus([still("d20", 5, 1.0)]);
+    let mut bus = bus([constant("d20", 5, 1.0)]);
     let select = ["7E5#4047000000000000", "7E5#4100000000000000", "7E5#4200000000000000", "7E5#4333750000000000"];
     let identity =
         [2, 3].map(|sub| device(&mut bus).value(ObjectId::new(0x1018, sub), Mono::START).expect("an object"));
@@ -155,7 +155,7 @@ fn lss_works_in_the_listed_states_only() {
 /// Figure 3 and table 10 of the DPS manual: NMT and LSS are available in the stopped state.
 #[test]
 fn dps_answers_lss_in_pre_operational_and_stopped() {
-    let mut bus = bus([still("dps", 127, 1.0)]);
+    let mut bus = bus([constant("dps", 127, 1.0)]);
     let [vendor, product, revision, serial] =
         ["7E5#4062030000000000", "7E5#4150314400000000", "7E5#4200000100000000", "7E5#43224E0000000000"];
     play(&mut bus, &[(vendor, "77F#00"), (product, "-"), (revision, "-"), (serial, "7E4#4400000000000000")]);
@@ -167,7 +167,7 @@ fn dps_answers_lss_in_pre_operational_and_stopped() {
 
 #[test]
 fn a_bit_rate_by_object() {
-    let mut bus = bus([still("mh4", 5, 1.0)]);
+    let mut bus = bus([constant("mh4", 5, 1.0)]);
     play(
         &mut bus,
         &[
@@ -185,7 +185,7 @@ fn a_bit_rate_by_object() {
 
 #[test]
 fn automatic_detection_reads_back_the_detected_rate() {
-    let mut bus = bus([still("mh4", 5, 1.0)]);
+    let mut bus = bus([constant("mh4", 5, 1.0)]);
     play(&mut bus, &[("605#2321230009736574", "705#00 585#6021230000000000")]);
     play(&mut bus, &[("605#2310100173617665", "585#6010100100000000"), ("000#8105", "-")]);
     later(&mut bus);
@@ -198,7 +198,7 @@ fn automatic_detection_reads_back_the_detected_rate() {
 
 #[test]
 fn answers_can_be_lost_late_and_slow() {
-    let mut setup = still("mh4", 5, 1.0);
+    let mut setup = constant("mh4", 5, 1.0);
     setup.oddities.lose = vec![0x11];
     setup.oddities.late = BTreeMap::from([(0x17, Duration::from_millis(20))]);
     setup.oddities.latency = Duration::from_millis(1);
@@ -217,10 +217,10 @@ fn answers_can_be_lost_late_and_slow() {
 #[test]
 fn offline_after_a_reset_or_an_activation() {
     for (gone, last) in [(OfflineAfter::Reset, "000#8105"), (OfflineAfter::Activate, "7E5#1500000000000000")] {
-        let mut setup = still("mh4", 5, 1.0);
+        let mut setup = constant("mh4", 5, 1.0);
         setup.oddities.offline_after = vec![gone];
-        let mut bus = bus([setup, still("mh4", 6, 1.0)]);
-        hear(&mut bus, ms(1));
+        let mut bus = bus([setup, constant("mh4", 6, 1.0)]);
+        receive(&mut bus, ms(1));
         play(&mut bus, &[("7E5#0401000000000000", "-")]);
         ask(&mut bus, last);
         later(&mut bus);
@@ -234,16 +234,16 @@ fn offline_after_a_reset_or_an_activation() {
 
 #[test]
 fn devices_that_store_a_written_node_id_themselves() {
-    let mut bus = bus([still("hydac-old", 5, 1.0)]);
+    let mut bus = bus([constant("hydac-old", 5, 1.0)]);
     ask(&mut bus, "605#2301200007736574");
     assert_eq!((device(&mut bus).node(), device(&mut bus).stored().0), (Some(node(5)), Some(node(7))));
     bus.power_cycle();
-    assert_eq!(hear(&mut bus, ms(300)), ["707#00"]);
+    assert_eq!(receive(&mut bus, ms(300)), ["707#00"]);
 }
 
 #[test]
 fn devices_that_store_the_node_id_by_1010h() {
-    let mut bus = bus([still("baumer", 5, 1.0)]);
+    let mut bus = bus([constant("baumer", 5, 1.0)]);
     play(
         &mut bus,
         &[

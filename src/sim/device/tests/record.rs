@@ -22,13 +22,13 @@ impl std::io::Write for Shared {
 fn record_has_the_time_of_the_complete_frame() {
     let file = Shared::default();
     let recorder = Recorder::new(Box::new(file.clone())).expect("memory");
-    let mut setup = still("mh4", 5, 5.0);
+    let mut setup = constant("mh4", 5, 5.0);
     setup.overloads =
         vec![(1, Overload { from: Duration::from_millis(49), until: Duration::MAX, direction: Direction::High })];
     setup.start = true;
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(Device::new(setup).expect("a device").recording(recorder.clone()));
-    let mut dps = still("dps", 127, 17.898);
+    let mut dps = constant("dps", 127, 17.898);
     dps.start = true;
     bus.attach(Device::new(dps).expect("a device").recording(recorder.clone()));
     let mut frames = Vec::new();
@@ -65,11 +65,11 @@ fn tpdo_pending_at_a_reset_is_neither_sent_nor_recorded() {
     setup.start = true;
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(Device::new(setup).expect("a device").recording(recorder.clone()));
-    hear(&mut bus, ms(10));
+    receive(&mut bus, ms(10));
     // The reset waits for the SYNC and has priority over the TPDO that the SYNC causes.
     bus.send(&"080#".parse().expect("a frame")).expect("room");
     bus.send(&"000#8105".parse().expect("a frame")).expect("room");
-    assert_eq!(hear(&mut bus, ms(200)), ["705#00"]);
+    assert_eq!(receive(&mut bus, ms(200)), ["705#00"]);
     let sent = ask(&mut bus, "080#");
     assert_eq!(sent.len(), 1);
     recorder.flush().expect("memory");
@@ -82,14 +82,14 @@ fn tpdo_pending_at_a_reset_is_neither_sent_nor_recorded() {
 fn record_continues_after_the_controller_was_off() {
     let file = Shared::default();
     let recorder = Recorder::new(Box::new(file.clone())).expect("memory");
-    let mut setup = still("dps", 33, 17.898);
+    let mut setup = constant("dps", 33, 17.898);
     setup.start = true;
     setup.seed = 1;
     setup.channels.iter_mut().for_each(|channel| channel.noise = 0.5);
     let mut bus = MemoryBus::new(Clock::Virtual);
     bus.attach(Device::new(setup).expect("a device").recording(recorder.clone()));
     // A device at another bit rate destroys every frame, until one controller after the other is bus-off.
-    let mut other = still("mc1609", 11, 1.0);
+    let mut other = constant("mc1609", 11, 1.0);
     other.bit_rate = Some(500_000);
     other.set = vec![(id("0x1017"), Scalar::Integer(1000))];
     bus.attach(Device::new(other).expect("a device"));

@@ -4,11 +4,11 @@ use super::*;
 
 #[test]
 fn store_restore_and_reset() {
-    let mut bus = bus([still("mh4", 5, 5.0)]);
+    let mut bus = bus([constant("mh4", 5, 5.0)]);
     let reset = |bus: &mut MemoryBus| {
         ask(bus, "000#8105");
         let until = bus.now().mono + Duration::from_millis(150);
-        hear(bus, until)
+        receive(bus, until)
     };
     play(
         &mut bus,
@@ -38,8 +38,8 @@ fn store_restore_and_reset() {
 #[test]
 fn a_store_between_restore_and_reset_keeps_the_old_values() {
     for (kind, answers) in [("mh4", "43"), ("d20", "42"), ("dps", "42")] {
-        let mut bus = bus([still(kind, 5, 5.0)]);
-        hear(&mut bus, ms(1));
+        let mut bus = bus([constant(kind, 5, 5.0)]);
+        receive(&mut bus, ms(1));
         let kpa = if kind == "dps" { "00002203" } else { "0000AB00" };
         let [unit, save, load] =
             [format!("605#22316101{kpa}"), "605#2210100173617665".into(), "605#221110016C6F6164".into()];
@@ -63,21 +63,21 @@ fn a_store_between_restore_and_reset_keeps_the_old_values() {
 #[test]
 fn mh4_store_all_resets_the_cob_ids() {
     for (sub, after) in [("01", "4300180185010040"), ("02", "43001801AA010040")] {
-        let mut bus = bus([still("mh4", 5, 5.0)]);
+        let mut bus = bus([constant("mh4", 5, 5.0)]);
         ask(&mut bus, "605#23001801850100C0");
         ask(&mut bus, "605#23001801AA010040");
         assert_eq!(ask(&mut bus, &format!("605#231010{sub}73617665")), [format!("585#601010{sub}00000000")]);
         assert_eq!(ask(&mut bus, "605#4000180100000000"), ["585#43001801AA010040"], "until the reset it works");
         ask(&mut bus, "000#8105");
         let until = bus.now().mono + Duration::from_millis(150);
-        hear(&mut bus, until);
+        receive(&mut bus, until);
         assert_eq!(ask(&mut bus, "605#4000180100000000"), [format!("585#{after}")]);
     }
 }
 
 #[test]
 fn signed_node_id_is_active_after_store_and_reset() {
-    let mut bus = bus([still("mh4", 5, 5.0)]);
+    let mut bus = bus([constant("mh4", 5, 5.0)]);
     play(
         &mut bus,
         &[
@@ -87,7 +87,7 @@ fn signed_node_id_is_active_after_store_and_reset() {
             ("000#8105", "-"),
         ],
     );
-    assert_eq!(hear(&mut bus, ms(300)), ["703#00"]);
+    assert_eq!(receive(&mut bus, ms(300)), ["703#00"]);
     assert_eq!(device(&mut bus).node(), Some(node(3)));
     play(
         &mut bus,
@@ -101,7 +101,7 @@ fn signed_node_id_is_active_after_store_and_reset() {
 
 #[test]
 fn autozero_and_the_extremes() {
-    let mut bus = bus([still("mh4", 5, 0.25)]);
+    let mut bus = bus([constant("mh4", 5, 0.25)]);
     play(
         &mut bus,
         &[
@@ -119,7 +119,7 @@ fn autozero_and_the_extremes() {
 
 #[test]
 fn scaling_factor_is_applied() {
-    let mut bus = bus([still("mh4", 5, 1.5)]);
+    let mut bus = bus([constant("mh4", 5, 1.5)]);
     play(
         &mut bus,
         &[
@@ -134,12 +134,12 @@ fn scaling_factor_is_applied() {
 fn reset(bus: &mut MemoryBus, command: &str) -> Vec<String> {
     ask(bus, command);
     let until = bus.now().mono + Duration::from_millis(150);
-    hear(bus, until)
+    receive(bus, until)
 }
 
 #[test]
 fn d20_stores_and_restores_as_on_pages_12_and_13() {
-    let mut bus = bus([still("d20", 1, 0.5)]);
+    let mut bus = bus([constant("d20", 1, 0.5)]);
     play(
         &mut bus,
         &[
@@ -168,7 +168,7 @@ fn d20_stores_and_restores_as_on_pages_12_and_13() {
 
 #[test]
 fn dps_autozero_follows_table_30_and_pdo_settings_are_not_stored() {
-    let mut bus = bus([still("dps", 127, 0.5)]);
+    let mut bus = bus([constant("dps", 127, 0.5)]);
     play(
         &mut bus,
         &[

@@ -6,7 +6,7 @@ use super::*;
 fn mh4_is_silent_without_sync() {
     let mut bus = bus([Setup::new(catalog::by_name("mh4").expect("built in"), node(5))]);
     assert_eq!(ask(&mut bus, "000#0105"), ["705#00"]);
-    assert_eq!(hear(&mut bus, ms(60_000)), Vec::<String>::new());
+    assert_eq!(receive(&mut bus, ms(60_000)), Vec::<String>::new());
     let answer = ask(&mut bus, "080#");
     assert_eq!(answer.len(), 1);
     assert!(answer[0].starts_with("185#") && answer[0].ends_with("00") && answer[0].len() == 14, "{answer:?}");
@@ -14,22 +14,25 @@ fn mh4_is_silent_without_sync() {
 
 #[test]
 fn dps_sends_psi_every_100_ms() {
-    let mut bus = bus([still("dps", 127, 17.898)]);
+    let mut bus = bus([constant("dps", 127, 17.898)]);
     assert_eq!(ask(&mut bus, "000#017F"), ["77F#00"]);
-    let heard = timed(&mut bus, ms(1005));
-    assert_eq!(heard.iter().map(|(at, _)| *at).collect::<Vec<_>>(), (1..=10).map(|n| n * 100).collect::<Vec<u128>>());
+    let received = timed(&mut bus, ms(1005));
+    assert_eq!(
+        received.iter().map(|(at, _)| *at).collect::<Vec<_>>(),
+        (1..=10).map(|n| n * 100).collect::<Vec<u128>>()
+    );
     // 17898 = 45EAh.
-    assert!(heard.iter().all(|(_, frame)| frame == "1FF#EA450000"), "{heard:?}");
+    assert!(received.iter().all(|(_, frame)| frame == "1FF#EA450000"), "{received:?}");
     // Table 29: 1800h:5 to 1000 ms.
     play(&mut bus, &[("67F#22001805E8030000", "5FF#6000180500000000")]);
-    let heard = timed(&mut bus, ms(4100));
-    assert_eq!(heard.len(), 3);
-    assert_eq!(heard[1].0 - heard[0].0, 1000);
+    let received = timed(&mut bus, ms(4100));
+    assert_eq!(received.len(), 3);
+    assert_eq!(received[1].0 - received[0].0, 1000);
 }
 
 #[test]
 fn dps_remaps_as_its_table_26_prints() {
-    let mut bus = bus([still("dps", 127, 50.0)]);
+    let mut bus = bus([constant("dps", 127, 50.0)]);
     play(
         &mut bus,
         &[
@@ -55,7 +58,7 @@ fn dps_remaps_as_its_table_26_prints() {
 
 #[test]
 fn d20_mapping_needs_only_the_count_at_zero() {
-    let mut bus = bus([still("d20", 2, 5.0)]);
+    let mut bus = bus([constant("d20", 2, 5.0)]);
     play(
         &mut bus,
         &[
@@ -80,7 +83,7 @@ fn d20_mapping_needs_only_the_count_at_zero() {
 
 #[test]
 fn mh4_mapping_needs_an_invalid_pdo() {
-    let mut bus = bus([still("mh4", 1, 5.0)]);
+    let mut bus = bus([constant("mh4", 1, 5.0)]);
     play(
         &mut bus,
         &[
@@ -131,7 +134,7 @@ fn every_nth_sync_and_if_changed() {
         bus.send(&"080#".parse().expect("a frame")).expect("room");
     }
     let until = bus.now().mono + Duration::from_millis(5);
-    let changed = hear(&mut bus, until).len();
+    let changed = receive(&mut bus, until).len();
     assert!(changed < 3, "{changed}");
     // Types that CiA reserves, and types that this device does not support.
     for kind in ["F1", "FB", "FC", "FD"] {
@@ -142,13 +145,13 @@ fn every_nth_sync_and_if_changed() {
 #[test]
 fn event_timer_of_types_254_and_255() {
     for kind in ["FE", "FF"] {
-        let mut bus = bus([still("mh4", 5, 5.0)]);
+        let mut bus = bus([constant("mh4", 5, 5.0)]);
         ask(&mut bus, &format!("605#2F001802{kind}000000"));
         play(&mut bus, &[("605#2B00180564000000", "585#6000180500000000"), ("000#0105", "-")]);
-        let heard = timed(&mut bus, ms(1020));
-        assert_eq!(heard.len(), 10, "{kind} {heard:?}");
-        assert!(heard.windows(2).all(|pair| pair[1].0 - pair[0].0 == 100), "{heard:?}");
-        assert!(heard.iter().all(|(_, frame)| frame == "185#0000A04000"));
+        let received = timed(&mut bus, ms(1020));
+        assert_eq!(received.len(), 10, "{kind} {received:?}");
+        assert!(received.windows(2).all(|pair| pair[1].0 - pair[0].0 == 100), "{received:?}");
+        assert!(received.iter().all(|(_, frame)| frame == "185#0000A04000"));
         assert_eq!(ask(&mut bus, "080#").len(), 0, "not on SYNC");
     }
 }
@@ -156,16 +159,16 @@ fn event_timer_of_types_254_and_255() {
 #[test]
 fn a_change_by_delta_sends() {
     // 5 ± 1.05 within a second, delta 0.5.
-    let mut setup = still("mh4", 5, 5.0);
+    let mut setup = constant("mh4", 5, 5.0);
     setup.channels[0].amplitude = 1.05;
     setup.channels[0].period_s = 1.0;
     setup.set = vec![(id("1800:2"), Scalar::Integer(255)), (id("6133:1"), Scalar::Real(0.5))];
     setup.start = true;
     let mut bus = bus([setup]);
-    let heard: Vec<f32> = hear(&mut bus, ms(1000)).iter().skip(1).map(|frame| pressure(frame)).collect();
-    assert_eq!(heard.len(), 7, "{heard:?}");
-    for (value, expected) in heard.iter().zip([5.5, 6.0, 5.5, 5.0, 4.5, 4.0, 4.5]) {
-        assert!((value - expected).abs() < 0.02, "{heard:?}");
+    let received: Vec<f32> = receive(&mut bus, ms(1000)).iter().skip(1).map(|frame| pressure(frame)).collect();
+    assert_eq!(received.len(), 7, "{received:?}");
+    for (value, expected) in received.iter().zip([5.5, 6.0, 5.5, 5.0, 4.5, 4.0, 4.5]) {
+        assert!((value - expected).abs() < 0.02, "{received:?}");
     }
 }
 
@@ -177,7 +180,7 @@ fn pressure(frame: &str) -> f32 {
 
 #[test]
 fn passing_a_limit_sends_once() {
-    let mut setup = still("mh4", 5, 5.0);
+    let mut setup = constant("mh4", 5, 5.0);
     setup.channels[0].amplitude = 1.0;
     setup.channels[0].period_s = 1.0;
     setup.set = vec![
@@ -188,17 +191,17 @@ fn passing_a_limit_sends_once() {
     ];
     setup.start = true;
     let mut bus = bus([setup]);
-    let heard: Vec<f32> = hear(&mut bus, ms(2000)).iter().skip(1).map(|frame| pressure(frame)).collect();
-    assert_eq!(heard.len(), 4, "{heard:?}");
-    for (value, limit) in heard.iter().zip([5.8, 4.2, 5.8, 4.2]) {
-        assert!((value - limit).abs() < 0.01, "{heard:?}");
+    let received: Vec<f32> = receive(&mut bus, ms(2000)).iter().skip(1).map(|frame| pressure(frame)).collect();
+    assert_eq!(received.len(), 4, "{received:?}");
+    for (value, limit) in received.iter().zip([5.8, 4.2, 5.8, 4.2]) {
+        assert!((value - limit).abs() < 0.01, "{received:?}");
     }
 }
 
 #[test]
 fn hysteresis_prevents_repeated_events() {
     // 5 ± 1 never returns by 2: each limit is passed once.
-    let mut setup = still("mh4", 5, 5.0);
+    let mut setup = constant("mh4", 5, 5.0);
     setup.channels[0].amplitude = 1.0;
     setup.channels[0].period_s = 1.0;
     setup.set = vec![
@@ -209,21 +212,21 @@ fn hysteresis_prevents_repeated_events() {
     ];
     setup.start = true;
     let mut bus = bus([setup]);
-    assert_eq!(hear(&mut bus, ms(5000)).len(), 1 + 2);
+    assert_eq!(receive(&mut bus, ms(5000)).len(), 1 + 2);
 }
 
 #[test]
 fn event_causes_can_change_while_operational() {
-    let mut setup = still("mh4", 5, 5.0);
+    let mut setup = constant("mh4", 5, 5.0);
     setup.channels[0].amplitude = 1.05;
     setup.channels[0].period_s = 1.0;
     setup.set = vec![(id("1800:2"), Scalar::Integer(255))];
     setup.start = true;
     let mut bus = bus([setup]);
-    assert_eq!(hear(&mut bus, ms(1000)), ["705#00"]);
+    assert_eq!(receive(&mut bus, ms(1000)), ["705#00"]);
     // 6133h:1 = 0.5.
     play(&mut bus, &[("605#233361010000003F", "585#6033610100000000")]);
-    assert_eq!(hear(&mut bus, ms(2000)).len(), 7);
+    assert_eq!(receive(&mut bus, ms(2000)).len(), 7);
 }
 
 /// A device with an inhibit time; no built-in device has one.
@@ -296,9 +299,9 @@ fn inhibit_time_separates_events() {
     let mut free = run(0);
     assert!((36..=40).contains(&timed(&mut free, ms(1000)).len()));
     let mut held = run(2000);
-    let heard = timed(&mut held, ms(2000));
-    let gaps: Vec<u128> = heard[1..].windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
-    assert!(heard.len() > 8 && gaps.iter().all(|gap| *gap >= 200), "{gaps:?}");
+    let received = timed(&mut held, ms(2000));
+    let gaps: Vec<u128> = received[1..].windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+    assert!(received.len() > 8 && gaps.iter().all(|gap| *gap >= 200), "{gaps:?}");
     assert!(gaps.contains(&200), "what was held back is sent as soon as it may: {gaps:?}");
     // It can be changed only while the PDO is not valid.
     play(&mut held, &[("605#2B00180300000000", "585#8000180330000906")]);
@@ -308,7 +311,7 @@ fn inhibit_time_separates_events() {
 
 #[test]
 fn invalid_pdo_is_not_sent_and_a_new_cob_id_is_used() {
-    let mut bus = bus([still("mh4", 5, 5.0)]);
+    let mut bus = bus([constant("mh4", 5, 5.0)]);
     play(
         &mut bus,
         &[
@@ -329,7 +332,7 @@ fn invalid_pdo_is_not_sent_and_a_new_cob_id_is_used() {
 
 #[test]
 fn sync_on_another_identifier() {
-    let mut bus = bus([still("mh4", 5, 5.0)]);
+    let mut bus = bus([constant("mh4", 5, 5.0)]);
     play(
         &mut bus,
         &[
@@ -345,7 +348,7 @@ fn sync_on_another_identifier() {
 
 #[test]
 fn a_sync_with_bytes_is_an_emergency_on_mh4() {
-    let mut bus = bus([still("mh4", 5, 5.0)]);
+    let mut bus = bus([constant("mh4", 5, 5.0)]);
     play(
         &mut bus,
         &[
@@ -355,6 +358,6 @@ fn a_sync_with_bytes_is_an_emergency_on_mh4() {
             ("080#", "085#0000000000000000 185#0000A04000"),
         ],
     );
-    let mut d20 = self::bus([still("d20", 2, 5.0)]);
+    let mut d20 = self::bus([constant("d20", 2, 5.0)]);
     play(&mut d20, &[("000#0102", "702#00"), ("080#01", "182#88130000")]);
 }
