@@ -15,7 +15,7 @@ use std::process::Command;
 const PICTURE: [&str; 4] = [
     "cangauge -b sim scan",
     "cangauge -b sim read 1,127",
-    "cangauge -b sim log 1,127 --sync 100ms --duration 10s -o run.csv",
+    "cangauge -b sim log 127 --duration 10s -o run.csv",
     "cangauge -b sim check 1 'pressure in 0.5..2 bar' 'temperature < 20 degC'",
 ];
 
@@ -41,16 +41,13 @@ fn blocks(language: &str) -> Vec<String> {
 /// Runs the commands on the devices of `-b sim`, with the virtual clock: the output is always the same.
 fn picture() -> String {
     let bench = Bench::of(ALL);
-    let mut picture = String::from("```text\n");
-    let mut code = None;
-    for command in PICTURE {
+    let session = PICTURE.map(|command| {
         let words = words(command);
         let words: Vec<&str> = words.iter().skip(3).map(String::as_str).collect();
         let done = bench.run_words(&words);
-        picture.push_str(&format!("$ {command}\n{}{}\n", done.stdout, done.stderr));
-        code = done.code;
-    }
-    format!("{picture}$ echo $?\n{}\n```\n", code.expect("an exit code"))
+        format!("$ {command}\n{}{}", done.stdout, done.stderr)
+    });
+    format!("```text\n{}```\n", session.join("\n"))
 }
 
 #[test]
@@ -80,13 +77,41 @@ fn search_path() -> String {
 #[cfg(unix)]
 fn commands_on_the_simulated_bus_work_as_printed() {
     let blocks: Vec<String> = blocks("sh").into_iter().filter(|block| block.contains("-b sim ")).collect();
-    assert!(!blocks.is_empty());
-    for block in blocks {
-        let folder = tempfile::tempdir().expect("a folder");
-        let mut shell = Command::new("sh");
-        shell.env("PATH", search_path()).current_dir(folder.path()).args(["-e", "-c", &block]);
-        let done = shell.output().expect("sh");
-        assert!(done.status.success(), "{block}\n{}", String::from_utf8_lossy(&done.stderr));
+    let [block] = blocks.try_into().expect("one block");
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut shell = Command::new("sh");
+    shell.env("PATH", search_path()).current_dir(folder.path()).args(["-e", "-c", &block]);
+    let done = shell.output().expect("sh");
+    let stdout = String::from_utf8_lossy(&done.stdout);
+    assert!(done.status.success(), "{stdout}\n{}", String::from_utf8_lossy(&done.stderr));
+    assert!(stdout.ends_with("exit code 1\n"), "the last command is a check that fails: {stdout}");
+    assert!(folder.path().join("run.csv").exists());
+}
+
+/// The install commands name files that exist.
+#[test]
+fn installed_files_exist() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let install = blocks("sh").into_iter().find(|block| block.contains("cargo install")).expect("a block");
+    assert!(install.contains("completions/cangauge.bash ") && folder.join("completions/cangauge.bash").exists());
+    for section in ["1", "5", "7"] {
+        let pages = fs::read_dir(folder.join("man")).expect("the folder").filter_map(Result::ok);
+        assert!(pages.into_iter().any(|page| page.path().extension().is_some_and(|found| found == section)));
+    }
+}
+
+#[test]
+fn every_built_in_device_is_listed_with_its_defaults() {
+    let text = text();
+    for model in cangauge::device::catalog::built_in() {
+        let (name, factory) = (&model.description.name, &model.description.factory);
+        let unknown = || "unknown".to_owned();
+        let node = factory.node_id.map_or_else(unknown, |node| node.to_string());
+        let rate = factory.bit_rate.map_or_else(unknown, |rate| format!("{} kbit/s", rate / 1000));
+        assert!(
+            text.contains(&format!("| `{name}` | {node} | {rate} |")) || text.contains(&format!("`--device {name}`")),
+            "{name}: node-ID {node}, {rate}"
+        );
     }
 }
 
@@ -107,7 +132,7 @@ fn the_python_example_works() {
 }
 
 #[test]
-fn commands_in_the_text_are_understood() {
+fn commands_in_the_text_are_valid() {
     let text = text();
     let commands = text.split('`').skip(1).step_by(2).filter(|code| code.starts_with("cangauge "));
     let commands: Vec<&str> = commands.filter(|code| !code.contains("COMMAND")).collect();

@@ -16,6 +16,7 @@ mod log;
 mod log_files;
 mod lss;
 mod program;
+mod readme;
 mod two;
 mod virtual_interfaces;
 
