@@ -127,7 +127,7 @@ pub(crate) fn bench(spec: &Spec, recorder: &Recorder) -> MemoryBus {
     for (place, device) in spec.devices.iter().enumerate() {
         let made = Device::new(setup(device)).expect("a device").recording(recorder.clone());
         let unsaved = device.node.zip(device.unsaved_heartbeat).map(|(id, time)| write(id, 0x1017, 0, time.into(), 2));
-        let mut station = FaultyDevice::new(made, place, &device.device_faults, unsaved);
+        let mut station = FaultyDevice::new(made, place, device, unsaved);
         if let Command::SdoWrite { node, object, .. } = &spec.command {
             station.watched = (device.node == Some(*node)).then_some(*object);
         }

@@ -7,6 +7,7 @@ mod claims;
 mod frames;
 mod kept;
 mod killed;
+mod odd;
 mod put_back;
 mod rows;
 mod silence;
@@ -19,6 +20,7 @@ use claims::{claims, last_writes};
 use frames::frames;
 use kept::after_power;
 use killed::killed;
+use odd::odd;
 use put_back::put_back;
 use rows::{rows, signatures};
 use silence::check_cause;
@@ -61,6 +63,7 @@ pub(crate) fn judge(spec: &Spec, run: &mut Run) -> Vec<Violation> {
     checks(spec, run, &mut violations);
     signatures(spec, run, &mut violations);
     killed(spec, run, &mut violations);
+    odd(spec, run, &mut violations);
     if let Ok(said) = run.result.clone() {
         claims(spec, run, &said, &after, &mut violations);
         last_writes(spec, run, &mut violations);

@@ -17,6 +17,7 @@ mod command;
 mod judge;
 mod kinds;
 mod make;
+mod odd;
 mod random;
 mod run;
 mod shrink;

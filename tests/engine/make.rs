@@ -59,6 +59,9 @@ impl Spec {
             70..=75 => spec.kill = Some(kill(random)),
             _ => {}
         }
+        if random.percent(15) {
+            spec.make_odd(random);
+        }
         spec
     }
 
@@ -117,6 +120,7 @@ fn device(random: &mut Random, at: u32) -> DeviceSpec {
         event_timer_ms: random.percent(30).then(|| *random.pick(&[10, 50, 100])),
         overload: random.percent(10),
         device_faults: Vec::new(),
+        oddity: None,
     }
 }
 

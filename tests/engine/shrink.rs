@@ -30,6 +30,9 @@ impl Spec {
             if device.event_timer_ms.is_some() {
                 without(&|spec| spec.devices[at].event_timer_ms = None);
             }
+            if device.oddity.is_some() {
+                without(&|spec| spec.devices[at].oddity = None);
+            }
             if device.overload {
                 without(&|spec| spec.devices[at].overload = false);
             }

@@ -2,6 +2,7 @@
 //! failing scenario can be reduced piece by piece.
 
 use crate::command::Command;
+use crate::odd::Oddity;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Spec {
@@ -40,6 +41,7 @@ pub(crate) struct DeviceSpec {
     pub(crate) event_timer_ms: Option<u16>,
     pub(crate) overload: bool,
     pub(crate) device_faults: Vec<DeviceFault>,
+    pub(crate) oddity: Option<Oddity>,
 }
 
 /// A fault of a device.
@@ -199,7 +201,16 @@ impl Spec {
             && self.kill.is_none()
             && self.device_faults().next().is_none()
             && !self.shares_node_ids()
-            && self.devices.iter().all(|device| device.bit_rate.is_none() && device.latency_us < 20_000)
+            && self
+                .devices
+                .iter()
+                .all(|device| device.bit_rate.is_none() && device.latency_us < 20_000 && device.oddity.is_none())
+    }
+
+    /// Whether a device with this node-ID is odd.
+    pub(crate) fn oddity_of(&self, node: &str) -> Option<Oddity> {
+        let device = self.devices.iter().find(|device| device.node.is_some_and(|id| id.to_string() == node));
+        device.and_then(|device| device.oddity)
     }
 
     /// Whether all faults are between the program and the bus.

@@ -1,7 +1,8 @@
 //! The participants on the bus: devices with faults, which record what they sent, and others.
 
+use crate::odd::{Mute, Oddity};
 use crate::random::Random;
-use crate::spec::{Act, DeviceFault};
+use crate::spec::{Act, DeviceFault, DeviceSpec};
 use cangauge::bus::Mono;
 use cangauge::bus::memory::{Outbox, Station, Tuning};
 use cangauge::canopen::frame::Frame;
@@ -9,7 +10,7 @@ use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
 use cangauge::node::write::is_signature;
 use cangauge::sim::{Device, State};
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 pub(crate) fn ms(milliseconds: u64) -> Mono {
@@ -22,6 +23,11 @@ pub(crate) struct FaultyDevice {
     /// Its place on the bench.
     pub(crate) place: usize,
     device_faults: Vec<DeviceFault>,
+    oddity: Option<Oddity>,
+    /// Whether it has its oddity: a device may reject the setting.
+    pub(crate) has_oddity: bool,
+    /// The lengths of frames before the oddity changed them.
+    lengths: BTreeMap<CanId, usize>,
     resets: VecDeque<Mono>,
     hangs: Vec<(Mono, Mono)>,
     /// The device hangs until then: it is not woken before.
@@ -42,16 +48,11 @@ pub(crate) struct FaultyDevice {
 }
 
 impl FaultyDevice {
-    pub(crate) fn new(
-        device: Device,
-        place: usize,
-        device_faults: &[DeviceFault],
-        unsaved: Option<Frame>,
-    ) -> FaultyDevice {
+    pub(crate) fn new(device: Device, place: usize, spec: &DeviceSpec, unsaved: Option<Frame>) -> FaultyDevice {
         let mut resets: Vec<Mono> = Vec::new();
         let mut hangs = Vec::new();
         let mut babble = None;
-        for device_fault in device_faults {
+        for device_fault in &spec.device_faults {
             match device_fault {
                 DeviceFault::ResetAt { ms: at } => resets.push(ms(*at)),
                 DeviceFault::Hang { from_ms, for_ms } => hangs.push((ms(*from_ms), ms(from_ms + for_ms))),
@@ -65,7 +66,10 @@ impl FaultyDevice {
         FaultyDevice {
             device,
             place,
-            device_faults: device_faults.to_vec(),
+            device_faults: spec.device_faults.clone(),
+            oddity: spec.oddity,
+            has_oddity: true,
+            lengths: BTreeMap::new(),
             resets: resets.into(),
             hangs,
             hung_until: Mono::START,
@@ -83,6 +87,7 @@ impl FaultyDevice {
     /// Removes all faults.
     pub(crate) fn tame(&mut self) {
         self.device_faults.clear();
+        self.oddity = None;
         self.resets.clear();
         self.hangs.clear();
         self.late.clear();
@@ -124,7 +129,7 @@ impl FaultyDevice {
         let before = answers(out);
         act(&mut self.device, out);
         let mut old = answers(out).min(before);
-        if answers(out) > old && !self.device_faults.is_empty() {
+        if answers(out) > old && (!self.device_faults.is_empty() || self.oddity == Some(Oddity::Twice)) {
             let all: Vec<Frame> = std::iter::from_fn(|| out.pop()).collect();
             for frame in all {
                 let is_answer = frame.id().sdo_response_node().is_some();
@@ -136,13 +141,23 @@ impl FaultyDevice {
                 }
             }
         }
+        if let Some(oddity) = self.oddity {
+            let all: Vec<Frame> = std::iter::from_fn(|| out.pop()).collect();
+            for frame in all.into_iter().filter(|frame| !oddity.drops(frame)) {
+                let changed = oddity.changed(frame);
+                if changed != frame {
+                    self.lengths.insert(frame.id(), frame.data().len());
+                }
+                out.send(changed);
+            }
+        }
         self.look(now);
     }
 
     fn answer(&mut self, mut frame: Frame, now: Mono, out: &mut Outbox) {
         let number = self.answers;
         self.answers += 1;
-        let (mut copies, mut late) = (1, None);
+        let (mut copies, mut late) = (if self.oddity == Some(Oddity::Twice) { 2 } else { 1 }, None);
         for device_fault in &self.device_faults {
             match *device_fault {
                 DeviceFault::Lose { nth } if nth == number => copies = 0,
@@ -193,10 +208,13 @@ impl Station for FaultyDevice {
             let mut nowhere = Outbox::default();
             self.device.receive(now, &write, &mut nowhere);
         }
+        if let Some(oddity) = self.oddity {
+            self.has_oddity = oddity.power_on(&mut self.device, now);
+        }
     }
 
     fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
-        if self.hung_until(now).is_some() {
+        if self.hung_until(now).is_some() || self.oddity.is_some_and(|oddity| oddity.ignores(frame)) {
             return;
         }
         if let (Some(node), Some(data)) = (frame.id().sdo_request_node(), frame.all_eight())
@@ -209,6 +227,17 @@ impl Station for FaultyDevice {
         match self.refusal(frame) {
             Some(refusal) if self.device.state().is_some_and(|state| state != State::Stopped) => out.send(refusal),
             _ => self.act(now, out, |device, out| device.receive(now, frame, out)),
+        }
+        if let (Some(oddity), Some(node), Some(State::Operational)) =
+            (self.oddity, self.device.node(), self.device.state())
+        {
+            if matches!(oddity, Oddity::Mute(Mute::Dies | Mute::DiesUnseen)) {
+                out.clear();
+                self.hangs.push((now, ms(1_000_000)));
+            }
+            let Some((command, emergency)) = oddity.own_command(node) else { return };
+            self.act(now, out, |device, out| device.receive(now, &command, out));
+            emergency.into_iter().for_each(|frame| out.send(frame));
         }
     }
 
@@ -242,7 +271,11 @@ impl Station for FaultyDevice {
 
     fn sent(&mut self, now: Mono, frame: &Frame) {
         self.sent.push((now, *frame));
-        self.device.sent(now, frame);
+        // The simulated device records only frames of its own lengths.
+        let own = self.lengths.get(&frame.id()).and_then(|length| frame.data().get(..*length));
+        let own = own.filter(|_| matches!(self.oddity, Some(Oddity::Pdo(_))));
+        let own = own.and_then(|data| Frame::new(frame.id(), data).ok());
+        self.device.sent(now, &own.unwrap_or(*frame));
     }
 
     fn tuning(&self) -> Tuning {

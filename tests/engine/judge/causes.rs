@@ -121,7 +121,7 @@ fn may_be_odd(spec: &Spec, message: &str) -> bool {
             "no measured",
             "has no",
             "multiplexed",
-            "not known",
+            "is unknown",
             "it keeps no",
         ]
         .iter()

@@ -84,6 +84,9 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, vio
                         | Command::Map { .. }
                         | Command::Store { .. }
                         | Command::Restore { .. }
+                        // The state of a silent node.
+                        | Command::Log { .. }
+                        | Command::Check { .. }
                 );
                 (guards || lss) && id.heartbeat_node().is_some_and(|node| named.contains(&node.get()))
             }

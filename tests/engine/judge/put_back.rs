@@ -1,6 +1,7 @@
 //! Temporary changes are restored.
 
 use super::*;
+use crate::odd::Oddity;
 use cangauge::bus::BitRateControl;
 use cangauge::bus::memory::BIT_RATE;
 use cangauge::output::failure::ErrorMessage;
@@ -11,6 +12,7 @@ pub(super) fn put_back(spec: &Spec, run: &mut Run, after: &[DeviceState], violat
     let cannot = spec.loses_sent()
         // A device that floods the bus can delay the last frames.
         || spec.device_faults().any(|fault| matches!(fault, DeviceFault::Hang { .. } | DeviceFault::Babbles { .. }))
+        || spec.devices.iter().any(|device| device.oddity.is_some_and(Oddity::has_own_state))
         // Some devices use LSS in one NMT state only, and another master may change that state.
         || spec.acts().any(|act| matches!(act, Act::Nmt { .. }))
         || spec.devices.iter().any(|device| device.bit_rate.is_some()) && !detects;

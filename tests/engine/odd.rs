@@ -1,0 +1,297 @@
+//! Devices that always differ from the standard in one point. A scenario with such a device has no faults.
+
+use crate::command::{Command, Expected, How, Measuring};
+use crate::kinds::model;
+use crate::random::Random;
+use crate::spec::Spec;
+use crate::station::write;
+use cangauge::bus::Mono;
+use cangauge::bus::memory::{Outbox, Station};
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::{CanId, NodeId};
+use cangauge::canopen::nmt::NmtCommand;
+use cangauge::canopen::object::ObjectId;
+use cangauge::master::BlockMode;
+use cangauge::sim::Device;
+
+/// A deviation from the standard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Oddity {
+    /// Reads of this index are not answered.
+    Silent(u16),
+    /// The toggle bit of segments is always 1.
+    WrongToggle,
+    /// Every SDO answer is sent twice.
+    Twice,
+    /// Writes are acknowledged with index and sub-index 0.
+    IndexZero,
+    /// Heartbeats have this many bytes.
+    Heartbeat(usize),
+    /// TPDOs have this many bytes.
+    Pdo(usize),
+    /// It has neither a profile nor a known vendor: nothing states the types of its objects.
+    Stranger,
+    /// It sends no TPDO.
+    Mute(Mute),
+}
+
+/// Why a device sends no TPDO.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Mute {
+    Disabled,
+    OnRequest,
+    SlowTimer,
+    WaitsForSync,
+    FewSyncs,
+    FallsBack,
+    Stops,
+    /// Stops without heartbeat: node guarding shows the state.
+    StopsUnseen,
+    /// Falls back with the emergency FF00h.
+    Emergency,
+    /// It neither receives nor sends after the start.
+    Dies,
+    /// The same without heartbeat.
+    DiesUnseen,
+    NothingMapped,
+    /// Its mapping is that of a multiplexed PDO (1A00h:0 is FEh).
+    Multiplexed,
+    /// Everything is set up, and it does not send.
+    NotSent,
+}
+
+impl Mute {
+    /// What the failure of `log` must contain.
+    pub(crate) fn reason(self) -> &'static str {
+        match self {
+            Mute::Disabled => "(bit 31 of 1800h:1)",
+            Mute::OnRequest => "is sent on remote request only (1800h:2",
+            Mute::SlowTimer => "is longer (1800h:5 is 60000 ms)",
+            Mute::WaitsForSync => "waits for SYNC, and no node sends SYNC",
+            Mute::FewSyncs => "is sent at every 240th SYNC",
+            Mute::FallsBack => "it is pre-operational again after the start",
+            Mute::Stops => "it is stopped after the start",
+            Mute::StopsUnseen => "it is stopped",
+            Mute::Emergency => "it is pre-operational again after the start, emergency FF00h",
+            Mute::Dies => "its heartbeat stopped",
+            Mute::DiesUnseen => "it does not answer: it is stopped, or has no power or cable",
+            Mute::NothingMapped => "nothing is mapped into TPDO1 (1A00h:0 is 0)",
+            Mute::Multiplexed => "is a multiplexed PDO (1A00h:0 is FEh)",
+            Mute::NotSent => "is due ",
+        }
+    }
+
+    /// The sub-index of each TPDO, its number of bytes and its value, that have this effect.
+    fn settings(self, device: &mut Device, index: u16) -> Vec<(u8, u8, u32)> {
+        match self {
+            Mute::Disabled => {
+                let bytes = device.value(ObjectId::new(index, 1), Mono::START).unwrap_or_default();
+                let cob_id = bytes.iter().rev().fold(0u32, |number, byte| number << 8 | u32::from(*byte));
+                vec![(1, 4, cob_id | 0x8000_0000)]
+            }
+            Mute::OnRequest => vec![(2, 1, 253)],
+            Mute::SlowTimer => vec![(2, 1, 254), (5, 2, 60_000)],
+            Mute::WaitsForSync | Mute::NotSent => vec![(2, 1, 1), (5, 2, 0)],
+            Mute::FewSyncs => vec![(2, 1, 240), (5, 2, 0)],
+            _ => Vec::new(),
+        }
+    }
+
+    /// Sets up the TPDOs. Returns whether the device accepts that.
+    fn set_up(self, device: &mut Device, now: Mono, node: u8) -> bool {
+        let mut accepted = true;
+        for index in 0x1800..0x1810 {
+            if device.value(ObjectId::new(index, 1), now).is_none() {
+                continue;
+            }
+            for (sub, bytes, value) in self.settings(device, index) {
+                device.receive(now, &write(node, index, sub, value, bytes), &mut Outbox::default());
+                let held = device.value(ObjectId::new(index, sub), now);
+                // A device without event timer cannot have a slow one.
+                accepted &= value == 0 || held.as_deref() == Some(&value.to_le_bytes()[..usize::from(bytes)]);
+            }
+        }
+        accepted
+    }
+}
+
+impl Oddity {
+    /// Changes the device after power-on. Returns whether it then has the oddity.
+    pub(crate) fn power_on(self, device: &mut Device, now: Mono) -> bool {
+        match (self, device.node()) {
+            (Oddity::Mute(mute), Some(node)) => mute.set_up(device, now, node.get()),
+            _ => true,
+        }
+    }
+
+    /// Whether the device ignores a frame.
+    pub(crate) fn ignores(self, frame: &Frame) -> bool {
+        match (self, frame.data()) {
+            (Oddity::Silent(index), [0x40, low, high, ..]) => {
+                frame.id().sdo_request_node().is_some() && u16::from_le_bytes([*low, *high]) == index
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether the device does not send a frame.
+    pub(crate) fn drops(self, frame: &Frame) -> bool {
+        matches!(self, Oddity::Mute(Mute::Multiplexed | Mute::NothingMapped | Mute::NotSent)) && is_tpdo(frame)
+    }
+
+    /// The NMT command that the device gives itself when it is operational, and the emergency that it sends then.
+    pub(crate) fn own_command(self, node: NodeId) -> Option<(Frame, Option<Frame>)> {
+        let specifier = match self {
+            Oddity::Mute(Mute::FallsBack | Mute::Emergency) => NmtCommand::EnterPreOperational,
+            Oddity::Mute(Mute::Stops | Mute::StopsUnseen) => NmtCommand::Stop,
+            _ => return None,
+        };
+        let emergency = Frame::full(CanId::emergency(node), [0x00, 0xff, 0x81, 0, 0, 0, 0, 0]);
+        let sends = self == Oddity::Mute(Mute::Emergency);
+        Some((Frame::pair(CanId::NMT, specifier.specifier(), node.get()), sends.then_some(emergency)))
+    }
+
+    /// The frame as this device sends it. A frame that was changed before stays as it is.
+    pub(crate) fn changed(self, frame: Frame) -> Frame {
+        let mut data = frame.data().to_vec();
+        let id = frame.id();
+        match (self, id.sdo_response_node(), data.as_mut_slice()) {
+            (Oddity::WrongToggle, Some(_), [first, ..]) if *first >> 5 == 0 => *first |= 0x10,
+            (Oddity::IndexZero, Some(_), [0x60, rest @ ..]) => rest.fill(0),
+            (Oddity::Stranger, Some(_), [_, 0x00, 0x10, 0, value @ ..]) => value.fill(0),
+            (Oddity::Stranger, Some(_), [_, 0x18, 0x10, 1, value @ ..]) => value.copy_from_slice(&[0x77, 0, 0, 0x7f]),
+            (Oddity::Mute(mute @ (Mute::Multiplexed | Mute::NothingMapped)), Some(_), answer) => match answer {
+                [0x40..=0x4f, 0..=0x0f, 0x1a, 0, count, ..] => {
+                    *count = if mute == Mute::Multiplexed { 0xfe } else { 0 };
+                }
+                _ => return frame,
+            },
+            (Oddity::Heartbeat(length), None, _) if id.heartbeat_node().is_some() => data.resize(length, 0),
+            (Oddity::Pdo(length), None, _) if is_tpdo(&frame) => data.resize(length, 0),
+            _ => return frame,
+        }
+        Frame::new(id, &data).unwrap_or(frame)
+    }
+
+    /// Whether the device ends in a state of its own.
+    pub(crate) fn has_own_state(self) -> bool {
+        let mutes = [Mute::FallsBack, Mute::Emergency, Mute::Stops, Mute::StopsUnseen, Mute::Dies, Mute::DiesUnseen];
+        mutes.into_iter().any(|mute| self == Oddity::Mute(mute))
+    }
+
+    /// Whether the program can use the device like one without the oddity.
+    pub(crate) fn is_harmless(self) -> bool {
+        !matches!(self, Oddity::Stranger | Oddity::Mute(_) | Oddity::Pdo(0..=7))
+    }
+}
+
+fn is_tpdo(frame: &Frame) -> bool {
+    (0x180..0x580).contains(&frame.id().number())
+}
+
+impl Spec {
+    /// Makes one device odd, and chooses a command that meets the oddity.
+    pub(crate) fn make_odd(&mut self, random: &mut Random) {
+        let fits = |device: &&mut crate::spec::DeviceSpec| {
+            device.node.is_some() && model(device.kind).dictionary.get(ObjectId::new(0x1800, 1)).is_some()
+        };
+        let Some(device) = self.devices.iter_mut().find(fits) else { return };
+        let node = device.node.expect("it has one");
+        let oddity = oddity(random);
+        device.oddity = Some(oddity);
+        device.start = false;
+        if matches!(oddity, Oddity::Heartbeat(_) | Oddity::Mute(_)) {
+            let unseen = matches!(oddity, Oddity::Mute(Mute::StopsUnseen | Mute::DiesUnseen));
+            device.heartbeat_ms = (!unseen).then_some(100);
+        }
+        self.timeout_ms = 100;
+        (self.others, self.faults, self.interrupts, self.kill) = Default::default();
+        for device in &mut self.devices {
+            device.device_faults.clear();
+            device.bit_rate = None;
+            device.latency_us = device.latency_us.min(2_000);
+            device.unsaved_heartbeat = None;
+        }
+        self.command = command(oddity, node, random);
+    }
+}
+
+fn oddity(random: &mut Random) -> Oddity {
+    let mutes = [
+        Mute::Disabled,
+        Mute::OnRequest,
+        Mute::SlowTimer,
+        Mute::WaitsForSync,
+        Mute::FewSyncs,
+        Mute::FallsBack,
+        Mute::Stops,
+        Mute::StopsUnseen,
+        Mute::Emergency,
+        Mute::Dies,
+        Mute::DiesUnseen,
+        Mute::NothingMapped,
+        Mute::Multiplexed,
+        Mute::NotSent,
+    ];
+    match random.within(0..=10) {
+        0 => Oddity::Silent(*random.pick(&[0x1008, 0x1009, 0x100a])),
+        1 => Oddity::WrongToggle,
+        2 => Oddity::Twice,
+        3 => Oddity::IndexZero,
+        4 => Oddity::Heartbeat(*random.pick(&[2, 3, 8])),
+        5 => Oddity::Pdo(8),
+        6 => Oddity::Pdo(*random.pick(&[0, 1])),
+        7 => Oddity::Stranger,
+        _ => Oddity::Mute(*random.pick(&mutes)),
+    }
+}
+
+/// A command that meets the oddity.
+fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
+    let log = |sync_ms, poll_ms| Command::Log {
+        nodes: vec![node],
+        sync_ms,
+        poll_ms,
+        duration_ms: 1000,
+        count: None,
+        nmt: true,
+    };
+    let how = How { blocks: BlockMode::Auto, described: false };
+    let heartbeat = ObjectId::new(0x1017, 0);
+    let of_values = [
+        Command::Read { nodes: vec![node] },
+        Command::Scan { nodes: vec![node] },
+        Command::Info { node },
+        log(Some(50), None),
+        log(None, Some(100)),
+    ];
+    let own = match oddity {
+        Oddity::Silent(_) | Oddity::WrongToggle | Oddity::Stranger => of_values.to_vec(),
+        Oddity::Twice => [
+            of_values.to_vec(),
+            vec![
+                Command::SdoRead { node, object: heartbeat, how },
+                Command::Check {
+                    nodes: vec![node],
+                    expected: vec![Expected { signal: "ch1", low: -1e9, high: 1e9 }],
+                    how: Measuring::Once,
+                    excuse: false,
+                },
+            ],
+        ]
+        .concat(),
+        Oddity::IndexZero => vec![Command::SdoWrite { node, object: heartbeat, bytes: vec![200, 0], how }],
+        Oddity::Heartbeat(_) => {
+            let what = [NmtCommand::Start, NmtCommand::Stop, NmtCommand::EnterPreOperational];
+            let what = *random.pick(&what);
+            vec![
+                Command::Nmt { what, nodes: vec![node], all: false },
+                Command::NmtState { nodes: vec![node] },
+                log(Some(50), None),
+            ]
+        }
+        Oddity::Mute(Mute::WaitsForSync | Mute::SlowTimer) => vec![log(None, None)],
+        Oddity::Mute(_) | Oddity::Pdo(_) => vec![log(Some(50), None)],
+    };
+    random.pick(&own).clone()
+}
