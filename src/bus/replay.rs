@@ -22,6 +22,9 @@ const MAX_LINE: u64 = 4096;
 /// Lines without any valid one, after which the file is not a recording.
 const MAX_UNKNOWN: u64 = 100;
 
+/// The first bytes of a file, which show its format, and the rest of their last line.
+const START_LENGTH: usize = 512;
+
 /// Lines that are read ahead to see whether times without a date increase.
 const LINES_AHEAD: usize = 1000;
 
@@ -43,6 +46,8 @@ pub enum ReplayNote {
     },
     /// The times count from the start of the recording; its date is unknown.
     NoDate,
+    /// The file ends in the middle of its last line, which has this number and was skipped.
+    CutOff(u64),
 }
 
 /// A candump recording as a bus that only receives.
@@ -68,6 +73,8 @@ pub struct Replay {
     is_recording: bool,
     /// Skipped lines: their number, and the first one.
     skipped: Option<(u64, u64)>,
+    /// The number of the last line, if it is not complete.
+    cut_off: Option<u64>,
     has_no_date: bool,
     report: Report,
 }
@@ -111,6 +118,7 @@ impl Replay {
             start: Vec::new(),
             is_recording: false,
             skipped: None,
+            cut_off: None,
             has_no_date: false,
             report,
         }
@@ -144,11 +152,11 @@ impl Replay {
             }
         }
         self.number += 1;
-        if self.number == 1 {
-            self.start = line.clone();
-            if line.starts_with(BYTE_ORDER_MARK) {
-                line.drain(..BYTE_ORDER_MARK.len());
-            }
+        if self.start.len() < START_LENGTH {
+            self.start.extend_from_slice(&line);
+        }
+        if self.number == 1 && line.starts_with(BYTE_ORDER_MARK) {
+            line.drain(..BYTE_ORDER_MARK.len());
         }
         Ok(Some((self.number, line)))
     }
@@ -174,7 +182,9 @@ impl Replay {
                     return Err(self.wrong(Some(number), RecordingError::NoTimes));
                 }
                 // The recording was stopped in the middle of its last line.
-                Line::WithoutTime | Line::Unknown if !bytes.ends_with(b"\n") && self.is_recording => {}
+                Line::WithoutTime | Line::Unknown if !bytes.ends_with(b"\n") && self.is_recording => {
+                    self.cut_off = Some(number);
+                }
                 Line::WithoutTime | Line::Unknown => {
                     let (count, _) = self.skipped.get_or_insert((0, number));
                     *count += 1;
@@ -262,6 +272,9 @@ impl Drop for Replay {
         }
         if let Some((count, first)) = self.skipped {
             (self.report)(&ReplayNote::Skipped { count, first });
+        }
+        if let Some(line) = self.cut_off {
+            (self.report)(&ReplayNote::CutOff(line));
         }
     }
 }

@@ -11,6 +11,9 @@ pub fn note(file: &str, note: &ReplayNote) -> (String, bool) {
         ReplayNote::Skipped { count, first } => {
             (format!("{file}: {count} lines skipped, line {first} first: they are not lines of a candump log"), true)
         }
+        ReplayNote::CutOff(line) => {
+            (format!("{file}: the file ends in the middle of line {line}, which was skipped"), true)
+        }
         ReplayNote::NoDate => (format!("{file}: the times have no date; they count from 1970-01-01"), false),
     }
 }

@@ -180,6 +180,14 @@ fn broken_lines_are_skipped_counted_and_named() {
     let done = log_of(&bench, cut(|number| number == 15)).exit(0);
     assert_eq!(done.stdout.lines().count(), 5, "{}", done.stdout);
     assert!(done.stderr.contains("t.log: 1 line skipped: line 16 is not a line"), "{}", done.stderr);
+    let whole = recording(log_form);
+    let done = log_of(&bench, &whole[..whole.len() - 8]).exit(0);
+    assert_eq!(done.stdout.lines().count(), 5, "{}", done.stdout);
+    assert!(
+        done.stderr.contains("t.log: the file ends in the middle of line 18, which was skipped"),
+        "{}",
+        done.stderr
+    );
     let done = log_of(&bench, cut(|number| number > 14)).exit(0);
     assert_eq!(done.stdout.lines().count(), 3, "{}", done.stdout);
     assert!(done.stderr.contains("t.log: 3 lines skipped, line 16 first"), "{}", done.stderr);
@@ -220,8 +228,14 @@ fn files_that_are_no_recordings_are_named() {
         let done = log_of(&bench, text).exit(8);
         assert!(done.stderr.starts_with(&format!("cangauge: {message}")), "{}", done.stderr);
     }
-    let done = log_of(&bench, b"LOGG\x90\0\0\0").exit(8);
-    assert!(done.stderr.contains("hint: convert it with python-can: "), "{}", done.stderr);
+    for (bytes, hint) in [
+        (&b"LOGG\x90\0\0\0"[..], "hint: convert it with python-can: "),
+        (b"UnFinMF 4.10    ", "hint: convert it with python-can: "),
+        (b"\x0a\x0d\x0d\x0a\x1c\0\0\0", "hint: "),
+    ] {
+        let done = log_of(&bench, bytes).exit(8);
+        assert!(done.stderr.contains(hint) && done.stderr.contains("replay t.log: this is a"), "{}", done.stderr);
+    }
     replay(&bench, "nowhere.log", "log 1").exit(8);
     replay(&bench, "", "log 1").exit(2);
 }

@@ -73,10 +73,11 @@ impl FileFormat {
 
     /// The format of a file by its first bytes; `None` if it is not one of these.
     pub(super) fn of(start: &[u8]) -> Option<FileFormat> {
-        let binary: [(&[u8], FileFormat); 10] = [
+        let binary: [(&[u8], FileFormat); 11] = [
             (b"\x1f\x8b", FileFormat::Gzip),
             (b"LOGG", FileFormat::Blf),
             (b"MDF ", FileFormat::Mdf),
+            (b"UnFinMF ", FileFormat::Mdf),
             (b"SQLite format 3\0", FileFormat::Sqlite),
             (b"\x0a\x0d\x0d\x0a", FileFormat::Pcap),
             (b"\xa1\xb2\xc3\xd4", FileFormat::Pcap),
@@ -89,7 +90,6 @@ impl FileFormat {
             return Some(*format);
         }
         let text = String::from_utf8_lossy(start.strip_prefix(super::BYTE_ORDER_MARK).unwrap_or(start)).to_lowercase();
-        let text = text.trim_start();
         let words = [
             ("date ", FileFormat::Asc),
             ("base hex", FileFormat::Asc),
@@ -101,6 +101,8 @@ impl FileFormat {
             ("time,elapsed_s,", FileFormat::Measurements),
             ("<", FileFormat::Xml),
         ];
-        words.iter().find(|(word, _)| text.starts_with(word)).map(|(_, format)| *format)
+        // Comments may stand before.
+        let of_line = |line: &str| words.iter().find(|(word, _)| line.trim_start().starts_with(word));
+        text.lines().find_map(of_line).map(|(_, format)| *format)
     }
 }

@@ -65,8 +65,10 @@ fn error_frames_are_faults_and_fd_frames_are_ignored() {
 }
 
 #[test]
-fn a_truncated_last_line_is_ignored() {
-    assert_eq!(all("(1.5) can0 181#01\n(2.5) can0 18"), ["0 181#01", "end"]);
+fn a_truncated_last_line_is_skipped_and_reported() {
+    let text = "(1700000001.5) can0 181#01\n(1700000002.5) can0 18";
+    assert_eq!(all(text), ["0 181#01", "end"]);
+    assert_eq!(notes(text), [ReplayNote::CutOff(2)]);
 }
 
 #[test]
@@ -110,7 +112,10 @@ fn files_that_are_no_recordings_are_named() {
         (";$FILEVERSION=2.1\n;\n", "this is a PEAK TRC file, not a candump log"),
         ("timestamp,arbitration_id,extended\n", "this is a CSV file of python-can, not a candump log"),
         ("time,elapsed_s,node,signal,value,unit,status,raw\n", "this is a CSV file of measurements, not a candump log"),
+        ("; exported\n;$FILEVERSION=1.1\n;\n", "this is a PEAK TRC file, not a candump log"),
         ("LOGG\x01\x02", "this is a Vector BLF file, not a candump log"),
+        ("\n\r\r\n\x1c\0\0\0", "this is a Wireshark capture, not a candump log"),
+        ("UnFinMF 4.10", "this is an MDF file, not a candump log"),
     ] {
         assert_eq!(all(text), [format!("replay x.log: {message}")], "{text}");
     }

@@ -183,6 +183,12 @@ fn signals(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>
         if !names.insert(&signal.name) {
             table.mistake("name", format!("name: two signals have the name \"{}\"", signal.name));
         }
+        let number = signal.name.strip_prefix("ch").and_then(|number| number.parse::<u8>().ok());
+        if let Some(number) = number.filter(|number| *number != signal.channel) {
+            let message =
+                format!("name: \"{}\" is channel {number}, and this is channel {}", signal.name, signal.channel);
+            table.mistake("name", message);
+        }
         if !(1..=LAST_CHANNEL).contains(&signal.channel) {
             table.mistake("channel", format!("channel: {} is not in the range 1 to {LAST_CHANNEL}", signal.channel));
         } else if !channels.insert(signal.channel) {

@@ -4,6 +4,7 @@ use super::DescriptionError;
 use crate::canopen::id::{NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
+use crate::device::nearest::distance;
 use crate::device::scalar::{NumberRange, Scalar};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -55,12 +56,14 @@ pub(super) struct Table<'t> {
     offset: usize,
     source: &'t Source<'t>,
     known: Vec<&'static str>,
+    /// The required keys that it does not have.
+    missing: Vec<&'static str>,
 }
 
 impl<'t> Table<'t> {
     /// `offset`: the place of the table in the text.
     pub(super) fn new(table: &'t DeTable<'t>, offset: usize, source: &'t Source<'t>) -> Table<'t> {
-        Table { table, offset, source, known: Vec::new() }
+        Table { table, offset, source, known: Vec::new(), missing: Vec::new() }
     }
 
     fn value(&mut self, key: &'static str) -> Option<&'t Spanned<DeValue<'t>>> {
@@ -99,7 +102,7 @@ impl<'t> Table<'t> {
     /// The value of a key that must be there.
     pub(super) fn required<T: FromToml>(&mut self, key: &'static str) -> Option<T> {
         let Some(value) = self.value(key) else {
-            self.source.mistake(self.offset, format!("missing key \"{key}\""));
+            self.missing.push(key);
             return None;
         };
         self.read(key, value)
@@ -164,13 +167,17 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// Every key that was not asked for is a mistake.
+    /// Every key that was not asked for is a mistake, and so is every missing key that is not one of them, misspelt.
     pub(super) fn finish(&mut self) {
         for (name, _) in self.table {
             if !self.known.contains(&name.get_ref().as_ref()) {
                 let message = format!("unknown key \"{}\" (known: {})", name.get_ref(), self.known.join(", "));
                 self.source.mistake(name.span().start, message);
+                self.missing.retain(|key| distance(key, name.get_ref()) > 2);
             }
+        }
+        for key in self.missing.drain(..) {
+            self.source.mistake(self.offset, format!("missing key \"{key}\""));
         }
     }
 }

@@ -56,6 +56,11 @@ fn every_mistake_is_reported() {
 #[test]
 fn a_missing_key_has_the_line_of_its_table() {
     assert_eq!(mistakes("[[signal]]\nname = \"p\"\nvalue = \"0x6130:1\""), ["x.toml:4: missing key \"channel\""]);
+    let misspelt = mistakes("[[signal]]\nname = \"p\"\nchanel = 1\nvalue = \"0x6130:1\"");
+    assert!(
+        matches!(misspelt.as_slice(), [only] if only.starts_with("x.toml:6: unknown key \"chanel\"")),
+        "{misspelt:?}"
+    );
 }
 
 #[test]
@@ -71,6 +76,8 @@ fn signals_differ_in_name_and_channel() {
     assert_eq!(mistakes(&signal("p", 0)), ["x.toml:6: channel: 0 is not in the range 1 to 199"]);
     let name = mistakes(&signal("Druck 1", 1));
     assert_eq!(name, ["x.toml:5: name: \"Druck 1\" has other characters than a to z, 0 to 9 and -"]);
+    assert_eq!(mistakes(&signal("ch1", 2)), ["x.toml:5: name: \"ch1\" is channel 1, and this is channel 2"]);
+    assert_eq!(mistakes(&signal("ch2", 2)), [""; 0]);
     assert_eq!(mistakes(&signal("6130", 1)), ["x.toml:5: name: \"6130\" would be read as an address"]);
 }
 
