@@ -7,6 +7,7 @@ pub use failure::CheckFailure;
 use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
 use crate::master::{Error, Master};
+use crate::measure::decode::Wanted;
 use crate::measure::expression::Expression;
 use crate::measure::expression::bind::AvailableSignals;
 use crate::measure::expression::evaluator::Evaluator;
@@ -131,7 +132,7 @@ fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<Chec
         }
     }
     let mut evaluator = Evaluator::new(&options.expressions);
-    let available = AvailableSignals::from_layouts(known.iter().map(Node::layout));
+    let available = available(&known, &options.expressions);
     evaluator.bind(&options.nodes, &available, options.skip_unsupported, &missing)?;
     let all = wanted_targets(&known, &evaluator)?;
     let sources: Vec<Source> = all.iter().map(|target| target.source.clone()).collect();
@@ -160,6 +161,19 @@ fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<Chec
     let started = samples.first().map(|sample| sample.at);
     let length = started.zip(samples.last()).map_or(Duration::ZERO, |(first, last)| last.at.mono.since(first.mono));
     Ok(CheckReport { verdicts, started, length, failures, remarks })
+}
+
+/// All signals of these nodes, and the objects that the expressions name.
+fn available(nodes: &[Node], expressions: &[Expression]) -> AvailableSignals {
+    let mut available = AvailableSignals::from_layouts(nodes.iter().map(Node::layout));
+    for node in nodes {
+        for item in expressions.iter().flat_map(Expression::wanted) {
+            if let (Wanted::Signal(name), Wanted::Object(object, _)) = (&item, node.wanted(&item)) {
+                available.name_object(node.id, name, object);
+            }
+        }
+    }
+    available
 }
 
 /// The objects to read of all nodes.
@@ -325,7 +339,7 @@ impl Observer for Checker<'_> {
     }
 
     fn begin(&mut self, nodes: &[Node]) -> Result<(), Failure> {
-        let available = AvailableSignals::from_layouts(nodes.iter().map(Node::layout));
+        let available = available(nodes, self.evaluator.expressions());
         self.evaluator.bind(&self.nodes, &available, self.skip_unsupported, &self.missing_nodes())?;
         self.is_bound = true;
         wanted_targets(nodes, &self.evaluator)?;

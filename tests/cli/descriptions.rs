@@ -132,6 +132,23 @@ fn text_that_is_not_an_address_is_a_name() {
     assert!(done.stdout.contains(",1,0x1017:0,0,"), "{}", done.stdout);
 }
 
+#[test]
+fn an_expression_uses_the_names_of_an_eds() {
+    let bench = bench_with("mh4@1", &[("x.eds", eds(0x47, 1, &NAMES))]);
+    let run = |words: &[&str]| bench.run_words(&[&["--eds", "x.eds"], words].concat());
+    let done = run(&["check", "1", "heartbeat == 0"]).exit(0);
+    assert_eq!(done.stdout, "ok    heartbeat == 0  0\n");
+    run(&["check", "1", "1.Heartbeat > 5"]).exit(1);
+    run(&["check", "1", "heartbeat == 0", "--for", "300ms", "--poll", "100ms"]).exit(0);
+    run(&["log", "1", "heartbeat", "--poll", "100ms", "--count", "2", "--expect", "heartbeat == 0"]).exit(0);
+    let done = run(&["check", "1", "offset < 5"]).exit(4);
+    assert!(done.stderr.contains("read 0x2200:0"), "{}", done.stderr);
+    let done = run(&["check", "1", "ofset < 5"]).exit(2);
+    assert!(done.stderr.contains("no signal \"ofset\""), "{}", done.stderr);
+    // The description has names, too.
+    bench.run_words(&["check", "1", "pressure < 100 bar and producer-heartbeat-time == 0"]).exit(0);
+}
+
 /// A description without objects: one signal, and a fixed unit if there is one.
 fn description(unit: Option<&str>) -> String {
     let head = "name = \"mine\"\ntitle = \"Mine\"\nvendor = \"Maker\"\n[identify]\n";
@@ -170,4 +187,28 @@ fn a_unit_in_a_description_is_the_unit_of_the_signal() {
     assert!(done.stdout.contains(",flow,0,l/min,"), "{}", done.stdout);
     let done = bench.run("--device mine.toml log 1 --poll 100ms --count 1").exit(0);
     assert!(done.stdout.contains(",1,flow,0,l/min,,"), "{}", done.stdout);
+}
+
+#[test]
+fn mistakes_in_a_description_are_shown_with_their_lines() {
+    let head = "name = \"mine\"\ntitle = \"Mine\"\nvendor = \"Maker\"\n[identify]\n";
+    let signal =
+        |name, channel, rest| format!("[[signal]]\nname = \"{name}\"\n{channel}\nvalue = \"0x6130:1\"\n{rest}");
+    let one = signal("pressure", "channel = 1", "");
+    for (text, message) in [
+        (format!("{one}{}", signal("temperature", "channel = 1", "")), "11: channel: two signals have the channel 1"),
+        (format!("{one}{}", signal("pressure", "channel = 2", "")), "10: name: two signals have the name \"pressure\""),
+        (signal("pressure", "channel = 0", ""), "7: channel: 0 is not in the range"),
+        (signal("ch2", "channel = 1", ""), "6: name: \"ch2\" is channel 2"),
+        (signal("pressure", "chanel = 1", ""), "7: unknown key \"chanel\""),
+        (signal("pressure", "channel = 1", "units = \"bar\"\n"), "9: unknown key \"units\""),
+        ("[[signal]\n".to_owned(), "5: "),
+    ] {
+        let bench = bench_with("mh4@1", &[("mine.toml", format!("{head}{text}"))]);
+        for line in ["read 1", "log 1 --sync 100ms --count 1", "pdo show 1"] {
+            let done = bench.run(&format!("--device mine.toml {line}")).exit(2);
+            assert!(done.stderr.starts_with(&format!("cangauge: mine.toml:{message}")), "{line}: {}", done.stderr);
+            assert!(done.frames.is_empty(), "{:?}", done.frames);
+        }
+    }
 }

@@ -5,6 +5,7 @@ use super::formula::{Formula, Rule};
 use super::tree::{Condition, Function, Quantity, SignalName};
 use super::{Expression, ExpressionError, LocatedError};
 use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
 use crate::device::nearest::distance;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
@@ -31,6 +32,8 @@ pub struct AvailableSignals {
     signals: Vec<AvailableSignal>,
     /// Nodes whose objects can all be read by address.
     readable: Vec<NodeId>,
+    /// Objects that an expression names, of nodes that have no signal of this name.
+    objects: Vec<(NodeId, String, ObjectId)>,
 }
 
 impl AvailableSignals {
@@ -51,6 +54,18 @@ impl AvailableSignals {
         available
     }
 
+    /// Adds an object that has a name.
+    pub fn name_object(&mut self, node: NodeId, name: &str, object: ObjectId) {
+        self.objects.push((node, name.to_owned(), object));
+    }
+
+    /// What to measure for a name: a signal, or the object with this name.
+    fn what(&self, node: NodeId, signal: &SignalName) -> Wanted {
+        let Wanted::Signal(name) = &signal.what else { return signal.what.clone() };
+        let object = self.objects.iter().find(|(id, named, _)| *id == node && named == name);
+        object.map_or_else(|| signal.what.clone(), |(.., object)| Wanted::Object(*object, None))
+    }
+
     /// The signals of a recording.
     pub fn from_sources(sources: &[Source]) -> AvailableSignals {
         let entry = |source: &Source| AvailableSignal {
@@ -58,7 +73,7 @@ impl AvailableSignals {
             name: source.signal.to_string(),
             unit: unit_of(source),
         };
-        AvailableSignals { signals: sources.iter().map(entry).collect(), readable: Vec::new() }
+        AvailableSignals { signals: sources.iter().map(entry).collect(), ..AvailableSignals::default() }
     }
 
     /// The nodes with at least one signal, without repetitions.
@@ -74,7 +89,7 @@ impl AvailableSignals {
     fn find(&self, node: NodeId, signal: &SignalName) -> Option<Option<Unit>> {
         let name = signal.name();
         let known = self.signals.iter().find(|known| known.node == node && known.name == name);
-        let is_readable = || matches!(signal.what, Wanted::Object(..)) && self.readable.contains(&node);
+        let is_readable = || matches!(self.what(node, signal), Wanted::Object(..)) && self.readable.contains(&node);
         known.map(|known| known.unit).or_else(|| is_readable().then_some(None))
     }
 
@@ -304,7 +319,8 @@ impl Binder<'_> {
         let Some(unit) = self.available.find(node, signal) else {
             return Err(self.unknown_signal(node, signal));
         };
-        let input = Input { node, name: signal.name(), what: signal.what.clone(), unit };
+        let what = self.available.what(node, signal);
+        let input = Input { node, name: what.name(), what, unit };
         if let Some(known) = self.bound.inputs.iter().position(|known| *known == input) {
             return Ok(known);
         }

@@ -127,6 +127,11 @@ impl Evaluator {
         }
     }
 
+    /// The expressions, without repetitions.
+    pub fn expressions(&self) -> &[Expression] {
+        &self.expressions
+    }
+
     /// All bound expressions.
     pub fn bound(&self) -> impl Iterator<Item = &BoundExpression> {
         self.comparisons.iter().map(Comparison::bound)
