@@ -23,12 +23,7 @@ const HAND_WRITTEN: &str = "src/cli/man";
 type Files = BTreeMap<String, Vec<u8>>;
 
 fn completions() -> Files {
-    let names = [
-        (Shell::Bash, "cangauge.bash"),
-        (Shell::Zsh, "_cangauge"),
-        (Shell::Fish, "cangauge.fish"),
-        (Shell::PowerShell, "_cangauge.ps1"),
-    ];
+    let names = [(Shell::Bash, "cangauge.bash"), (Shell::Zsh, "_cangauge"), (Shell::Fish, "cangauge.fish")];
     let script = |shell| {
         let mut script = Vec::new();
         clap_complete::generate(shell, &mut Cli::command(), "cangauge", &mut script);

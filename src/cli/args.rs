@@ -6,6 +6,7 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::measure::decode::Wanted;
 use crate::output::report::Format;
+use crate::output::rows::CHOICES;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use std::collections::BTreeSet;
@@ -206,15 +207,11 @@ impl FromStr for BusSpec {
 
 impl ValueEnum for Format {
     fn value_variants<'a>() -> &'a [Format] {
-        &[Format::Text, Format::Json, Format::Csv]
+        CHOICES
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(match self {
-            Format::Text => "text",
-            Format::Json => "json",
-            Format::Csv => "csv",
-        }))
+        Some(PossibleValue::new(self.name()))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Commands that work on one node after the other.
+//! Commands that work on one node, or on one node after the other.
 
 use super::Global;
 use super::args::Nodes;
@@ -6,8 +6,9 @@ use super::exit::several;
 use super::{descriptions, open};
 use crate::canopen::id::NodeId;
 use crate::master::Master;
-use crate::node::Overrides;
+use crate::node::{Node, Overrides};
 use crate::output::failure::ErrorMessage;
+use crate::tasks::settings::open as open_node;
 use crate::tasks::{Failure, Kind};
 
 /// The results of all nodes.
@@ -42,6 +43,19 @@ pub(super) fn each<T>(
             }
         }
         Ok(each)
+    })
+}
+
+/// Runs `work` on one node, with its signals and TPDOs.
+pub(super) fn on_node<T>(
+    global: &Global,
+    node: NodeId,
+    work: impl FnOnce(&mut Master<'_>, &mut Node) -> Result<T, Failure>,
+) -> anyhow::Result<T> {
+    let overrides = descriptions::overrides(global, &[node])?;
+    global.with_master(|master| {
+        let mut node = open_node(master, node, &overrides)?;
+        Ok(work(master, &mut node)?)
     })
 }
 

@@ -1,10 +1,10 @@
 //! `cangauge errors`.
 
-use super::{Global, descriptions};
+use super::Global;
+use super::each::on_node;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::errors::{ErrorReport, clear, read};
-use crate::tasks::settings::open as open_node;
 use clap::Args;
 
 /// Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history
@@ -27,14 +27,12 @@ impl Errors {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let overrides = descriptions::overrides(global, &[self.node])?;
-        let report = global.with_master(|master| {
-            let node = open_node(master, self.node, &overrides)?;
+        let report = on_node(global, self.node, |master, node| {
             let (errors, cleared) = if self.clear {
-                let (before, now) = clear(master, &node)?;
+                let (before, now) = clear(master, node)?;
                 (now, before.count)
             } else {
-                (read(master, &node)?, None)
+                (read(master, node)?, None)
             };
             Ok(ErrorReport { node: self.node, errors, cleared })
         })?;

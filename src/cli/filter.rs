@@ -1,12 +1,12 @@
 //! `cangauge filter`.
 
+use super::Global;
 use super::args::Duration;
-use super::{Global, descriptions};
+use super::each::on_node;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::notes;
 use crate::tasks::settings::filter::{FilterReport, FilterRequest, FilterType, set, show};
-use crate::tasks::settings::open as open_node;
 use clap::{Args, ValueEnum};
 
 /// Show or set the filter of a signal: type (61A0h) and constant (61A1h)
@@ -57,21 +57,14 @@ impl Filter {
             constant: self.constant,
             damping: self.damping.map(|damping| damping.0),
         };
-        let overrides = descriptions::overrides(global, &[self.node])?;
         let signal = self.signal.as_deref();
         if wanted == FilterRequest::default() {
-            let filters = global.with_master(|master| {
-                let node = open_node(master, self.node, &overrides)?;
-                Ok(show(master, &node, signal)?)
-            })?;
+            let filters = on_node(global, self.node, |master, node| show(master, node, signal))?;
             let filters =
                 filters.into_iter().map(|filter| FilterReport { filter, damping_shown: None, notes: Vec::new() });
             return global.print(&filters.collect::<Vec<_>>());
         }
-        let change = global.with_master(|master| {
-            let node = open_node(master, self.node, &overrides)?;
-            Ok(set(master, &node, signal, wanted)?)
-        })?;
+        let change = on_node(global, self.node, |master, node| set(master, node, signal, wanted))?;
         let report = change.into_report();
         global.print(std::slice::from_ref(&report))?;
         report.notes.iter().for_each(|note| notes::print(&global.console(), note));

@@ -1,10 +1,10 @@
 //! `cangauge info`.
 
-use super::{Global, descriptions};
+use super::Global;
+use super::each::on_node;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::info::read;
-use crate::tasks::settings::open as open_node;
 use clap::Args;
 
 /// Show everything about a device on one page
@@ -26,11 +26,6 @@ impl Info {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let overrides = descriptions::overrides(global, &[self.node])?;
-        let page = global.with_master(|master| {
-            let node = open_node(master, self.node, &overrides)?;
-            Ok(read(master, &node)?)
-        })?;
-        global.print(&[page])
+        global.print(&[on_node(global, self.node, |master, node| read(master, node))?])
     }
 }

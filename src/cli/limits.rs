@@ -1,12 +1,12 @@
 //! `cangauge limits`.
 
-use super::{Global, descriptions};
+use super::Global;
+use super::each::on_node;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::failure::ErrorMessage;
 use crate::output::notes;
 use crate::tasks::settings::limits::{Limit, set, show};
-use crate::tasks::settings::open as open_node;
 use clap::Args;
 
 /// Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)
@@ -57,13 +57,9 @@ impl Limits {
                 return Err(ErrorMessage::usage(message).into());
             }
         }
-        let overrides = descriptions::overrides(global, &[self.node])?;
-        let report = global.with_master(|master| {
-            let node = open_node(master, self.node, &overrides)?;
-            Ok(match wanted.is_empty() {
-                true => show(master, &node, &self.signal)?,
-                false => set(master, &node, &self.signal, &wanted)?,
-            })
+        let report = on_node(global, self.node, |master, node| match wanted.is_empty() {
+            true => show(master, node, &self.signal),
+            false => set(master, node, &self.signal, &wanted),
         })?;
         global.print(std::slice::from_ref(&report))?;
         report.notes.iter().for_each(|note| notes::print(&global.console(), note));

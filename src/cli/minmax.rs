@@ -1,10 +1,10 @@
 //! `cangauge minmax`.
 
-use super::{Global, descriptions};
+use super::Global;
+use super::each::on_node;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::minmax::{reset, show};
-use crate::tasks::settings::open as open_node;
 use clap::Args;
 
 /// Show the lowest and highest value that the device has measured, or reset them
@@ -25,12 +25,11 @@ impl Minmax {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let overrides = descriptions::overrides(global, &[self.node])?;
-        let report = global.with_master(|master| {
-            let node = open_node(master, self.node, &overrides)?;
-            let report = if self.reset { reset(master, &node) } else { show(master, &node) };
-            Ok(report?)
-        })?;
+        let report = on_node(
+            global,
+            self.node,
+            |master, node| if self.reset { reset(master, node) } else { show(master, node) },
+        )?;
         global.print(&report)?;
         if self.reset {
             global.console().note(&format!("node {}: minimum and maximum are reset", self.node));

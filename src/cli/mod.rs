@@ -35,7 +35,8 @@ use crate::bus::interrupt::survive_file_size_limit;
 use crate::canopen::id::NodeId;
 use crate::master::{Master, Timing};
 use crate::output::console::Console;
-pub(crate) use crate::output::report::Format;
+pub(crate) use crate::output::failure::ErrorMessage;
+use crate::output::report::Format;
 use crate::output::report::{Report, Stream, render};
 use anstream::ColorChoice;
 use args::{BusSpec, Duration, Override};
@@ -324,6 +325,10 @@ impl Global {
 pub fn run(cli: &Cli) -> anyhow::Result<()> {
     let failed = |source| FileError { what: "watch for the file size limit".to_owned(), source };
     survive_file_size_limit().map_err(failed)?;
+    if cli.global.format.is_for_recordings() && !matches!(cli.command, Command::Log(_)) {
+        let message = format!("--format {} is only for recordings (log)", cli.global.format.name());
+        return Err(ErrorMessage::usage(message).into());
+    }
     let global = Global { claim: cli.command.claim(), only_reads: cli.command.only_reads(), ..cli.global.clone() };
     cli.command.run(&global)
 }

@@ -282,10 +282,8 @@ impl WriteArgs {
                 });
             }
             let form = self.sdo_size.into();
-            let has_expedited = ready.iter().any(|(_, bytes, _)| (1..=4).contains(&bytes.len()));
-            if form == Form::Auto && has_expedited {
-                find_form(master, &mut node)?;
-            }
+            // The first SDO to a node is a read: a transfer that another master did not finish then disturbs no write.
+            find_form(master, &mut node)?;
             let bar = Transfer::new(global.shows_progress());
             let (mut progress, mut watch) = (|moved| bar.moved(moved), |_: &_| {});
             let mut options =

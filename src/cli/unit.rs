@@ -1,13 +1,13 @@
 //! `cangauge unit`.
 
+use super::Global;
+use super::each::on_node;
 use super::read::parse_unit;
-use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit as Code;
 use crate::output::failure::ErrorMessage;
 use crate::output::notes;
-use crate::tasks::settings::open as open_node;
 use crate::tasks::settings::unit::{set, show};
 use clap::Args;
 
@@ -36,20 +36,10 @@ impl Unit {
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let (signal, unit) = self.words().map_err(ErrorMessage::usage)?;
-        let overrides = descriptions::overrides(global, &[self.node])?;
         match unit {
-            None => {
-                let units = global.with_master(|master| {
-                    let node = open_node(master, self.node, &overrides)?;
-                    Ok(show(&node, signal)?)
-                })?;
-                global.print(&units)
-            }
+            None => global.print(&on_node(global, self.node, |_, node| show(node, signal))?),
             Some(unit) => {
-                let change = global.with_master(|master| {
-                    let mut node = open_node(master, self.node, &overrides)?;
-                    Ok(set(master, &mut node, signal, unit)?)
-                })?;
+                let change = on_node(global, self.node, |master, node| set(master, node, signal, unit))?;
                 global.print(std::slice::from_ref(&change))?;
                 change.notes.iter().for_each(|note| notes::print(&global.console(), note));
                 Ok(())

@@ -218,23 +218,20 @@ fn read_services<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::St
     Ok(())
 }
 
-fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
-    let numbers = |node: &Node| -> Vec<TpdoNumber> {
-        let has = |number: &TpdoNumber| {
-            let dictionary = node.model.as_ref().map(|model| &model.dictionary);
-            dictionary.is_some_and(|dictionary| dictionary.has_index(number.communication(0).index))
-        };
-        let described: Vec<TpdoNumber> = (1..=512).filter_map(TpdoNumber::new).filter(has).collect();
-        if described.is_empty() {
-            // Without a description, or with one without TPDOs, the device is asked.
-            return (1..=TPDOS_TRIED).filter_map(TpdoNumber::new).collect();
-        }
-        described
+/// The TPDOs that the description lists. Without a description, or if it lists none: the first ones.
+fn tpdo_numbers(node: &Node) -> Vec<TpdoNumber> {
+    let is_described = |number: &TpdoNumber| {
+        node.model.as_ref().is_some_and(|model| model.dictionary.has_index(number.communication(0).index))
     };
+    let described: Vec<TpdoNumber> = (1..=512).filter_map(TpdoNumber::new).filter(is_described).collect();
+    if described.is_empty() { (1..=TPDOS_TRIED).filter_map(TpdoNumber::new).collect() } else { described }
+}
+
+fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let wanted: Vec<(usize, TpdoNumber)> = nodes
         .iter()
         .enumerate()
-        .flat_map(|(at, node)| numbers(node).into_iter().map(move |number| (at, number)))
+        .flat_map(|(at, node)| tpdo_numbers(node).into_iter().map(move |number| (at, number)))
         .collect();
     let items: Vec<Item> = wanted.iter().map(|&(at, number)| (nodes[at].id, number.communication(1), U32)).collect();
     let cob_ids = read_known(master, &items)?;

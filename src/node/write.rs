@@ -3,12 +3,14 @@
 //! An expedited download either contains its size (23h, 27h, 2Bh, 2Fh) or not (22h). Some devices accept only one of the
 //! two forms:
 //! 1. The first request has the form of the device description, else it contains the size.
-//! 2. If the node rejects the form (0504 0001h) or the length (0607 0010h), the other form is sent once. If that is
+//! 2. If the node rejects the command (0504 0001h), the same form is sent once more: a transfer that another master did
+//!    not finish may be the reason. Not a signature. Foreign SDO traffic is a failure of its own, without a repetition.
+//! 3. If the node then rejects the form (0504 0001h) or the length (0607 0010h), the other form is sent once. If that is
 //!    rejected as well, the first abort code is reported.
-//! 3. Before a value is sent without its size, the width of the object is checked. Otherwise a node would fill up a
+//! 4. Before a value is sent without its size, the width of the object is checked. Otherwise a node would fill up a
 //!    narrower value: -5 as INTEGER16 would become 65531 in an INTEGER32.
-//! 4. A signature ("save", "load", "zero", a number with "set") starts an action. It is sent once and never repeated.
-//! 5. If no answer comes, a plain value is read back. A signature reads as something else, so its result is unknown.
+//! 5. A signature ("save", "load", "zero", a number with "set") starts an action. It is sent once and never repeated.
+//! 6. If no answer comes, a plain value is read back. A signature reads as something else, so its result is unknown.
 
 use super::Node;
 use super::error::{Error, shown};
@@ -92,6 +94,7 @@ pub fn write_with(
     let mut attempts_left = master.timing().retries;
     let mut sizes = sizes(node, options.form);
     let mut first_refusal: Option<SdoError> = None;
+    let mut may_repeat = !is_signature(data) && options.blocks != BlockMode::Always;
     // A rejected block transfer was not rejected for its form.
     let is_expedited = (1..=4).contains(&data.len()) && options.blocks != BlockMode::Always;
     let is_auto = options.form == Form::Auto && is_expedited;
@@ -104,6 +107,7 @@ pub fn write_with(
             return Ok(Written::Acknowledged);
         };
         match error.failure {
+            SdoFailure::Refused(AbortCode::COMMAND_SPECIFIER) if std::mem::take(&mut may_repeat) => {}
             SdoFailure::Refused(AbortCode::COMMAND_SPECIFIER | AbortCode::LENGTH)
                 if is_auto && first_refusal.is_none() =>
             {

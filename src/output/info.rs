@@ -3,7 +3,7 @@
 use super::table::{self, Align};
 use crate::measure::sample::Status;
 use crate::tasks::settings::errors::Errors;
-use crate::tasks::settings::info::{Channel, Info, Setting};
+use crate::tasks::settings::info::{Channel, Date, Info, Meaning, Monitoring, Setting};
 use std::io::{self, Write};
 
 /// The width of the page in characters.
@@ -42,17 +42,17 @@ pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
     let mut rows: Rows = Vec::new();
     rows.extend(info.bit_rate.map(|rate| row("bit rate", format!("{} kbit/s", f64::from(rate) / 1000.0))));
     rows.push(row("state", state(info)));
-    rows.push(row("monitoring", &info.monitoring));
-    rows.extend(info.communication.iter().map(|setting| row(&setting.name, &setting.text)));
+    rows.push(row("monitoring", monitoring(info.monitoring)));
+    rows.extend(info.communication.iter().map(|setting| row(&setting.name, meaning(setting))));
     section(out, "communication", &rows)?;
     section(out, "errors", &info.errors.as_ref().map(errors).unwrap_or_default())?;
     section(out, "signals", &info.channels.iter().map(signal).collect())?;
     section(out, "signal settings", &settings(&info.channels))?;
     section(out, "TPDOs", &tpdos(info))?;
     let mut rows: Rows = Vec::new();
-    rows.extend(info.calibrated.as_ref().map(|date| row("calibrated", date)));
-    rows.extend(info.produced.as_ref().map(|date| row("produced", date)));
-    rows.extend(info.own.iter().map(|setting| row(&full_name(setting), &setting.text)));
+    rows.extend(info.calibrated.as_ref().map(|date| row("calibrated", self::date(date))));
+    rows.extend(info.produced.as_ref().map(|date| row("produced", self::date(date))));
+    rows.extend(info.own.iter().map(|setting| row(&full_name(setting), meaning(setting))));
     section(out, "manufacturer-specific", &rows)?;
     section(out, "stored by 1010h", &store(info))
 }
@@ -61,6 +61,43 @@ pub fn text(out: &mut dyn Write, info: &Info) -> io::Result<()> {
 fn state(info: &Info) -> String {
     let unknown = || format!("unknown (no heartbeat): cangauge nmt state {} --probe", info.node.id);
     info.state.map_or_else(unknown, |state| format!("{state} (heartbeat)"))
+}
+
+/// A value with its unit and meaning.
+pub(super) fn meaning(setting: &Setting) -> String {
+    let value = &setting.value;
+    let number = value.as_u64().unwrap_or(0);
+    match &setting.meaning {
+        Meaning::Quantity(quantity) => quantity.to_string(),
+        Meaning::Unit(unit) => unit.to_string(),
+        Meaning::Labelled(label) => format!("{value} {label}"),
+        Meaning::CobId => format!("0x{number:X}"),
+        Meaning::OperatingMode if number == 0 => "0 off".to_owned(),
+        Meaning::OperatingMode if number == 1 => "1 normal operation".to_owned(),
+        Meaning::Microseconds => format!("{number} us"),
+        Meaning::HundredMicroseconds => format!("{}.{} ms", number / 10, number % 10),
+        Meaning::Milliseconds if number == 0 => "off".to_owned(),
+        Meaning::Milliseconds => format!("{number} ms"),
+        Meaning::OperatingMode | Meaning::Plain => value.to_string(),
+    }
+}
+
+/// `2016-04-01`; the numbers if they are not a date.
+pub(super) fn date(Date { parts: [year, month, day] }: &Date) -> String {
+    match (year.as_u64(), month.as_u64(), day.as_u64()) {
+        (Some(year @ 1980..=2200), Some(month @ 1..=12), Some(day @ 1..=31)) => format!("{year}-{month:02}-{day:02}"),
+        _ => format!("year {year}, month {month}, day {day}"),
+    }
+}
+
+/// How the loss of the device is detected.
+pub(super) fn monitoring(Monitoring { heartbeat_ms, guarding_ms }: Monitoring) -> String {
+    match (heartbeat_ms, guarding_ms) {
+        (0, (_, 0)) => "none".to_owned(),
+        (0, (guard, life)) => format!("node guarding every {guard} ms, life time {life} ms"),
+        (heartbeat, (_, 0)) => format!("heartbeat every {heartbeat} ms"),
+        (heartbeat, _) => format!("heartbeat every {heartbeat} ms and node guarding (CiA 301 allows only one of them)"),
+    }
 }
 
 fn identity(info: &Info) -> Rows {
@@ -119,9 +156,8 @@ fn settings(channels: &[Channel]) -> Rows {
             names.push(&setting.name);
         }
     }
-    let setting = |channel: &Channel, name: &str| {
-        channel.settings.iter().find(|setting| setting.name == name).map(|setting| setting.text.clone())
-    };
+    let setting =
+        |channel: &Channel, name: &str| channel.settings.iter().find(|setting| setting.name == name).map(meaning);
     if channels.len() <= COLUMNS {
         let cells = |name: &&str| {
             let texts = channels.iter().map(|channel| setting(channel, name).unwrap_or_else(|| "-".to_owned()));
@@ -250,4 +286,17 @@ fn wrapped(names: &[String]) -> Vec<String> {
 /// The name, with the sub-index if it is not 0.
 fn full_name(setting: &Setting) -> String {
     if setting.object.sub == 0 { setting.name.clone() } else { format!("{}:{}", setting.name, setting.object.sub) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::canopen::value::Value;
+
+    #[test]
+    fn a_date_is_shown_only_if_its_numbers_are_one() {
+        let date = |parts: [u64; 3]| date(&Date { parts: parts.map(Value::Unsigned) });
+        assert_eq!(date([2016, 4, 1]), "2016-04-01");
+        assert_eq!(date([16, 4, 1]), "year 16, month 4, day 1");
+    }
 }

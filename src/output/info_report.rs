@@ -45,13 +45,13 @@ impl Report for Info {
             identity_cell(self),
             self.bit_rate.into(),
             self.state.map(|state| state.to_string()).into(),
-            self.monitoring.as_str().into(),
+            info::monitoring(self.monitoring).into(),
             settings_cell(&self.communication),
             self.errors.as_ref().map(errors_cell).into(),
             Cell::List(self.channels.iter().map(signal_cell).collect()),
             Cell::List(tpdos.collect()),
-            self.calibrated.as_ref().into(),
-            self.produced.as_ref().into(),
+            self.calibrated.as_ref().map(info::date).into(),
+            self.produced.as_ref().map(info::date).into(),
             settings_cell(&self.own),
             store_cell(self),
             Cell::Rows(all.map(|setting| setting_cells(setting).to_vec()).collect()),
@@ -64,8 +64,8 @@ impl Report for Info {
 }
 
 fn setting_cells(setting: &Setting) -> [Cell; 4] {
-    let Setting { object, name, value, text } = setting;
-    [(*object).into(), name.into(), value.into(), text.into()]
+    let Setting { object, name, value, .. } = setting;
+    [(*object).into(), name.into(), value.into(), info::meaning(setting).into()]
 }
 
 fn settings_cell(settings: &[Setting]) -> Cell {

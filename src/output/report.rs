@@ -14,6 +14,7 @@ mod cell;
 
 pub use cell::Cell;
 
+use super::rows::FileFormat;
 use super::table::{self, Align};
 use super::{csv, json};
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
@@ -29,9 +30,26 @@ pub enum Format {
     Json,
     /// Comma-separated values with a header.
     Csv,
+    /// A format that only recordings have.
+    Recording(FileFormat),
 }
 
 impl Format {
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Text => "text",
+            Format::Json => "json",
+            Format::Csv => "csv",
+            Format::Recording(format) => format.name(),
+        }
+    }
+
+    /// Whether only recordings have it.
+    pub fn is_for_recordings(self) -> bool {
+        matches!(self, Format::Recording(_))
+    }
+
     /// Whether it is for people.
     pub fn is_text(self) -> bool {
         self == Format::Text
@@ -141,7 +159,9 @@ pub fn render<R: Report>(reports: &[R], format: Format, out: &mut dyn Write) -> 
     match format {
         Format::Text => R::text(reports, &mut bytes)?,
         Format::Json => reports.iter().try_for_each(|report| json_line(report, &mut bytes))?,
-        Format::Csv => csv::write(&mut bytes, &csv_head::<R>(), reports.iter().flat_map(csv_rows))?,
+        Format::Csv | Format::Recording(_) => {
+            csv::write(&mut bytes, &csv_head::<R>(), reports.iter().flat_map(csv_rows))?
+        }
     }
     out.write_all(&bytes)?;
     out.flush()
@@ -176,7 +196,7 @@ impl<R: Report, W: Write> Stream<R, W> {
         match self.format {
             Format::Text => report.line(&mut bytes)?,
             Format::Json => json_line(report, &mut bytes)?,
-            Format::Csv => csv::write(&mut bytes, &[], csv_rows(report))?,
+            Format::Csv | Format::Recording(_) => csv::write(&mut bytes, &[], csv_rows(report))?,
         }
         self.out.write_all(&bytes)?;
         self.out.flush()

@@ -1,12 +1,10 @@
 //! The rows of a recording: typed rows, file formats, rotation, and the writing of whole lines.
 //!
 //! [`Rows`] turns samples into typed rows, by layout. A sink formats each row and starts the next file when one is
-//! due. A [`LineWriter`] writes. A further format is one more file that implements `RowFormat`.
+//! due. A [`LineWriter`] writes. A further format is one file in `format/`, and its lines in `format.rs`.
 
 mod cells;
-mod csv;
 mod format;
-mod json_lines;
 mod line_writer;
 mod resume;
 mod rotation;
@@ -21,7 +19,7 @@ use crate::bus::Stamp;
 use crate::measure::sample::{Sample, Source};
 pub use cells::{Dialect, TimeForm};
 pub(super) use cells::{Times, push_number, push_seconds, push_text, push_texts};
-pub use format::{FileFormat, HeaderMismatch};
+pub use format::{CHOICES, FileFormat, HeaderMismatch};
 pub use line_writer::{LineWriter, QUEUE_CAPACITY};
 pub use resume::{ExistingLines, existing_lines};
 pub use rotation::Rotation;

@@ -243,6 +243,32 @@ impl fmt::Display for Failure {
 
 impl std::error::Error for Failure {}
 
+/// The cause of an area as a [`Cause`].
+macro_rules! causes {
+    ($($variant:ident($cause:ty);)+) => {
+        $(impl From<$cause> for Cause {
+            fn from(cause: $cause) -> Cause {
+                Cause::$variant(cause.into())
+            }
+        })+
+    };
+}
+
+causes! {
+    Host(host::HostFailure);
+    Read(read::ReadFailure);
+    Scan(scan::ScanFailure);
+    Nmt(nmt::NmtFailure);
+    Store(store::StoreFailure);
+    Pdo(pdo::PdoFailure);
+    Settings(settings::SettingsFailure);
+    Log(log::LogFailure);
+    Check(check::CheckFailure);
+    Lss(lss::LssFailure);
+    Detect(detect::DetectFailure);
+    Autozero(autozero::AutozeroFailure);
+}
+
 impl From<SdoError> for Failure {
     fn from(error: SdoError) -> Failure {
         Failure::at(error.node, Cause::Sdo(Box::new(error.clone()))).of_object(error.object)

@@ -1,7 +1,7 @@
 //! The interface of this computer: why it was not set.
 
 use super::Failure;
-use super::failure::{BusError, Cause};
+use super::failure::BusError;
 use crate::tasks::Kind;
 
 /// An action on an interface.
@@ -56,12 +56,6 @@ impl HostFailure {
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
         Kind::Bus
-    }
-}
-
-impl From<HostFailure> for Cause {
-    fn from(cause: HostFailure) -> Cause {
-        Cause::Host(cause)
     }
 }
 

@@ -124,3 +124,28 @@ impl Note {
         Note { node: None, fact: fact.into() }
     }
 }
+
+/// The effect and the fact of an area as an [`Effect`] and a [`Fact`].
+macro_rules! areas {
+    ($($area:ident($effect:ty, $fact:ty);)+) => {
+        $(impl From<$effect> for Effect {
+            fn from(effect: $effect) -> Effect {
+                Effect::$area(effect.into())
+            }
+        }
+
+        impl From<$fact> for Fact {
+            fn from(fact: $fact) -> Fact {
+                Fact::$area(fact.into())
+            }
+        })+
+    };
+}
+
+areas! {
+    Autozero(AutozeroEffect, AutozeroFact);
+    Lss(LssEffect, LssFact);
+    Pdo(PdoEffect, PdoFact);
+    Settings(SettingsEffect, SettingsFact);
+    Store(StoreEffect, StoreFact);
+}

@@ -8,6 +8,7 @@ use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::master::{Master, Timing};
+use cangauge::node::write::write;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Bench, Device, State};
 use cangauge::tasks::Fact;
@@ -365,4 +366,24 @@ fn rejection_is_reported_and_only_the_form_is_retried() {
     let mut bus = FaultyBus::of("d20", "", Some((place(false), Fault::Refuse(0x0504_0001))));
     save(&mut bus, false).expect("stored");
     assert_eq!((bus.count("2210100173617665"), bus.count("2310100173617665")), (1, 1));
+}
+
+#[test]
+fn rejected_command_of_a_plain_value_is_repeated_once() {
+    let write = |bus: &mut FaultyBus| {
+        with(bus, |master| {
+            let device = store::device(master, node(), &Default::default())?;
+            Ok::<_, Failure>(write(master, &device, ObjectId::new(0x1017, 0), &[0xf4, 0x01])?)
+        })
+    };
+    let mut usual = FaultyBus::of("d20", "", None);
+    write(&mut usual).expect("written");
+    let at = usual.sent.iter().position(|sent| sent.ends_with("22171000F4010000")).expect("the write");
+    let mut bus = FaultyBus::of("d20", "", Some((at, Fault::Refuse(0x0504_0001))));
+    write(&mut bus).expect("written");
+    // The same form again: an unfinished transfer of another master was the reason. The other form is not needed.
+    assert_eq!((bus.count("22171000F4010000"), bus.count("2B171000F4010000")), (2, 0));
+    let mut bus = FaultyBus::of("d20", "", Some((at, Fault::Refuse(0x0607_0010))));
+    write(&mut bus).expect("written");
+    assert_eq!((bus.count("22171000F4010000"), bus.count("2B171000F4010000")), (1, 1), "a wrong length is the form");
 }

@@ -55,14 +55,7 @@ pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> Words {
             let length = if bits % 8 == 0 { format!("{} bytes", bits / 8) } else { format!("{bits} bits") };
             Words::new(format!("the mapping has {length}; a PDO has at most 8 bytes"))
         }
-        PdoFailure::UnknownName { name, nearest, signals } => {
-            let words = Words::new(format!("it has no object or signal \"{name}\""));
-            match (nearest.as_slice(), signals.as_slice()) {
-                ([], []) => words,
-                ([], signals) => words.hint(format!("its signals: {}", signals.join(", "))),
-                (nearest, _) => words.hint(format!("nearest: {}", nearest.join(", "))),
-            }
-        }
+        PdoFailure::UnknownName { name, nearest, signals } => unknown_name(name, nearest, signals),
         PdoFailure::WidthUnknown { object } => {
             Words::new(format!("the width of {object} is unknown")).hint(format!("state its bits: {object}/32"))
         }
@@ -74,6 +67,15 @@ pub(super) fn words(_failure: &Failure, cause: &PdoFailure) -> Words {
             }
         }
         PdoFailure::NothingReceived { nodes } => nothing_received(nodes),
+    }
+}
+
+fn unknown_name(name: &str, nearest: &[String], signals: &[String]) -> Words {
+    let words = Words::new(format!("it has no object or signal \"{name}\""));
+    match (nearest, signals) {
+        ([], []) => words,
+        ([], signals) => words.hint(format!("its signals: {}", signals.join(", "))),
+        (nearest, _) => words.hint(format!("nearest: {}", nearest.join(", "))),
     }
 }
 

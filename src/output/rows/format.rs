@@ -1,10 +1,13 @@
-//! The file formats of a recording. Each one is a file of its own beside this one.
+//! The file formats of a recording. Each one is a file of its own in this folder.
 
-use super::csv::CsvRows;
-use super::json_lines::JsonRows;
+mod csv;
+mod json_lines;
+
 use super::row::{Columns, Row};
 use super::setup::Setup;
 use crate::output::report::Format;
+use csv::CsvRows;
+use json_lines::JsonRows;
 use std::fmt::Debug;
 use std::io;
 
@@ -18,12 +21,16 @@ pub enum FileFormat {
     JsonLines,
 }
 
+/// The values of `--format`. A format that only recordings have is a [`Format::Recording`].
+pub const CHOICES: &[Format] = &[Format::Text, Format::Json, Format::Csv];
+
 impl From<Format> for FileFormat {
-    /// Files and pipes get CSV unless JSON is requested.
+    /// Files and pipes get CSV unless another format is requested.
     fn from(format: Format) -> FileFormat {
         match format {
             Format::Text | Format::Csv => FileFormat::Csv,
             Format::Json => FileFormat::JsonLines,
+            Format::Recording(format) => format,
         }
     }
 }
@@ -50,6 +57,14 @@ pub(super) trait RowFormat: Debug {
 }
 
 impl FileFormat {
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            FileFormat::Csv => "csv",
+            FileFormat::JsonLines => "json",
+        }
+    }
+
     /// Whether the options for CSV apply.
     pub fn is_csv(self) -> bool {
         self == FileFormat::Csv

@@ -8,8 +8,6 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::unit::Unit;
 use crate::measure::sample::Number;
 use crate::tasks::Kind;
-use crate::tasks::failure::Cause;
-use crate::tasks::note::{Effect, Fact};
 use crate::tasks::store::Group;
 
 /// A value with its unit and the decimals that are significant.
@@ -132,12 +130,6 @@ impl AutozeroFailure {
     }
 }
 
-impl From<AutozeroFailure> for Cause {
-    fn from(cause: AutozeroFailure) -> Cause {
-        Cause::Autozero(cause)
-    }
-}
-
 /// The state after a failed autozero.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AutozeroEffect {
@@ -166,12 +158,6 @@ pub enum AutozeroEffect {
     Stored,
     /// How to undo it.
     Undo(Undo),
-}
-
-impl From<AutozeroEffect> for Effect {
-    fn from(effect: AutozeroEffect) -> Effect {
-        Effect::Autozero(effect)
-    }
 }
 
 /// How a zero is undone.
@@ -224,10 +210,4 @@ pub enum AutozeroFact {
         /// The groups.
         groups: Vec<Group>,
     },
-}
-
-impl From<AutozeroFact> for Fact {
-    fn from(fact: AutozeroFact) -> Fact {
-        Fact::Autozero(fact)
-    }
 }

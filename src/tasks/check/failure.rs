@@ -2,7 +2,6 @@
 
 use crate::measure::expression::verdict::Verdict;
 use crate::tasks::Kind;
-use crate::tasks::failure::Cause;
 
 /// A check failed or had no data.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,11 +35,5 @@ impl CheckFailure {
             CheckFailure::NoData { .. } => Kind::NoAnswer,
             CheckFailure::UnknownType { .. } => Kind::Usage,
         }
-    }
-}
-
-impl From<CheckFailure> for Cause {
-    fn from(cause: CheckFailure) -> Cause {
-        Cause::Check(cause)
     }
 }

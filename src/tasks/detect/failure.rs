@@ -2,7 +2,7 @@
 
 use super::Detection;
 use crate::tasks::Kind;
-use crate::tasks::failure::{BusError, Cause};
+use crate::tasks::failure::BusError;
 use std::sync::Arc;
 
 /// Why a detection failed.
@@ -35,11 +35,5 @@ impl DetectFailure {
             DetectFailure::NotFound { .. } => Kind::NoAnswer,
             DetectFailure::NotRestored { .. } => Kind::Bus,
         }
-    }
-}
-
-impl From<DetectFailure> for Cause {
-    fn from(cause: DetectFailure) -> Cause {
-        Cause::Detect(cause)
     }
 }

@@ -5,7 +5,6 @@ use crate::canopen::nmt::NmtState;
 use crate::canopen::pdo::TpdoNumber;
 use crate::tasks::Kind;
 use crate::tasks::diagnosis::Silence;
-use crate::tasks::failure::Cause;
 use std::time::Duration;
 
 /// Nothing was recorded, or a recording ended early.
@@ -123,11 +122,5 @@ impl LogFailure {
             | LogFailure::FileDeleted { .. } => Kind::Io,
             LogFailure::EndedEarly { .. } => Kind::Interrupted,
         }
-    }
-}
-
-impl From<LogFailure> for Cause {
-    fn from(cause: LogFailure) -> Cause {
-        Cause::Log(cause)
     }
 }

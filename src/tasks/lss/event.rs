@@ -5,7 +5,6 @@ use super::progress::Progress;
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
 use crate::master::LssError;
-use crate::tasks::Fact;
 use std::sync::Arc;
 
 /// An event of an LSS task.
@@ -140,11 +139,5 @@ pub struct Reason(pub Arc<LssError>);
 impl PartialEq for Reason {
     fn eq(&self, other: &Reason) -> bool {
         format!("{:?}", self.0) == format!("{:?}", other.0)
-    }
-}
-
-impl From<LssFact> for Fact {
-    fn from(fact: LssFact) -> Fact {
-        Fact::Lss(Box::new(fact))
     }
 }

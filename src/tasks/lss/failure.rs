@@ -9,8 +9,8 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::lss::{LssAddress, LssRange};
 use crate::canopen::object::ObjectId;
 use crate::master::LssError;
-use crate::tasks::failure::{Cause, lss_kind};
-use crate::tasks::{Effect, Kind};
+use crate::tasks::Kind;
+use crate::tasks::failure::lss_kind;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -232,17 +232,5 @@ impl LssFailure {
             | LssCause::DuplicateNewNodeId(_)
             | LssCause::StillOldNodeId { .. } => Kind::Unexpected,
         }
-    }
-}
-
-impl From<LssFailure> for Cause {
-    fn from(cause: LssFailure) -> Cause {
-        Cause::Lss(Box::new(cause))
-    }
-}
-
-impl From<LssEffect> for Effect {
-    fn from(effect: LssEffect) -> Effect {
-        Effect::Lss(Box::new(effect))
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::canopen::nmt::NmtState;
 use crate::tasks::Kind;
-use crate::tasks::failure::Cause;
 
 /// An NMT state was not reached or not confirmed.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,11 +32,5 @@ impl NmtFailure {
             NmtFailure::OtherState { .. } | NmtFailure::NoStartupObject => Kind::Unexpected,
             NmtFailure::NoSign | NmtFailure::NoBootUp | NmtFailure::NotConfirmed | NmtFailure::Absent => Kind::NoAnswer,
         }
-    }
-}
-
-impl From<NmtFailure> for Cause {
-    fn from(cause: NmtFailure) -> Cause {
-        Cause::Nmt(cause)
     }
 }

@@ -8,7 +8,6 @@ use crate::canopen::pdo::{MappingEntry, TpdoNumber, Transmission};
 use crate::canopen::sdo::AbortCode;
 use crate::master::{Error, SdoError, SdoFailure};
 use crate::tasks::failure::Cause;
-use crate::tasks::note::{Effect, Fact};
 use crate::tasks::store::Group;
 use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
@@ -374,23 +373,5 @@ pub(super) fn not_read(node: NodeId, available: Vec<TpdoNumber>, error: StepErro
         StepError::Interrupted => Failure::general(Cause::Interrupted),
         StepError::Bus(error) => Failure::general(Cause::Bus(error)),
         StepError::Restarted | StepError::NotKept { .. } => Failure::at(node, PdoFailure::Restarted),
-    }
-}
-
-impl From<PdoFailure> for Cause {
-    fn from(cause: PdoFailure) -> Cause {
-        Cause::Pdo(cause)
-    }
-}
-
-impl From<PdoEffect> for Effect {
-    fn from(effect: PdoEffect) -> Effect {
-        Effect::Pdo(effect)
-    }
-}
-
-impl From<PdoFact> for Fact {
-    fn from(fact: PdoFact) -> Fact {
-        Fact::Pdo(fact)
     }
 }

@@ -3,7 +3,6 @@
 use crate::device::unit::Unit;
 use crate::measure::sample::{Raw, Status};
 use crate::tasks::Kind;
-use crate::tasks::failure::Cause;
 
 /// Measured values could not be read.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,11 +56,5 @@ impl ReadFailure {
             | ReadFailure::NotConvertible { .. }
             | ReadFailure::TypeUnknown { .. } => Kind::Usage,
         }
-    }
-}
-
-impl From<ReadFailure> for Cause {
-    fn from(cause: ReadFailure) -> Cause {
-        Cause::Read(cause)
     }
 }

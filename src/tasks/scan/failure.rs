@@ -1,7 +1,6 @@
 //! Causes of failures: a scan did not find nodes.
 
 use crate::tasks::Kind;
-use crate::tasks::failure::Cause;
 
 /// A scan did not find nodes.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,11 +17,5 @@ impl ScanFailure {
         match self {
             ScanFailure::NoAnswer | ScanFailure::NoFrame => Kind::NoAnswer,
         }
-    }
-}
-
-impl From<ScanFailure> for Cause {
-    fn from(cause: ScanFailure) -> Cause {
-        Cause::Scan(cause)
     }
 }

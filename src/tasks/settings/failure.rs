@@ -7,8 +7,6 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::value::ValueError;
 use crate::device::unit::Unit;
 use crate::tasks::Kind;
-use crate::tasks::failure::Cause;
-use crate::tasks::note::{Effect, Fact};
 
 /// A setting could not be shown or changed.
 #[derive(Clone, Debug, PartialEq)]
@@ -228,23 +226,5 @@ impl SettingsFact {
     /// Whether the user should act on it.
     pub fn is_warning(&self) -> bool {
         !matches!(self, SettingsFact::AlreadyInUnit { .. })
-    }
-}
-
-impl From<SettingsFailure> for Cause {
-    fn from(cause: SettingsFailure) -> Cause {
-        Cause::Settings(cause)
-    }
-}
-
-impl From<SettingsEffect> for Effect {
-    fn from(effect: SettingsEffect) -> Effect {
-        Effect::Settings(effect)
-    }
-}
-
-impl From<SettingsFact> for Fact {
-    fn from(fact: SettingsFact) -> Fact {
-        Fact::Settings(fact)
     }
 }

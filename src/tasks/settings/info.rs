@@ -2,10 +2,11 @@
 
 use super::errors::{Errors, read as read_errors};
 use super::limits::Limit;
-use super::{Quantity, SettingsFailure, filter, page, read_each};
+use super::{Quantity, SettingsFailure, page, read_each};
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
+use crate::device::unit::Unit;
 use crate::master::Master;
 use crate::measure::layout::Signal;
 use crate::measure::sample::Sample;
@@ -31,7 +32,7 @@ pub struct Info {
     /// The NMT state; `None` if no heartbeat shows it.
     pub state: Option<NmtState>,
     /// How the loss of the device is detected: heartbeat or node guarding.
-    pub monitoring: String,
+    pub monitoring: Monitoring,
     /// The communication objects.
     pub communication: Vec<Setting>,
     /// Register and history; `None` if the device has neither.
@@ -40,14 +41,23 @@ pub struct Info {
     pub channels: Vec<Channel>,
     /// Inhibit times (180xh:3) in the order of the TPDOs, in 100 us.
     pub inhibit_100us: Vec<Option<u64>>,
-    /// The date of the last calibration: `2016-04-01`.
-    pub calibrated: Option<String>,
+    /// The date of the last calibration.
+    pub calibrated: Option<Date>,
     /// The date of production.
-    pub produced: Option<String>,
+    pub produced: Option<Date>,
     /// The manufacturer's own objects.
     pub own: Vec<Setting>,
     /// The groups of 1010h, and the settings that it stores.
     pub store: Store,
+}
+
+/// How the loss of a device is detected. CiA 301 allows either heartbeat or node guarding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Monitoring {
+    /// The heartbeat time in ms; 0: off.
+    pub heartbeat_ms: u64,
+    /// The guard time in ms, and the life time in ms; a life time of 0: off.
+    pub guarding_ms: (u64, u64),
 }
 
 /// One object with its value.
@@ -59,8 +69,38 @@ pub struct Setting {
     pub name: String,
     /// The value, as read.
     pub value: Value,
-    /// The value with its unit and meaning.
-    pub text: String,
+    /// What the value means.
+    pub meaning: Meaning,
+}
+
+/// What the value of an object means.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Meaning {
+    /// Nothing else is known.
+    Plain,
+    /// A number in the unit of its signal.
+    Quantity(Quantity),
+    /// The code of a unit.
+    Unit(Unit),
+    /// A number with this unit, or a code with this word. Both are from the description or CiA 404.
+    Labelled(String),
+    /// A COB-ID with its flags.
+    CobId,
+    /// The operating mode of a channel (6112h).
+    OperatingMode,
+    /// A time in microseconds.
+    Microseconds,
+    /// A time in multiples of 100 microseconds.
+    HundredMicroseconds,
+    /// A time in milliseconds; 0: off.
+    Milliseconds,
+}
+
+/// A date as the device stores it. The numbers need not be a date.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Date {
+    /// Year, month and day.
+    pub parts: [Value; 3],
 }
 
 /// A signal with its settings.
@@ -163,8 +203,8 @@ pub fn read(master: &mut Master<'_>, node: &Node) -> Result<Info, Failure> {
     let setting = |signal: Option<&Signal>, object: ObjectId| {
         let value = values.get(&object)?.clone();
         let name = node.entry(object).map_or_else(|| object.to_string(), |entry| entry.name);
-        let text = page::text(node, &values, signal, object, &value);
-        Some(Setting { object, name, value, text })
+        let meaning = page::meaning(node, &values, signal, object, &value);
+        Some(Setting { object, name, value, meaning })
     };
     let Selection { communication, channels, own, dates, inhibit } = selection;
     let [calibrated, produced] = dates.map(|objects| page::date(&values, objects?));
@@ -284,19 +324,8 @@ fn state(
     }
 }
 
-/// How the loss of the device is detected. CiA 301 allows either heartbeat or node guarding.
-fn monitoring(values: &BTreeMap<ObjectId, Value>) -> String {
+fn monitoring(values: &BTreeMap<ObjectId, Value>) -> Monitoring {
     let number = |object: ObjectId| values.get(&object).and_then(Value::as_u64).unwrap_or(0);
-    let (heartbeat, guard, life) = (number(HEARTBEAT), number(GUARD_TIME), number(LIFE_TIME));
-    match (heartbeat, guard * life) {
-        (0, 0) => "none".to_owned(),
-        (0, life) => format!("node guarding every {guard} ms, life time {life} ms"),
-        (heartbeat, 0) => format!("heartbeat every {heartbeat} ms"),
-        (heartbeat, _) => format!("heartbeat every {heartbeat} ms and node guarding (CiA 301 allows only one of them)"),
-    }
-}
-
-/// The meaning of a filter type (61A0h).
-pub(super) fn filter_text(node: &Node, signal: &Signal, code: u64) -> String {
-    filter::meaning(node, signal, code)
+    let guard = number(GUARD_TIME);
+    Monitoring { heartbeat_ms: number(HEARTBEAT), guarding_ms: (guard, guard * number(LIFE_TIME)) }
 }

@@ -1,7 +1,7 @@
-//! Values of the page of `info`: with unit and meaning, dates, ranges, stored settings.
+//! Values of the page of `info`: meanings, dates, ranges, stored settings.
 
-use super::info::{Store, filter_text};
-use super::{Quantity, quantity};
+use super::info::{Date, Meaning, Store};
+use super::{Quantity, filter, quantity};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
 use crate::device::description::{Access, Signature};
@@ -24,59 +24,42 @@ pub(super) fn is_own(object: ObjectId) -> bool {
 /// The objects in the unit of a signal, as indices without the first digit.
 const IN_UNIT: [u16; 9] = [0x121, 0x123, 0x124, 0x133, 0x134, 0x135, 0x136, 0x148, 0x149];
 
-/// A value with its unit and meaning.
-pub(super) fn text(
+/// What a value means.
+pub(super) fn meaning(
     node: &Node,
     values: &BTreeMap<ObjectId, Value>,
     signal: Option<&Signal>,
     object: ObjectId,
     value: &Value,
-) -> String {
+) -> Meaning {
     let described = node.described(object);
     let number = value.as_u64();
+    let as_unit = |number: u64| u32::try_from(number).ok().map(Unit);
     if let Some(signal) = signal.filter(|signal| is_in_unit(node, signal, object)) {
-        return quantity(signal, value).map_or_else(|| value.to_string(), |quantity| quantity.to_string());
+        return quantity(signal, value).map_or(Meaning::Plain, Meaning::Quantity);
     }
     if let Some(unit) = described.and_then(|entry| entry.unit_at).and_then(|at| values.get(&at)?.as_u64()) {
-        let unit = u32::try_from(unit).map(Unit).map(|unit| unit.to_string()).unwrap_or_default();
-        return format!("{value} {unit}");
+        return Meaning::Labelled(as_unit(unit).map(|unit| unit.to_string()).unwrap_or_default());
     }
-    let codes = node
-        .model
-        .as_ref()
-        .is_some_and(|model| model.description.objects.iter().any(|entry| entry.unit_at == Some(object)));
-    if let Some(code) = number.filter(|_| codes).and_then(|code| u32::try_from(code).ok()) {
-        return Unit(code).to_string();
+    let objects = node.model.as_ref().map_or(&[][..], |model| &model.description.objects);
+    let is_unit = objects.iter().any(|entry| entry.unit_at == Some(object));
+    if let Some(unit) = number.filter(|_| is_unit).and_then(as_unit) {
+        return Meaning::Unit(unit);
     }
+    let word = || number.and_then(|number| described?.meaning(number));
+    let label = |word: Option<&str>| word.map_or(Meaning::Plain, |word| Meaning::Labelled(word.to_owned()));
     match (object.index, number) {
-        (0x1005 | 0x1014, Some(number)) => format!("0x{number:X}"),
-        (0x100c | 0x1017, Some(0)) => "off".to_owned(),
-        (0x1006, Some(number)) => format!("{number} us"),
-        (0x100c | 0x1017, Some(number)) => format!("{number} ms"),
-        (0x1015, Some(number)) => format!("{}.{} ms", number / 10, number % 10),
-        (0x6110, Some(number)) => {
-            let standard = || u16::try_from(number).ok().and_then(sensor::kind);
-            let kind = described.and_then(|entry| entry.meaning(number)).or_else(standard);
-            kind.map_or_else(|| number.to_string(), |kind| format!("{number} {kind}"))
-        }
-        (0x6112, Some(number)) if described.is_none() => match number {
-            0 => "0 off".to_owned(),
-            1 => "1 normal operation".to_owned(),
-            _ => number.to_string(),
-        },
+        (0x1005 | 0x1014, Some(_)) => Meaning::CobId,
+        (0x1006, Some(_)) => Meaning::Microseconds,
+        (0x100c | 0x1017, Some(_)) => Meaning::Milliseconds,
+        (0x1015, Some(_)) => Meaning::HundredMicroseconds,
+        (0x6110, Some(number)) => label(word().or_else(|| u16::try_from(number).ok().and_then(sensor::kind))),
+        (0x6112, Some(_)) if described.is_none() => Meaning::OperatingMode,
         (0x61a0, Some(number)) => match signal {
-            Some(signal) => format!("{number} {}", filter_text(node, signal, number)),
-            None => number.to_string(),
+            Some(signal) => Meaning::Labelled(filter::meaning(node, signal, number)),
+            None => Meaning::Plain,
         },
-        _ => {
-            let meaning = number.and_then(|number| described?.meaning(number));
-            let unit = described.and_then(|entry| entry.unit.as_deref());
-            match (meaning, unit) {
-                (Some(meaning), _) => format!("{value} {meaning}"),
-                (None, Some(unit)) => format!("{value} {unit}"),
-                (None, None) => value.to_string(),
-            }
-        }
+        _ => label(word().or_else(|| described?.unit.as_deref())),
     }
 }
 
@@ -95,16 +78,10 @@ pub(super) fn date_objects(node: &Node, names: [&str; 3]) -> Option<[ObjectId; 3
     Some([year?, month?, day?])
 }
 
-/// `2016-04-01`; the numbers if they are not a date.
-pub(super) fn date(values: &BTreeMap<ObjectId, Value>, objects: [ObjectId; 3]) -> Option<String> {
-    let [year, month, day] = objects.map(|object| values.get(&object));
-    let (year, month, day) = (year?, month?, day?);
-    match (year.as_u64(), month.as_u64(), day.as_u64()) {
-        (Some(year @ 1980..=2200), Some(month @ 1..=12), Some(day @ 1..=31)) => {
-            Some(format!("{year}-{month:02}-{day:02}"))
-        }
-        _ => Some(format!("year {year}, month {month}, day {day}")),
-    }
+/// The date in three objects; `None` if one of them cannot be read.
+pub(super) fn date(values: &BTreeMap<ObjectId, Value>, objects: [ObjectId; 3]) -> Option<Date> {
+    let [year, month, day] = objects.map(|object| values.get(&object).cloned());
+    Some(Date { parts: [year?, month?, day?] })
 }
 
 /// The start and the end of the measuring range.
@@ -160,22 +137,5 @@ impl std::fmt::Display for Quantity {
             Some(unit) => write!(f, "{} {unit}", self.number),
             None => write!(f, "{}", self.number),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_date_is_shown_only_if_its_numbers_are_one() {
-        let objects = [0x2007, 0x2008, 0x2009].map(|index| ObjectId::new(index, 0));
-        let of = |numbers: [u64; 3]| {
-            let values = objects.into_iter().zip(numbers.map(Value::Unsigned)).collect();
-            date(&values, objects)
-        };
-        assert_eq!(of([2016, 4, 1]).as_deref(), Some("2016-04-01"));
-        assert_eq!(of([16, 4, 1]).as_deref(), Some("year 16, month 4, day 1"));
-        assert_eq!(date(&BTreeMap::new(), objects), None);
     }
 }

@@ -5,8 +5,6 @@ use super::{Group, Verb};
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::tasks::Kind;
-use crate::tasks::failure::Cause;
-use crate::tasks::note::{Effect, Fact};
 
 /// Settings were not stored or restored.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,22 +100,4 @@ pub enum StoreFact {
     NothingCompared,
     /// The settings have the same values as before, and these are not their usual defaults.
     Unchanged(Vec<Snapshot>),
-}
-
-impl From<StoreFailure> for Cause {
-    fn from(cause: StoreFailure) -> Cause {
-        Cause::Store(cause)
-    }
-}
-
-impl From<StoreEffect> for Effect {
-    fn from(effect: StoreEffect) -> Effect {
-        Effect::Store(effect)
-    }
-}
-
-impl From<StoreFact> for Fact {
-    fn from(fact: StoreFact) -> Fact {
-        Fact::Store(fact)
-    }
 }

@@ -1,10 +1,10 @@
 //! Rows as JSON Lines, in both layouts.
 
-use super::cells::{TimeForm, Times};
-use super::format::{HeaderMismatch, RowFormat};
-use super::row::{Columns, Row, Values};
+use super::{HeaderMismatch, RowFormat};
 use crate::measure::sample::Status;
 use crate::output::json::{self, JsonNumber};
+use crate::output::rows::cells::{TimeForm, Times};
+use crate::output::rows::row::{Columns, Row, Values};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 use std::collections::BTreeMap;
@@ -93,8 +93,8 @@ impl RowFormat for JsonRows {
 
 #[cfg(test)]
 mod tests {
-    use super::super::row::LONG_COLUMNS;
     use super::*;
+    use crate::output::rows::row::LONG_COLUMNS;
 
     #[test]
     fn only_the_same_keys_may_follow() {

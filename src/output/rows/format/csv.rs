@@ -1,11 +1,11 @@
 //! Rows as CSV, in both layouts.
 
-use super::cells::{
+use super::{HeaderMismatch, RowFormat};
+use crate::measure::sample::Status;
+use crate::output::rows::cells::{
     BOM, Dialect, TimeForm, Times, push_number, push_raw, push_seconds, push_text, push_texts, push_value,
 };
-use super::format::{HeaderMismatch, RowFormat};
-use super::row::{Columns, Row, Values};
-use crate::measure::sample::Status;
+use crate::output::rows::row::{Columns, Row, Values};
 use std::io;
 
 /// Writes CSV.
