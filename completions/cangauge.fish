@@ -1281,8 +1281,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fis
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -f -a "show" -d 'Print a description as TOML: a start for one of your own'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -f -a "check" -d 'Report every mistake in a description with its line'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -f -a "show" -d 'Print a description as TOML'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -f -a "check" -d 'Report each mistake in a description file with its line'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
@@ -1326,8 +1326,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "show" -d 'Print a description as TOML: a start for one of your own'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "check" -d 'Report every mistake in a description with its line'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "show" -d 'Print a description as TOML'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "check" -d 'Report each mistake in a description file with its line'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
@@ -1398,5 +1398,5 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from pdo" -f -a "show" -d 'Show the settings of TPDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from pdo" -f -a "map" -d 'Set the mapping and the transmission of a TPDO'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from pdo" -f -a "watch" -d 'Show received TPDOs, decoded, until Ctrl-C'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "show" -d 'Print a description as TOML: a start for one of your own'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "check" -d 'Report every mistake in a description with its line'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "show" -d 'Print a description as TOML'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "check" -d 'Report each mistake in a description file with its line'

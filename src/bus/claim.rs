@@ -66,7 +66,7 @@ impl fmt::Display for Part {
 pub enum IfHeld {
     /// Wait for it, up to this time for the whole claim.
     Wait(Duration),
-    /// Report it and continue beside it.
+    /// Report it and continue.
     Continue,
 }
 

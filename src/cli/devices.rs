@@ -11,7 +11,7 @@ use clap::{Args, Subcommand};
 
 /// List the device descriptions, show one as TOML, or check a file
 ///
-/// A description states the objects, signals and habits of one kind of device. The format: man cangauge-device.
+/// A description is a TOML file with the objects, signals and behaviour of one kind of device. Start your own with a copy.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge devices\n  cangauge devices show mh4 > mine.toml\n  cangauge devices check mine.toml"
@@ -23,12 +23,12 @@ pub(crate) struct Devices {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Print a description as TOML: a start for one of your own
+    /// Print a description as TOML
     Show {
         /// Its name: mh4
         name: String,
     },
-    /// Report every mistake in a description with its line
+    /// Report each mistake in a description file with its line
     Check {
         /// A TOML file
         file: String,

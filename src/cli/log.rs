@@ -31,7 +31,7 @@ use std::io::{self, IsTerminal};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Columns: time (UTC), elapsed_s, node, signal, value, unit, status (ok, invalid, overload-high,
-overload-low; empty if the device reports none), raw (bytes in wire order).
+overload-low, clipped; empty if the device reports none), raw (bytes in wire order).
 Layout wide: time, elapsed_s, then 5.pressure [bar] and 5.pressure.status for each signal.
 Each cycle is a row with the time of its first value. Cells without data are empty. If a mapping or
 a unit changes, the new columns start a new file.

@@ -279,7 +279,7 @@ impl Global {
         render(reports, self.format, &mut io::stdout().lock()).map_err(exit::stdout)
     }
 
-    /// Prints reports if the format is for programs. A note on stderr tells people.
+    /// Prints reports if the format is for programs. People get a note on stderr.
     pub(crate) fn print_data<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
         if self.prints_text() { Ok(()) } else { self.print(reports) }
     }

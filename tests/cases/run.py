@@ -22,7 +22,7 @@ import transfers  # noqa: E402, F401
 import values  # noqa: E402, F401
 from table import SCENES  # noqa: E402
 
-# The DPS has node-ID 127 as delivered.
+# The default node-ID of the DPS is 127.
 NODES = {"DpsUnderload": 127, "DpsOverload": 127, "DpsEmergency": 127, "Answers60": 127}
 # A line that runs longer counts as hung.
 LIMIT = 60

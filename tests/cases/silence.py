@@ -207,7 +207,7 @@ class SlowTimer(Device):
 
 @case("log 5 --duration 2s", 3, err="SYNC", never="event timer")
 class WaitsForSync(Device):
-    """TPDO1 follows a SYNC, and nobody sends one."""
+    """TPDO1 follows a SYNC, and no node sends one."""
 
 
 @case(SYNC, 3, err="MPDO|multiplex", never="event timer")

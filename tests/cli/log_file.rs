@@ -185,9 +185,9 @@ fn fifo_without_a_reader_is_waited_for_within_the_duration() {
     let made = std::process::Command::new("mkfifo").arg(bench.path("fifo")).status().expect("mkfifo");
     assert!(made.success());
     for output in ["-o fifo", "-o run.csv --force --events fifo"] {
-        let begun = std::time::Instant::now();
+        let start = std::time::Instant::now();
         let done = bench.run(&format!("log 1 --sync 10ms --duration 300ms {output}"));
         done.fails(8, "cangauge: open fifo: no program reads from this FIFO\nhint: start the reader first: cat fifo\n");
-        assert!(begun.elapsed() >= std::time::Duration::from_millis(300));
+        assert!(start.elapsed() >= std::time::Duration::from_millis(300));
     }
 }

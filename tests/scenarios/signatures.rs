@@ -286,9 +286,9 @@ fn settings_reported_as_stored_survive_a_reset() {
                     assert!(bus.look("0x6132:1") == [1] || restarts, "{place}");
                 }
                 Err(failure) => {
-                    let told = ["it is unknown whether the settings were stored", "it is not verified"];
-                    let told = told.iter().any(|told| ErrorMessage::of(&failure).message.contains(told));
-                    assert_eq!(told, bus.count("73617665") == 1, "{place}");
+                    let texts = ["it is unknown whether the settings were stored", "it is not verified"];
+                    let is_reported = texts.iter().any(|text| ErrorMessage::of(&failure).message.contains(text));
+                    assert_eq!(is_reported, bus.count("73617665") == 1, "{place}");
                 }
             }
         }
@@ -336,9 +336,9 @@ fn values_reported_as_restored_are_factory_defaults() {
                 assert_eq!(bus.look("0x1017"), [0, 0], "{place}");
             }
             Err(failure) => {
-                let told = ["whether the next reset sets the defaults", "it is not verified"];
-                let told = told.iter().any(|told| ErrorMessage::of(&failure).message.contains(told));
-                assert_eq!(told, bus.count("6C6F6164") == 1, "{place}");
+                let texts = ["whether the next reset sets the defaults", "it is not verified"];
+                let is_reported = texts.iter().any(|text| ErrorMessage::of(&failure).message.contains(text));
+                assert_eq!(is_reported, bus.count("6C6F6164") == 1, "{place}");
             }
         }
     }

@@ -187,7 +187,7 @@ fn markers_count_only_if_the_device_has_them() {
 #[test]
 fn other_objects_of_a_signal_and_objects_without_signal() {
     let d20 = node(REAL, &[0x2090_0020], |_| {});
-    // Without a description the type of 2090h is unknown: no value. It is the signal all the same.
+    // Without a description the type of 2090h is unknown: no value. It is still the signal.
     assert_eq!(rows(&d20, &[], "181#D2040000"), [row("pressure", "", "")]);
     let raw = node(REAL, &[0x7100_0110, 0x0005_0008], |_| {});
     assert_eq!(rows(&raw, &[], "181#100E00"), [row("0x7100:1", "3600", "")]);

@@ -190,7 +190,7 @@ pub(in crate::output) fn fact(fact: &PdoFact) -> NoteText {
         }
         PdoFact::SetDespite { number, error, write } => {
             let step = step(error, write.as_ref());
-            NoteText::new("set-despite", format!("{step}; {number} has the requested settings all the same"))
+            NoteText::new("set-despite", format!("{step}; but {number} has the requested settings"))
         }
         PdoFact::Off { number } => {
             NoteText::new("off", format!("{number} is off: map signals or set --cob-id to switch it on"))

@@ -1,4 +1,4 @@
-//! From the argument to the device: its identity, where it is, and how LSS reaches it.
+//! Finds the device that an argument names: its identity, its node-ID, and how LSS reaches it.
 
 use super::device::{Descriptions, LssDevice};
 use super::event::LssEvent;

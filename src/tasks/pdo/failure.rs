@@ -283,7 +283,7 @@ pub enum PdoFact {
         /// The groups of 1010h.
         groups: Vec<Group>,
     },
-    /// The description says that the object cannot be mapped. The request was sent all the same.
+    /// The description says that the object cannot be mapped. The request was sent anyway.
     MaybeNotMappable {
         /// The object.
         object: ObjectId,
@@ -295,7 +295,7 @@ pub enum PdoFact {
         /// The answer to the write of bit 31.
         error: SdoError,
     },
-    /// A step failed, and the TPDO has the requested settings all the same.
+    /// A step failed, but the TPDO has the requested settings.
     SetDespite {
         /// The TPDO.
         number: TpdoNumber,

@@ -49,7 +49,7 @@ impl StateSwitch {
     /// Sets the node to its previous state, if that is known.
     ///
     /// # Errors
-    /// Bus errors and Ctrl-C. The command has been sent all the same.
+    /// Bus errors and Ctrl-C. The command has been sent anyway.
     pub(super) fn restore(&mut self, session: &mut Session<'_, '_>) -> Result<Option<StateEffect>, StepError> {
         let node = session.node.id;
         let (back, before) = match self.before.take() {

@@ -117,7 +117,7 @@ fn may_be_odd(spec: &Spec, message: &str) -> bool {
             "it has no",
             "no source",
             "no object",
-            "tells no",
+            "no signal",
             "no measured",
             "has no",
             "multiplexed",
