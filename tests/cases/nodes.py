@@ -20,7 +20,7 @@ class Pair(Device):
 
 
 @case("read 5,9 --format json", 7, out='"node":5,"signal":"ch1","value":1.25', err='"kind":"no-answer","exit":3')
-@case("check 5,9 'ch1 < 5' --format json", 3, err='"kind":"no-answer","exit":3')
+@case("check 5,9 'ch1 < 5' --format json", 7, err='"kind":"no-answer","exit":3')
 @case("sdo read 5 0x1008", out="^CASE$")
 @case("read 9", 3, err="node 9")
 @case("scan 5-9", out="(?m)^ *5 ")
