@@ -114,7 +114,6 @@ const FUNCTION_LINES: usize = 60;
 const LONG: &[(&str, &str, usize)] = &[
     ("canopen/value.rs", "encode_text", 65),
     ("master/sdo.rs", "on_frame_of", 90),
-    ("output/events/text.rs", "event_text", 72),
     ("sim/sdo_server/tests.rs", "block_download", 62),
 ];
 

@@ -8,6 +8,7 @@ use crate::canopen::id::NodeId;
 use crate::output::diagnosis;
 use crate::output::failure::ErrorMessage;
 use crate::tasks::log::{Change, LogEvent, Remark, TpdoChange};
+use std::time::Duration;
 
 /// The text of a recording's event.
 pub fn event_text(event: &LogEvent) -> EventText {
@@ -19,26 +20,25 @@ pub fn event_text(event: &LogEvent) -> EventText {
             of_node(*node, "emcy", Warning, format!("node {node}: {}", emergency_text(*emergency, meaning)))
         }
         LogEvent::Share(interval, share) => {
-            let text = format!(
-                "SYNC every {} with its TPDOs takes {:.1} % of the bus",
-                format_duration(*interval),
-                share * 100.0
-            );
-            EventText { event: None, node: None, text, weight: Info }
+            EventText { event: None, node: None, text: share_text(*interval, *share), weight: Info }
         }
         LogEvent::Restarted(node) => of_node(*node, "reboot", Warning, format!("node {node} restarted")),
         LogEvent::ReadAgain(node, changes) if changes.is_empty() => {
             of_node(*node, "read-again", Info, format!("node {node} was read again: its setup is unchanged"))
         }
         LogEvent::ReadAgain(node, changes) => {
-            let changes: Vec<String> = changes.iter().map(change_text).collect();
-            let text = format!("node {node} has changed, and is recorded with its new setup: {}", changes.join("; "));
+            let changes = changes.iter().map(change_text).collect::<Vec<_>>().join("; ");
+            let text = format!("node {node} has changed, and is recorded with its new setup: {changes}");
             of_node(*node, "changed", Warning, text)
         }
         LogEvent::Unreadable(node, why) => {
-            let text =
-                format!("{}: node {node} is not recorded until it can be read again", ErrorMessage::of(why).message);
-            of_node(*node, "unreadable", Warning, text)
+            let why = ErrorMessage::of(why).message;
+            of_node(
+                *node,
+                "unreadable",
+                Warning,
+                format!("{why}: node {node} is not recorded until it can be read again"),
+            )
         }
         LogEvent::HeartbeatLost(node, since) => {
             let text = format!("node {node}: heartbeat lost, none for {}", format_duration(*since));
@@ -56,27 +56,18 @@ pub fn event_text(event: &LogEvent) -> EventText {
         }
         LogEvent::Back(node) => of_node(*node, "back", Info, format!("node {node} is back")),
         LogEvent::WrongLength(node, mapped, received) => {
-            let text = format!("node {node}: a TPDO has {received} bytes, its mapping {mapped}: it makes no row");
-            of_node(*node, "length", Warning, text)
+            of_node(*node, "length", Warning, length_text(*node, *mapped, *received, "it makes no row"))
         }
         LogEvent::LongerTpdo(node, mapped, received) => {
-            let text = format!(
-                "node {node}: a TPDO has {received} bytes, its mapping {mapped}: the first {mapped} bytes are used from now on"
-            );
-            of_node(*node, "length", Warning, text)
-        }
-        LogEvent::HeartbeatLength(node, 0) => {
-            let text = format!("node {node}: frames of 0 bytes on its heartbeat COB-ID are ignored");
-            of_node(*node, "heartbeat-length", Info, text)
+            let used = format!("the first {mapped} bytes are used from now on");
+            of_node(*node, "length", Warning, length_text(*node, *mapped, *received, &used))
         }
         LogEvent::HeartbeatLength(node, length) => {
-            let text = format!("node {node}: its heartbeats have {length} bytes, not 1: the first byte is the state");
-            of_node(*node, "heartbeat-length", Info, text)
+            of_node(*node, "heartbeat-length", Info, heartbeat_text(*node, *length))
         }
         LogEvent::EmergencyRepeated(node, emergency, meaning, count) => {
-            let times = if *count == 1 { "once more".to_owned() } else { format!("{count} times more") };
-            let text = format!("node {node}: {}: {times}", emergency_text(*emergency, meaning));
-            of_node(*node, "emcy", Warning, text)
+            let text = emergency_text(*emergency, meaning);
+            of_node(*node, "emcy", Warning, format!("node {node}: {text}: {}", times_more(*count)))
         }
         LogEvent::Fault(fault) => of_all("fault", fault_weight(*fault), fault.to_string()),
         LogEvent::Buffer(buffer) => EventText { event: None, node: None, text: buffer_text(*buffer), weight: Detail },
@@ -88,6 +79,25 @@ pub fn event_text(event: &LogEvent) -> EventText {
 
 fn of_node(node: NodeId, event: &'static str, weight: Weight, text: String) -> EventText {
     EventText { event: Some(event), node: Some(node), text, weight }
+}
+
+fn times_more(count: u64) -> String {
+    if count == 1 { "once more".to_owned() } else { format!("{count} times more") }
+}
+
+fn share_text(interval: Duration, share: f64) -> String {
+    format!("SYNC every {} with its TPDOs takes {:.1} % of the bus", format_duration(interval), share * 100.0)
+}
+
+fn length_text(node: NodeId, mapped: usize, received: usize, consequence: &str) -> String {
+    format!("node {node}: a TPDO has {received} bytes, its mapping {mapped}: {consequence}")
+}
+
+fn heartbeat_text(node: NodeId, length: usize) -> String {
+    match length {
+        0 => format!("node {node}: frames of 0 bytes on its heartbeat COB-ID are ignored"),
+        _ => format!("node {node}: its heartbeats have {length} bytes, not 1: the first byte is the state"),
+    }
 }
 
 fn emergency_text(emergency: Emergency, meaning: &str) -> String {
