@@ -6,7 +6,7 @@ use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::catalog::{self, MadeFor, Model};
 use crate::device::eds;
-use crate::master::Master;
+use crate::master::{Master, OnTwoDevices};
 use crate::node::Overrides;
 use crate::node::survey::revisions;
 use crate::output::failure::ErrorMessage;
@@ -31,6 +31,10 @@ pub(crate) struct Named {
 impl Named {
     fn is_for(&self, node: NodeId) -> bool {
         self.node.is_none_or(|own| own == node)
+    }
+
+    fn is_built_in(&self) -> bool {
+        !self.is_eds && catalog::by_name(self.file()).is_some()
     }
 
     fn file(&self) -> &str {
@@ -121,7 +125,10 @@ fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[N
             continue;
         }
         let message = mismatch(named.file(), **node, device, *vendor, *product);
-        if !global.only_reads {
+        // No description is for a device of this vendor: the user names the one that comes nearest.
+        let is_nearest = named.is_built_in() && !vendor.is_some_and(catalog::has_vendor);
+        let writes = global.on_two_devices == OnTwoDevices::RefuseWrites;
+        if !global.only_reads && (writes || !is_nearest) {
             let hint = "name the file of this device, or use this one anyway: --accept-mismatch";
             return Err(ErrorMessage::usage(message).hint(hint).into());
         }

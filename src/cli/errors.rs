@@ -17,7 +17,7 @@ pub(crate) struct Errors {
     node: NodeId,
     /// Delete the history; a pending error stays in the register
     #[arg(long)]
-    clear: bool,
+    pub(super) clear: bool,
 }
 
 impl Errors {

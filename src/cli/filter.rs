@@ -47,6 +47,10 @@ impl Filter {
         Claim::Nodes(vec![self.node])
     }
 
+    pub(super) fn writes(&self) -> bool {
+        self.kind.is_some() || self.constant.is_some() || self.damping.is_some()
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let wanted = FilterRequest {
             kind: self.kind.map(|kind| match kind {

@@ -47,6 +47,10 @@ impl Limits {
         Claim::Nodes(vec![self.node])
     }
 
+    pub(super) fn writes(&self) -> bool {
+        [self.delta, self.lower, self.upper, self.hysteresis].iter().any(Option::is_some)
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let given = [self.delta, self.lower, self.upper, self.hysteresis];
         let wanted: Vec<(Limit, f64)> =

@@ -15,7 +15,7 @@ pub(crate) struct Minmax {
     node: NodeId,
     /// Reset, and print the previous values
     #[arg(long)]
-    reset: bool,
+    pub(super) reset: bool,
 }
 
 impl Minmax {

@@ -33,7 +33,8 @@ mod unit;
 use crate::bus::claim::{Claim, Claims};
 use crate::bus::interrupt::survive_file_size_limit;
 use crate::canopen::id::NodeId;
-use crate::master::{Master, Timing};
+use crate::master::{Master, OnTwoDevices, Timing};
+use crate::output;
 use crate::output::console::Console;
 pub(crate) use crate::output::failure::ErrorMessage;
 use crate::output::report::Format;
@@ -147,6 +148,10 @@ pub struct Global {
     #[arg(skip)]
     pub(crate) only_reads: bool,
 
+    /// What the command does if two devices have one node-ID.
+    #[arg(skip)]
+    pub(crate) on_two_devices: OnTwoDevices,
+
     /// Descriptions that are yet to be compared with the devices of these nodes.
     #[arg(skip)]
     pub(crate) pending: RefCell<Option<(Vec<Named>, Vec<NodeId>)>>,
@@ -231,6 +236,24 @@ impl Command {
             _ => false,
         }
     }
+
+    /// What it does if two devices have one node-ID.
+    fn on_two_devices(&self) -> OnTwoDevices {
+        let writes = match self {
+            Command::Scan(_) => return OnTwoDevices::Report,
+            Command::Sdo(sdo) => !sdo.only_reads(),
+            Command::Unit(unit) => unit.writes(),
+            Command::Filter(filter) => filter.writes(),
+            Command::Limits(limits) => limits.writes(),
+            Command::Minmax(minmax) => minmax.reset,
+            Command::Errors(errors) => errors.clear,
+            Command::Pdo(pdo) => pdo.writes(),
+            Command::Nmt(nmt) => nmt.writes(),
+            Command::Lss(_) | Command::Autozero(_) | Command::Store(_) | Command::Restore(_) => true,
+            _ => false,
+        };
+        if writes { OnTwoDevices::RefuseWrites } else { OnTwoDevices::Fail }
+    }
 }
 
 /// Adds the arguments of a command.
@@ -308,9 +331,16 @@ impl Global {
         let mut claims = open::claim(self, &spec)?;
         let mut bus = open::open_as(self, &spec, false)?;
         let mut master = Master::new(&mut *bus, self.timing(Timing::default().timeout));
+        master.set_on_two_devices(self.on_two_devices);
         let result = descriptions::check_pending(&mut master, self).and_then(|()| work(&mut master, &mut claims));
         // The last frames of a command are still sent: an abort, an NMT state to restore.
         master.settle();
+        for (node, answers) in master.second_answers() {
+            // If the answers differ, the failure of the command says so, except in a scan.
+            if !answers.differs() || self.on_two_devices == OnTwoDevices::Report {
+                self.console().warn(&output::failure::second_answer(node, answers));
+            }
+        }
         let finished = bus.finish().or_fail();
         let result = result?;
         finished?;
@@ -329,7 +359,12 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         let message = format!("--format {} is only for recordings (log)", cli.global.format.name());
         return Err(ErrorMessage::usage(message).into());
     }
-    let global = Global { claim: cli.command.claim(), only_reads: cli.command.only_reads(), ..cli.global.clone() };
+    let global = Global {
+        claim: cli.command.claim(),
+        only_reads: cli.command.only_reads(),
+        on_two_devices: cli.command.on_two_devices(),
+        ..cli.global.clone()
+    };
     cli.command.run(&global)
 }
 

@@ -114,6 +114,14 @@ impl Nmt {
         }
     }
 
+    pub(super) fn writes(&self) -> bool {
+        match &self.action {
+            Action::Startup(args) => args.set.is_some(),
+            Action::State(args) => args.probe,
+            _ => false,
+        }
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let (kind, targets) = match &self.action {
             Action::Start(targets) => (NmtCommand::Start, targets),

@@ -174,6 +174,10 @@ impl Pdo {
         }
     }
 
+    pub(super) fn writes(&self) -> bool {
+        matches!(self.action, Action::Map(_))
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         match &self.action {
             Action::Show(args) => args.run(global),

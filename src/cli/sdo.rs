@@ -17,7 +17,7 @@ use crate::output::progress::Transfer;
 use crate::output::sdo::{ObjectValue, ValueForm};
 use crate::output::text;
 use crate::tasks::Failure;
-use crate::tasks::sdo::{encode, find_form, read, write};
+use crate::tasks::sdo::{ReadOptions, encode, find_form, read, write};
 use clap::{Args, Subcommand, ValueEnum};
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -190,7 +190,9 @@ impl ReadArgs {
                 let at = resolve(&mut node, master, object)?;
                 descriptions::warn_about(global, node.model.as_ref(), at.index);
                 let mut progress = |moved| bar.moved(moved);
-                let read = read(master, &mut node, at, self.data_type, (self.block.into(), &mut progress))?;
+                let (blocks, is_exact) = (self.block.into(), self.output.is_some());
+                let mut options = ReadOptions { blocks, is_exact, progress: &mut progress };
+                let read = read(master, &mut node, at, self.data_type, &mut options)?;
                 bar.finish();
                 if let Some(note) = read.note {
                     global.console().warn(&format!("node {}: {at}: {note}", self.node));

@@ -34,6 +34,10 @@ impl Unit {
         Claim::Nodes(vec![self.node])
     }
 
+    pub(super) fn writes(&self) -> bool {
+        self.words().is_ok_and(|(_, unit)| unit.is_some())
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let (signal, unit) = self.words().map_err(ErrorMessage::usage)?;
         match unit {

@@ -202,6 +202,11 @@ pub fn by_identity(vendor: u32, product: u32) -> Option<Arc<Model>> {
     fitting.next().filter(|_| fitting.next().is_none()).cloned()
 }
 
+/// Whether a built-in description is for a device of this vendor (1018h:1).
+pub fn has_vendor(vendor: u32) -> bool {
+    built_in().iter().any(|model| model.description.identify.vendor_id == Some(vendor))
+}
+
 /// The objects that must be read before [`recognise`] can decide: empty if it has decided, or if no description
 /// can fit. Put the bytes received into [`Traits::answers`].
 pub fn to_ask(traits: &Traits) -> Vec<ObjectId> {

@@ -23,6 +23,8 @@ const IDLE_TIMEOUT: Duration = Duration::from_millis(50);
 pub(super) struct ForeignTraffic {
     /// Any foreign frame was received.
     seen: bool,
+    /// A request of another master was received.
+    requested: bool,
     /// A segmented or block transfer was seen.
     in_segments: bool,
     /// A block transfer was seen.
@@ -70,6 +72,7 @@ impl ForeignTraffic {
     pub(super) fn record(&mut self, frame: &Frame, now: Mono) {
         let Some(kind) = FrameKind::of(frame) else { return };
         self.seen = true;
+        self.requested |= frame.id().sdo_request_node().is_some();
         self.in_blocks |= kind == FrameKind::Blocks;
         self.in_segments |= matches!(kind, FrameKind::Segments | FrameKind::Blocks);
         if let Some(until) = &mut self.back_off_until {
@@ -80,6 +83,11 @@ impl ForeignTraffic {
                 FrameKind::Expedited => {}
             }
         }
+    }
+
+    /// Whether another master certainly uses the channel.
+    pub(super) fn is_requested(self) -> bool {
+        self.requested
     }
 
     /// Whether segments can no longer be assigned to our transfer.
@@ -121,7 +129,7 @@ impl ForeignTraffic {
 
     /// Restarts our transfer: earlier frames no longer count.
     pub(super) fn restart(&mut self) {
-        *self = ForeignTraffic { since: self.since, ..ForeignTraffic::default() };
+        *self = ForeignTraffic { since: self.since, requested: self.requested, ..ForeignTraffic::default() };
     }
 }
 

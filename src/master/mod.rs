@@ -4,16 +4,19 @@
 //! [`Master::next`] is the only loop. It sends waiting frames, receives one event, passes it to the SDO client and
 //! returns what happened. All blocking functions are built on it.
 
+mod active;
 mod foreign_traffic;
 pub mod lss;
 mod machine;
 mod request;
 mod sdo;
+mod second_answer;
 mod send;
 pub mod transfer;
 
 pub use lss::{Lss, LssError};
 pub use request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
+pub use second_answer::{OnTwoDevices, SecondAnswer};
 pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, TransferKind, read_object, write_object};
 
 use crate::bus::{Bus, BusError, Event, Fault, Filters, Mono, Received, Stamp};
@@ -29,6 +32,8 @@ use std::time::Duration;
 
 /// The longest time that [`Master::drain`] accepts frames after its moment.
 const DRAIN_LIMIT: Duration = Duration::from_secs(1);
+
+const SERIAL_NUMBER: ObjectId = ObjectId::new(0x1018, 4);
 
 /// Time-out and retries of requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -192,6 +197,45 @@ impl<'bus> Master<'bus> {
         self.sdo.accept_60(node, quirks.contains(&Quirk::UploadAnswered60));
     }
 
+    /// Sets what happens if two devices answer with one node-ID.
+    pub fn set_on_two_devices(&mut self, reaction: OnTwoDevices) {
+        self.sdo.set_on_two_devices(reaction);
+    }
+
+    /// The nodes that sent two answers to one request.
+    pub fn second_answers(&self) -> Vec<(NodeId, SecondAnswer)> {
+        self.sdo.second_answers().collect()
+    }
+
+    /// Makes sure, before the first write to a node, that no two devices have its node-ID.
+    ///
+    /// # Errors
+    /// Outer: the bus failed or the user interrupted. Inner: two devices answer.
+    pub fn ensure_single(&mut self, node: NodeId) -> Result<Result<(), SdoError>, Error> {
+        if self.sdo.needs_check(node) {
+            // A device without a serial number answers as well. A silent one is reported by the write.
+            self.transfer_one(Request::read(node, SERIAL_NUMBER).once())?.ok();
+        }
+        let operation = Operation::Write;
+        let error = |failure| Err(SdoError { node, object: SERIAL_NUMBER, operation, failure });
+        Ok(self.sdo.failure_of(node, SERIAL_NUMBER).map_or(Ok(()), error))
+    }
+
+    /// Waits until no second answer can arrive. Frames go to `watch`. After the first answer of a node only.
+    pub(super) fn await_second_answers(&mut self, watch: &mut dyn FnMut(&Received)) -> Result<(), Error> {
+        while let Some(until) = self.sdo.second_answer_until() {
+            match self.next(until)? {
+                Happening::Frame(received) => watch(&received),
+                Happening::Deadline => self.sdo.on_waited(until),
+                Happening::Interrupted => return Err(Error::Interrupted),
+                Happening::Link(false) => return Err(Error::Bus(BusError::Down(self.bus.name().to_owned()))),
+                Happening::Ended => return Ok(()),
+                Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {}
+            }
+        }
+        Ok(())
+    }
+
     /// Whether an SDO transfer is in progress or waiting.
     pub fn is_busy(&self) -> bool {
         self.sdo.is_busy()
@@ -267,6 +311,10 @@ impl<'bus> Master<'bus> {
                 return Ok(Happening::Sdo(ticket, result));
             }
             let retry_at = self.send_waiting()?;
+            // A transfer with two devices ends before it is sent.
+            if self.sdo.has_finished() {
+                continue;
+            }
             let mut deadline = until;
             for other in [retry_at, self.sdo.next_deadline()].into_iter().flatten() {
                 deadline = deadline.min(other);
@@ -366,6 +414,14 @@ impl<'bus> Master<'bus> {
                 | Happening::Deadline => {}
             }
         }
+        if what.iter().any(|(_, _, operation)| *operation == Operation::Read) {
+            self.await_second_answers(watch)?;
+        }
+        for (result, &(node, object, operation)) in results.iter_mut().zip(&what) {
+            if let (Some(Ok(_)), Some(failure)) = (&result, self.sdo.failure_of(node, object)) {
+                *result = Some(Err(SdoError { node, object, operation, failure }));
+            }
+        }
         Ok(results.into_iter().flatten().collect())
     }
 
@@ -405,7 +461,7 @@ impl Answer {
         object: ObjectId,
         data_type: Option<DataType>,
     ) -> Result<(Value, Option<Note>), SdoError> {
-        let empty = Uploaded { bytes: Vec::new(), indicated: true, announced: None, misnamed_end: false };
+        let empty = Uploaded::complete(Vec::new());
         let uploaded = self.uploaded.as_ref().unwrap_or(&empty);
         fit(data_type, uploaded).map(|fitted| (fitted.value, fitted.note)).map_err(|error: FitError| SdoError {
             node,

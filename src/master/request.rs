@@ -1,6 +1,7 @@
 //! SDO requests, answers and errors.
 
 use super::machine::Machine;
+use super::second_answer::SecondAnswer;
 use super::transfer::{Blocks, TransferKind};
 use crate::bus::Stamp;
 use crate::bus::time::format_duration;
@@ -31,6 +32,8 @@ pub struct Request {
     pub(super) blocks: Blocks,
     /// The device rejected block transfer during this request.
     pub(super) refused_blocks: bool,
+    /// A length other than the announced one is always a failure.
+    pub(super) is_exact: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -52,12 +55,18 @@ impl Request {
 
     fn new(node: NodeId, object: ObjectId, kind: Kind) -> Request {
         let (blocks, refused_blocks) = (Blocks::Never, false);
-        Request { node, object, kind, timeout: None, repeatable: true, blocks, refused_blocks }
+        Request { node, object, kind, timeout: None, repeatable: true, blocks, refused_blocks, is_exact: false }
     }
 
     /// Sets whether blocks are used; [`super::BlockMode`] chooses.
     pub fn blocks(mut self, blocks: Blocks) -> Request {
         self.blocks = blocks;
+        self
+    }
+
+    /// Never accepts a length other than the announced one: for content that a file keeps.
+    pub fn exact(mut self, is_exact: bool) -> Request {
+        self.is_exact = is_exact;
         self
     }
 
@@ -175,10 +184,42 @@ pub enum SdoFailure {
     /// Another master wrote the same object at the same time, so the acknowledge may be for its write.
     #[error("acknowledged, but another master wrote the same object at the same time")]
     Ambiguous,
+    /// The length contradicts the announced one, or a segment in the middle is short.
+    #[error("{}: {frame}", lengths(*.announced, *.delivered))]
+    WrongLength {
+        /// Bytes announced.
+        announced: Option<u32>,
+        /// Bytes delivered.
+        delivered: usize,
+        /// The last frame.
+        frame: Frame,
+    },
+    /// Two devices answer with this node-ID.
+    #[error("{}", two_devices(.0.as_ref()))]
+    TwoDevices(Option<SecondAnswer>),
+    /// The same before the first write of the command.
+    #[error("{}; nothing was written", two_devices(Some(.0)))]
+    NotWritten(SecondAnswer),
     /// Another master used the channel again and again.
     #[error("another master uses the node's SDO channel at the same time")]
     Disturbed,
     /// The caller cancelled the transfer, or the node was silent to an earlier one.
     #[error("not finished")]
     Cancelled,
+}
+
+fn lengths(announced: Option<u32>, delivered: usize) -> String {
+    match announced {
+        Some(size) => format!("the device announced {size} bytes and delivered {delivered}"),
+        None => format!("a segment before the last one is not full ({delivered} bytes were delivered)"),
+    }
+}
+
+fn two_devices(answers: Option<&SecondAnswer>) -> String {
+    match answers {
+        Some(SecondAnswer { first, second }) => {
+            format!("two devices have this node-ID: one request got the answers {first} and {second}")
+        }
+        None => "more than one answer arrives: two devices have this node-ID, or a bridge repeats frames".to_owned(),
+    }
 }

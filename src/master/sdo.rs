@@ -3,38 +3,18 @@
 //! A late answer never becomes the result of a later request: see [`StaleRequest`].
 
 use super::Timing;
-use super::foreign_traffic::ForeignTraffic;
-use super::machine::Machine;
+use super::active::{Active, Verdict};
 use super::request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
+use super::second_answer::{Answers, OnTwoDevices, SecondAnswer};
 use super::send::Outgoing;
-use super::transfer::{Blocks, TransferKind, is_about_object};
+use super::transfer::Blocks;
 use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{AbortCode, Progress, TransferError, Uploaded};
+use crate::canopen::sdo::{AbortCode, Progress, TransferError};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
-
-/// A transfer in progress.
-#[derive(Debug)]
-struct Active {
-    ticket: Ticket,
-    request: Request,
-    machine: Machine,
-    /// Set when our last frame was sent. Other traffic never extends it.
-    deadline: Option<Mono>,
-    /// The number of our frames that still wait to be sent.
-    unsent: usize,
-    attempts_left: u32,
-    /// When the first request was sent. Earlier frames do not answer it.
-    asked_at: Option<Mono>,
-    foreign: ForeignTraffic,
-    /// The caller's transfer. It waits while this one, a barrier read, makes sure that no stale answer is pending.
-    deferred: Option<(Ticket, Request)>,
-    /// Another master wrote the same object. Its acknowledge looks like ours.
-    ambiguous: bool,
-}
 
 /// A request without an answer. The answer may still come.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +28,9 @@ struct Node {
     waiting: VecDeque<(Ticket, Request)>,
     active: Option<Active>,
     stale: Vec<StaleRequest>,
+    answers: Answers,
+    /// Whether a write was acknowledged.
+    is_written: bool,
     /// [`crate::device::quirk::Quirk::UploadAnswered60`] acts here.
     accept_60: bool,
 }
@@ -68,136 +51,7 @@ pub(super) struct SdoClient {
     due: Option<Mono>,
     /// Whether a node has a waiting transfer and none in progress.
     can_start: bool,
-}
-
-impl Active {
-    fn new(ticket: Ticket, request: Request, accept_60: bool, timing: &Timing) -> Active {
-        // If the server does not answer a block request, the next request is a segmented one, not a retry.
-        let attempts = if request.falls_back() { 0 } else { timing.retries };
-        let attempts_left = if request.repeatable { attempts } else { 0 };
-        let machine = request.machine(accept_60);
-        let (deadline, asked_at, deferred) = (None, None, None);
-        let foreign = ForeignTraffic::default();
-        Active {
-            ticket,
-            request,
-            machine,
-            deadline,
-            unsent: 0,
-            attempts_left,
-            asked_at,
-            foreign,
-            deferred,
-            ambiguous: false,
-        }
-    }
-
-    /// Queues frames for sending. They replace frames of this transfer that are still in the queue.
-    fn enqueue(&mut self, frames: Vec<Frame>, outgoing: &mut Outgoing) {
-        if self.unsent > 0 {
-            outgoing.drop_ticket(self.ticket);
-        }
-        self.unsent = frames.len();
-        self.deadline = None;
-        for frame in frames {
-            outgoing.push(frame, Some(self.ticket));
-        }
-    }
-
-    /// Whether a frame answers a segment that still waits to be sent. Then it comes from another device with the same
-    /// node-ID. Not checked for an initiate, which may be a retry of an answered one, and for an abort, which may come
-    /// at any time.
-    fn is_answered_before_sent(&self, frame: &Frame) -> bool {
-        let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
-        self.unsent > 0 && in_segments && frame.data().first() != Some(&0x80)
-    }
-
-    /// Waits for a foreign transfer to end, then restarts; `false` if the transfer must not be repeated or the time for
-    /// that is over. No abort is sent, because it would end the foreign transfer.
-    fn back_off(&mut self, accept_60: bool, now: Mono, timing: &Timing, outgoing: &mut Outgoing) -> bool {
-        let limit = self.timeout(timing) * (1 + timing.retries);
-        if !self.request.repeatable || !self.foreign.back_off(now, limit) {
-            return false;
-        }
-        self.enqueue(Vec::new(), outgoing);
-        self.machine = self.request.machine(accept_60);
-        self.asked_at = None;
-        self.deadline = self.foreign.back_off_until();
-        true
-    }
-
-    /// Records a foreign frame. Whether our transfer can continue.
-    fn record_foreign(
-        &mut self,
-        accept_60: bool,
-        received: &Received,
-        timing: &Timing,
-        outgoing: &mut Outgoing,
-    ) -> bool {
-        let now = received.at.mono;
-        self.foreign.record(&received.frame, now);
-        if let Some(until) = self.foreign.back_off_until() {
-            self.deadline = Some(until);
-            return true;
-        }
-        let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
-        !in_segments || !self.foreign.conflicts() || self.back_off(accept_60, now, timing, outgoing)
-    }
-
-    /// Whether the segmented transfer that has just ended may contain foreign segments.
-    fn is_suspect(&self, uploaded: Option<&Uploaded>) -> bool {
-        let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
-        let delivered = uploaded.map_or(0, |uploaded| uploaded.bytes.len());
-        in_segments && self.foreign.is_suspect(uploaded.and_then(|uploaded| uploaded.announced), delivered)
-    }
-
-    /// Restarts a segmented upload of a large object as a block upload.
-    fn restart_in_blocks(&mut self, accept_60: bool, out: &mut Vec<Frame>) {
-        out.clear();
-        self.machine.abort(AbortCode::GENERAL, out);
-        self.request.blocks = Blocks::First { threshold: 0 };
-        self.attempts_left = 0;
-        self.machine = self.request.machine(accept_60);
-        out.push(self.machine.request());
-    }
-
-    /// Whether the transfer failed only because the server does not support block transfer.
-    fn lacks_block_transfer(&self, error: TransferError) -> bool {
-        // An abort code about the object itself would come again. A write with an unknown answer may have had an
-        // effect and is not repeated.
-        let refused = match error {
-            TransferError::Aborted(code) => !is_about_object(code),
-            TransferError::Violation(..) => self.request.operation() == Operation::Read,
-            TransferError::NoAnswer => false,
-        };
-        refused && self.request.falls_back() && !self.machine.has_begun()
-    }
-
-    fn way(&self) -> TransferKind {
-        if self.machine.is_in_blocks() {
-            TransferKind::Blocks
-        } else if self.request.refused_blocks {
-            TransferKind::PlainFallback
-        } else {
-            TransferKind::Plain
-        }
-    }
-
-    fn timeout(&self, timing: &Timing) -> Duration {
-        self.request.timeout.unwrap_or(timing.timeout)
-    }
-
-    fn error(&self, failure: SdoFailure) -> SdoError {
-        SdoError { node: self.request.node, object: self.request.object, operation: self.request.operation(), failure }
-    }
-
-    /// Records a request of another master. If it writes the same object, an acknowledge may be for either of us.
-    fn record_request(&mut self, frame: &Frame) {
-        if let [command, a, b, c, ..] = frame.data() {
-            let same = ObjectId::from_multiplexer([*a, *b, *c]) == self.request.object;
-            self.ambiguous |= same && command >> 5 == 1 && self.request.operation() == Operation::Write;
-        }
-    }
+    on_two_devices: OnTwoDevices,
 }
 
 impl SdoClient {
@@ -236,8 +90,17 @@ impl SdoClient {
         if !std::mem::take(&mut self.can_start) {
             return;
         }
+        let on_two_devices = self.on_two_devices;
         for node in self.nodes.values_mut() {
             if node.active.is_some() {
+                continue;
+            }
+            if let Some(failure) = node.refusal(on_two_devices) {
+                for (ticket, request) in node.waiting.drain(..) {
+                    let (node, object, operation) = (request.node, request.object, request.operation());
+                    self.finished
+                        .push_back((ticket, Err(SdoError { node, object, operation, failure: failure.clone() })));
+                }
                 continue;
             }
             let Some((ticket, request)) = node.waiting.pop_front() else { continue };
@@ -298,12 +161,26 @@ impl SdoClient {
     fn on_frame_of(&mut self, number: NodeId, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let id = received.frame.id();
         let Some(node) = self.nodes.get_mut(&number) else { return false };
+        let at = received.at.mono;
+        let is_request = id.sdo_request_node().is_some();
+        if is_request {
+            node.answers.on_foreign_request(at);
+        }
         let Some(active) = &mut node.active else {
+            if !is_request && !node.has_stale(&received.frame) {
+                node.answers.on_unexpected(&received.frame, at);
+            }
             node.remove_stale(&received.frame);
             return false;
         };
         let mut out = Vec::new();
-        let at = received.at.mono;
+        let operation = active.request.operation();
+        let in_segments = active.machine.has_begun() && !active.machine.is_in_blocks();
+        let asked_at = active.asked_at.filter(|_| !active.machine.has_begun() && !active.is_repeated);
+        if !active.is_repeated && node.answers.is_repetition(&received.frame, operation, in_segments, at) {
+            node.answers.on_unexpected(&received.frame, at);
+            return true;
+        }
         let progress = match active.asked_at {
             Some(asked_at) if at + CLOCK_TOLERANCE >= asked_at && !active.is_answered_before_sent(&received.frame) => {
                 active.machine.on_frame(&received.frame, &mut out)
@@ -312,11 +189,14 @@ impl SdoClient {
         };
         let result = match progress {
             Progress::NotOurs => {
-                if id.sdo_request_node().is_some() {
+                if is_request {
                     active.record_request(&received.frame);
+                } else if node.answers.on_unexpected(&received.frame, at) {
+                    node.remove_stale(&received.frame);
+                    return false;
                 }
                 if !active.record_foreign(node.accept_60, received, timing, outgoing) {
-                    let error = active.error(SdoFailure::Disturbed);
+                    let error = active.error(active.disturbance());
                     self.finished.push_back((active.ticket, Err(error)));
                     outgoing.drop_ticket(active.ticket);
                     node.active = None;
@@ -326,12 +206,14 @@ impl SdoClient {
             }
             Progress::Continue if out.is_empty() => {
                 // A segment of a block: each segment has its own time-out.
+                node.answers.on_answer(received.frame, operation, asked_at, at);
                 if active.unsent == 0 {
                     active.deadline = Some(received.at.mono + active.timeout(timing));
                 }
                 return true;
             }
             Progress::Continue => {
+                node.answers.on_answer(received.frame, operation, asked_at, at);
                 if active.request.blocks == Blocks::WhenLarge && active.machine.is_worth_blocks() {
                     active.restart_in_blocks(node.accept_60, &mut out);
                 }
@@ -343,19 +225,32 @@ impl SdoClient {
                 if active.back_off(node.accept_60, at, timing, outgoing) {
                     return true;
                 }
-                Err(active.error(SdoFailure::Disturbed))
+                Err(active.error(active.disturbance()))
             }
-            Progress::Done(uploaded) => Ok(Answer { uploaded, at: received.at, way: active.way() }),
+            Progress::Done(uploaded) => match active.judge(uploaded.as_ref(), node.accept_60) {
+                Verdict::Accepted => Ok(Answer { uploaded, at: received.at, way: active.way() }),
+                Verdict::Again => {
+                    node.answers.on_answer(received.frame, operation, asked_at, at);
+                    out.push(active.machine.request());
+                    active.enqueue(out, outgoing);
+                    return true;
+                }
+                Verdict::WrongLength => {
+                    let (announced, delivered) = uploaded.map_or((None, 0), |read| (read.announced, read.bytes.len()));
+                    Err(active.error(SdoFailure::WrongLength { announced, delivered, frame: received.frame }))
+                }
+            },
             Progress::Failed(error) if active.foreign.explains(error) => {
                 if active.back_off(node.accept_60, at, timing, outgoing) {
                     return true;
                 }
                 // An abort would end the foreign transfer.
                 out.clear();
-                Err(active.error(SdoFailure::Disturbed))
+                Err(active.error(active.disturbance()))
             }
             Progress::Failed(error) => {
                 if active.lacks_block_transfer(error) {
+                    node.answers.on_repeated(active.request.object);
                     active.request.fall_back();
                     *active = Active::new(active.ticket, active.request.clone(), node.accept_60, timing);
                     active.enqueue(vec![active.machine.request()], outgoing);
@@ -363,6 +258,7 @@ impl SdoClient {
                 }
                 Err(active.error(match error {
                     TransferError::Aborted(code) => SdoFailure::Refused(code),
+                    TransferError::Violation(..) if node.answers.finding().is_some() => active.disturbance(),
                     TransferError::Violation(violation, frame) => SdoFailure::Violation(violation, frame),
                     TransferError::NoAnswer => SdoFailure::Cancelled,
                 }))
@@ -371,6 +267,8 @@ impl SdoClient {
         for frame in out {
             outgoing.push(frame, None);
         }
+        node.answers.on_answer(received.frame, operation, asked_at, at);
+        node.is_written |= operation == Operation::Write && result.is_ok();
         if let Some(active) = node.active.take() {
             outgoing.drop_ticket(active.ticket);
             match active.deferred {
@@ -418,7 +316,9 @@ impl SdoClient {
             }
             if !has_begun {
                 node.stale.push(StaleRequest { object: active.request.object, until: now + STALE_LIFETIME });
+                node.answers.on_repeated(active.request.object);
                 if active.attempts_left > 0 {
+                    active.is_repeated = true;
                     active.attempts_left -= 1;
                     out.push(active.machine.request());
                     active.enqueue(out, outgoing);
@@ -450,10 +350,44 @@ impl SdoClient {
     pub(super) fn forget(&mut self, ticket: Ticket) {
         let Some(node) = self.nodes.get_mut(&ticket.node) else { return };
         node.waiting.retain(|(waiting, _)| *waiting != ticket);
-        if node.active.as_ref().is_some_and(|active| active.ticket == ticket) {
-            node.active = None;
+        if let Some(active) = node.active.take_if(|active| active.ticket == ticket) {
+            node.answers.on_repeated(active.request.object);
         }
         self.can_start |= node.active.is_none() && !node.waiting.is_empty();
+    }
+
+    pub(super) fn set_on_two_devices(&mut self, reaction: OnTwoDevices) {
+        self.on_two_devices = reaction;
+    }
+
+    /// The nodes with second answers.
+    pub(super) fn second_answers(&self) -> impl Iterator<Item = (NodeId, SecondAnswer)> {
+        self.nodes.iter().filter_map(|(&id, node)| Some((id, node.answers.finding()?)))
+    }
+
+    /// The failure of a transfer that is complete, if two devices answer it.
+    pub(super) fn failure_of(&self, node: NodeId, object: ObjectId) -> Option<SdoFailure> {
+        let node = self.nodes.get(&node)?;
+        let has_two = node.answers.differing().filter(|answers| answers.object() == Some(object));
+        node.refusal(self.on_two_devices).or(has_two.map(|answers| SdoFailure::TwoDevices(Some(answers))))
+    }
+
+    /// Whether the serial number of a node must be read before the first write.
+    pub(super) fn needs_check(&mut self, node: NodeId) -> bool {
+        self.nodes.entry(node).or_default().answers.needs_check()
+    }
+
+    /// Until when second answers may arrive. `None` if all nodes are known to be single, or a transfer is in progress.
+    pub(super) fn second_answer_until(&self) -> Option<Mono> {
+        if self.is_busy() {
+            return None;
+        }
+        self.nodes.values().filter_map(|node| node.answers.wait_until()).max()
+    }
+
+    /// The time for second answers until `now` has passed.
+    pub(super) fn on_waited(&mut self, now: Mono) {
+        self.nodes.values_mut().for_each(|node| node.answers.on_waited(now));
     }
 
     /// Ends all transfers. The aborts for the servers go to `out`.
@@ -480,6 +414,21 @@ impl Node {
             |other: &ObjectId| *other != object && !self.stale.iter().any(|request| request.object == *other);
         let fallback = if object == DEVICE_TYPE { ERROR_REGISTER } else { DEVICE_TYPE };
         [DEVICE_TYPE, ERROR_REGISTER, IDENTITY].into_iter().find(is_fresh).unwrap_or(fallback)
+    }
+
+    /// Why no transfer with this node is carried out; `None` if it is.
+    fn refusal(&self, reaction: OnTwoDevices) -> Option<SdoFailure> {
+        let answers = self.answers.differing()?;
+        match reaction {
+            OnTwoDevices::RefuseWrites if !self.is_written => Some(SdoFailure::NotWritten(answers)),
+            OnTwoDevices::Fail | OnTwoDevices::RefuseWrites => Some(SdoFailure::TwoDevices(Some(answers))),
+            OnTwoDevices::Report => None,
+        }
+    }
+
+    fn has_stale(&self, frame: &Frame) -> bool {
+        matches!(frame.data(), [_, a, b, c, ..]
+            if self.stale.iter().any(|request| request.object == ObjectId::from_multiplexer([*a, *b, *c])))
     }
 
     /// Removes the stale request that this frame answers, if any.

@@ -13,7 +13,7 @@
 //! four with a built-in description, do not support block transfer. So it is used only if it saves frames: see
 //! [`BlockMode::Auto`].
 
-use super::{Answer, Error, Happening, Master, Request, SdoError, Ticket};
+use super::{Answer, Error, Happening, Master, Operation, Request, SdoError, Ticket};
 use crate::bus::{BusError, Received};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -168,13 +168,22 @@ impl Master<'_> {
         progress: &mut dyn FnMut(Moved),
         watch: &mut dyn FnMut(&Received),
     ) -> Result<Result<Answer, SdoError>, Error> {
+        let (node, object, operation) = (request.node, request.object, request.operation());
         let ticket = self.start(request);
         // From the latest known moment: a short transfer needs no reading of the clock.
         let mut report_at = self.seen + REPORT_INTERVAL;
         let mut timed = false;
         loop {
             match self.next(report_at)? {
-                Happening::Sdo(ended, result) if ended == ticket => return Ok(result),
+                Happening::Sdo(ended, result) if ended == ticket => {
+                    if operation == Operation::Read {
+                        self.await_second_answers(watch)?;
+                    }
+                    return Ok(result.and_then(|answer| match self.sdo.failure_of(node, object) {
+                        Some(failure) => Err(SdoError { node, object, operation, failure }),
+                        None => Ok(answer),
+                    }));
+                }
                 Happening::Frame(received) => watch(&received),
                 Happening::Deadline => {
                     // The first deadline only updates the clock.

@@ -4,7 +4,8 @@ use super::survey::Ask;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};
-use crate::master::{Error, SdoError, SdoFailure};
+use crate::master::{Answer, Error, SdoError, SdoFailure};
+use std::collections::BTreeSet;
 
 /// An object to read, with its type.
 pub type Item = (NodeId, ObjectId, DataType);
@@ -37,4 +38,74 @@ pub(super) fn read_known<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<O
             },
         })
         .collect()
+}
+
+/// Reads objects that a device may lack. `None` for each that it does not answer properly: one such object affects no
+/// other.
+///
+/// If a node is silent twice in a row, the rest of its objects is `None` as well, and the error is returned beside.
+///
+/// # Errors
+/// What stops everything.
+pub(super) fn ask_optional<A: Ask>(
+    master: &mut A,
+    objects: &[(NodeId, ObjectId)],
+) -> Result<(Vec<Option<Answer>>, Option<SdoError>), A::Stop> {
+    let mut answers: Vec<Option<Answer>> = objects.iter().map(|_| None).collect();
+    let mut open: Vec<usize> = (0..objects.len()).collect();
+    let (mut silent, mut dead): (BTreeSet<NodeId>, _) = (BTreeSet::new(), None);
+    let mut repeated = BTreeSet::new();
+    while !open.is_empty() {
+        let asked: Vec<(NodeId, ObjectId)> = open.iter().map(|&at| objects[at]).collect();
+        let results = master.ask(&asked)?;
+        let has_failed = |error: &SdoError| {
+            !matches!(error.failure, SdoFailure::NoAnswer { started: false, .. } | SdoFailure::Cancelled)
+        };
+        let before = repeated.len();
+        let answering: BTreeSet<NodeId> = asked
+            .iter()
+            .zip(&results)
+            .filter(|(_, result)| result.as_ref().err().is_none_or(has_failed))
+            .map(|(&(node, _), _)| node)
+            .collect();
+        let mut rest = Vec::new();
+        for (at, result) in open.into_iter().zip(results) {
+            match result {
+                Ok(answer) => answers[at] = Some(answer),
+                Err(error) => match error.failure {
+                    // The others were not asked after a silent one.
+                    SdoFailure::Cancelled => rest.push(at),
+                    SdoFailure::NoAnswer { started: false, .. }
+                        if !answering.contains(&error.node) && !silent.insert(error.node) =>
+                    {
+                        dead = dead.or(Some(error));
+                    }
+                    SdoFailure::Refused(_) | SdoFailure::Fit(_) | SdoFailure::TwoDevices(_) => {}
+                    SdoFailure::NoAnswer { started: false, .. } => {}
+                    // A transfer that failed in the middle is tried once more.
+                    _ if repeated.insert(at) => rest.push(at),
+                    _ => {}
+                },
+            }
+        }
+        let is_stuck = rest.len() == asked.len() && repeated.len() == before;
+        open = if is_stuck || dead.is_some() { Vec::new() } else { rest };
+    }
+    Ok((answers, dead))
+}
+
+/// The values of [`ask_optional`]; `None` also if the bytes do not fit the type.
+///
+/// # Errors
+/// A node that is silent twice in a row, and what stops everything.
+pub(super) fn read_optional<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Option<Value>>, A::Stop> {
+    let objects: Vec<(NodeId, ObjectId)> = items.iter().map(|&(node, object, _)| (node, object)).collect();
+    let (answers, dead) = ask_optional(master, &objects)?;
+    if let Some(error) = dead {
+        return Err(Error::Sdo(error).into());
+    }
+    let values = answers.into_iter().zip(items).map(|(answer, &(node, object, data_type))| {
+        answer?.value(node, object, Some(data_type)).ok().map(|(value, _)| value)
+    });
+    Ok(values.collect())
 }

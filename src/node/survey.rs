@@ -5,7 +5,7 @@
 
 mod background;
 
-use super::read::{Item, read_known, read_values};
+use super::read::{Item, ask_optional, read_known, read_optional, read_values};
 use super::{Identity, Node};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -15,7 +15,7 @@ use crate::device::catalog::{Model, Traits, recognise, to_ask};
 use crate::device::description::SignalEntry;
 use crate::device::quirk::Quirk;
 use crate::device::unit::Unit;
-use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
+use crate::master::{Answer, Error, Master, Request, SdoError};
 use crate::measure::layout::{MeasuringRange, PROCESS_VALUES, Signal, Tpdo};
 use crate::measure::sample::Number;
 pub use background::BackgroundSurvey;
@@ -75,7 +75,6 @@ fn identities<A: Ask>(
     has_name: impl Fn(NodeId, &Identity) -> bool,
 ) -> Result<Vec<Identity>, A::Stop> {
     let objects = [
-        (ObjectId::new(0x1000, 0), U32),
         (ObjectId::new(0x1018, 1), U32),
         (ObjectId::new(0x1018, 2), U32),
         (ObjectId::new(0x1018, 3), U32),
@@ -83,15 +82,18 @@ fn identities<A: Ask>(
     ];
     let items: Vec<Item> =
         nodes.iter().flat_map(|&node| objects.map(|(object, data_type)| (node, object, data_type))).collect();
-    let values = read_known(master, &items)?;
+    let device_types: Vec<Item> = nodes.iter().map(|&node| (node, ObjectId::new(0x1000, 0), U32)).collect();
+    let device_types = read_known(master, &device_types)?;
+    let values = read_optional(master, &items)?;
     let mut identities: Vec<Identity> = values
         .chunks(objects.len())
-        .map(|values| Identity {
-            device_type: small(values[0].as_ref()),
-            vendor: small(values[1].as_ref()),
-            product: small(values[2].as_ref()),
-            revision: small(values[3].as_ref()),
-            serial: small(values[4].as_ref()),
+        .zip(&device_types)
+        .map(|(values, device_type)| Identity {
+            device_type: small(device_type.as_ref()),
+            vendor: small(values[0].as_ref()),
+            product: small(values[1].as_ref()),
+            revision: small(values[2].as_ref()),
+            serial: small(values[3].as_ref()),
             name: None,
         })
         .collect();
@@ -99,7 +101,7 @@ fn identities<A: Ask>(
     let named: Vec<NodeId> = nodes.iter().zip(&identities).filter(is_named).map(|(node, _)| *node).collect();
     let items: Vec<Item> =
         named.iter().map(|&node| (node, ObjectId::new(0x1008, 0), DataType::VisibleString)).collect();
-    let mut names: BTreeMap<NodeId, Option<Value>> = named.into_iter().zip(read_known(master, &items)?).collect();
+    let mut names: BTreeMap<NodeId, Option<Value>> = named.into_iter().zip(read_optional(master, &items)?).collect();
     for (identity, node) in identities.iter_mut().zip(nodes) {
         if let Some(Some(Value::Text(name))) = names.remove(node) {
             identity.name = Some(name);
@@ -145,8 +147,10 @@ pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides)
     for (node, model) in overrides {
         master.set_quirks(*node, &model.description.quirks);
     }
-    let identities =
-        identities(master, nodes, |node, identity| overrides.get(&node).is_none_or(|model| !identity.fits(model)))?;
+    let has_name = |node, identity: &Identity| {
+        overrides.get(&node).is_none_or(|model| model.description.signals.is_empty() && !identity.fits(model))
+    };
+    let identities = identities(master, nodes, has_name)?;
     let mut traits: Vec<Traits> = identities.iter().map(Identity::traits).collect();
     let questions: Vec<(usize, ObjectId)> = nodes
         .iter()
@@ -155,14 +159,8 @@ pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides)
         .flat_map(|(at, _)| to_ask(&traits[at]).into_iter().map(move |object| (at, object)))
         .collect();
     let objects: Vec<(NodeId, ObjectId)> = questions.iter().map(|&(at, object)| (nodes[at], object)).collect();
-    for (&(at, object), answer) in questions.iter().zip(master.ask(&objects)?) {
-        match answer {
-            Ok(answer) => {
-                traits[at].answers.extend(answer.uploaded.map(|uploaded| (object, uploaded.bytes)));
-            }
-            Err(SdoError { failure: SdoFailure::Refused(_), .. }) => {}
-            Err(error) => return Err(Error::Sdo(error).into()),
-        }
+    for (&(at, object), answer) in questions.iter().zip(ask_optional(master, &objects)?.0) {
+        traits[at].answers.extend(answer.and_then(|answer| answer.uploaded).map(|uploaded| (object, uploaded.bytes)));
     }
     let mut found: Vec<Node> = nodes.iter().map(|&node| Node::new(node)).collect();
     for ((node, identity), traits) in found.iter_mut().zip(identities).zip(&traits) {
@@ -195,7 +193,7 @@ fn read_services<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::St
         .iter()
         .flat_map(|node| objects[..3].iter().map(|&(object, data_type)| (node.id, object, data_type)))
         .collect();
-    let values = read_known(master, &items)?;
+    let values = read_optional(master, &items)?;
     // If a description lists the SYNC object but not 1019h, the device has no SYNC counter.
     let may_count = |node: &Node| match &node.model {
         Some(model) => model.dictionary.has_index(0x1019) || !model.dictionary.has_index(0x1005),
@@ -203,7 +201,7 @@ fn read_services<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::St
     };
     let counting: Vec<usize> = (0..nodes.len()).filter(|&at| may_count(&nodes[at])).collect();
     let items: Vec<Item> = counting.iter().map(|&at| (nodes[at].id, objects[3].0, objects[3].1)).collect();
-    for (&at, value) in counting.iter().zip(read_known(master, &items)?) {
+    for (&at, value) in counting.iter().zip(read_optional(master, &items)?) {
         nodes[at].sync_overflow = small(value.as_ref()).filter(|overflow| (2..=240).contains(overflow));
     }
     for (node, values) in nodes.iter_mut().zip(values.chunks(3)) {

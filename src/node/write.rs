@@ -91,6 +91,7 @@ pub fn write_with(
     data: &[u8],
     options: &mut WriteOptions<'_>,
 ) -> Result<Written, Error> {
+    master.ensure_single(node.id)??;
     let mut attempts_left = master.timing().retries;
     let mut sizes = sizes(node, options.form);
     let mut first_refusal: Option<SdoError> = None;

@@ -105,7 +105,10 @@ impl Cause {
             Cause::Sdo(error) => match error.failure {
                 SdoFailure::Refused(_) => Kind::Refused,
                 SdoFailure::NoAnswer { .. } => Kind::NoAnswer,
+                SdoFailure::NotWritten(_) => Kind::CheckFailed,
                 SdoFailure::Violation(..)
+                | SdoFailure::WrongLength { .. }
+                | SdoFailure::TwoDevices(_)
                 | SdoFailure::NotANumber
                 | SdoFailure::Ambiguous
                 | SdoFailure::Fit(_)

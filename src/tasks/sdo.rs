@@ -4,8 +4,8 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::Note;
 use crate::canopen::value::{DataType, Value};
-use crate::master::transfer::{BlockMode, Moved, read_object};
-use crate::master::{Error, Master};
+use crate::master::transfer::{BlockMode, Moved};
+use crate::master::{Error, Master, Request};
 use crate::node::write::write_with;
 use crate::node::{self, Node, WriteOptions, names, survey};
 use crate::tasks::Failure;
@@ -29,8 +29,17 @@ pub struct ReadValue {
     pub note: Option<Note>,
 }
 
-/// Reads an object. The type is `data_type`, else that of the description or the standard. `progress` is called every
-/// 100 ms.
+/// How an object is read.
+pub struct ReadOptions<'a> {
+    /// When block transfer is used.
+    pub blocks: BlockMode,
+    /// A length other than the announced one is always a failure: the content goes to a file.
+    pub is_exact: bool,
+    /// Called every 100 ms with the bytes transferred.
+    pub progress: &'a mut dyn FnMut(Moved),
+}
+
+/// Reads an object. The type is `data_type`, else that of the description or the standard.
 ///
 /// # Errors
 /// A transfer that failed, bytes that do not fit the type, bus errors and Ctrl-C.
@@ -39,10 +48,11 @@ pub fn read(
     node: &mut Node,
     object: ObjectId,
     data_type: Option<DataType>,
-    (blocks, progress): (BlockMode, &mut dyn FnMut(Moved)),
+    options: &mut ReadOptions<'_>,
 ) -> Result<ReadValue, Failure> {
     let expected = data_type.or_else(|| node.known_type(object));
-    let answer = read_object(master, (node.id, object), expected, blocks, progress)??;
+    let request = Request::read(node.id, object).blocks(options.blocks.for_read(expected)).exact(options.is_exact);
+    let answer = master.carry_out(request, options.progress)??;
     let entry = match data_type {
         Some(_) => node.entry(object),
         None => names::entry(master, node, object)?,
@@ -100,8 +110,8 @@ pub fn write(
 ) -> Result<(), Failure> {
     write_with(master, node, object, data, options)?;
     let Some(data_type) = verify else { return Ok(()) };
-    let progress = &mut *options.progress;
-    let found = read(master, &mut node.clone(), object, Some(data_type), (options.blocks, progress))?.raw;
+    let mut options = ReadOptions { blocks: options.blocks, is_exact: false, progress: &mut *options.progress };
+    let found = read(master, &mut node.clone(), object, Some(data_type), &mut options)?.raw;
     if found == data {
         return Ok(());
     }

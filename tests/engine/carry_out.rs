@@ -157,7 +157,10 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
         }
         Command::SdoRead { node: id, object, how } => {
             let mut node = Node::with_overrides(node(*id), &described(spec, *id, *how));
-            let value = sdo::read(master, &mut node, *object, None, (how.blocks, &mut |_| {}))?;
+            let value = {
+                let mut options = sdo::ReadOptions { blocks: how.blocks, is_exact: false, progress: &mut |_| {} };
+                sdo::read(master, &mut node, *object, None, &mut options)?
+            };
             Claim::Values(vec![(*id, *object, value.raw)])
         }
         Command::SdoWrite { node: id, object, bytes, how } => {

@@ -9,6 +9,7 @@ mod garbage;
 mod log_goes_on;
 mod lss;
 mod nmt;
+mod odd_answers;
 mod pdo_map;
 mod pdo_map_devices;
 mod probe;

@@ -1,13 +1,13 @@
 //! Another master reads the same nodes on the same SDO channels.
 
-use cangauge::bus::Mono;
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
+use cangauge::bus::{BusError, Mono};
 use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::DownloadSize;
 use cangauge::device::catalog::Model;
-use cangauge::master::{Master, Request, SdoFailure, Timing};
+use cangauge::master::{Error, Master, Request, SdoFailure, Timing};
 use cangauge::sim::{Device, Setup};
 use std::sync::Arc;
 use std::time::Duration;
@@ -126,7 +126,11 @@ fn read(object: ObjectId) -> Request {
 
 /// The bytes that are read, or the failure.
 fn outcome(master: &mut Master<'_>, request: Request) -> Result<Vec<u8>, SdoFailure> {
-    let answer = master.transfer_one(request).unwrap();
+    let answer = match master.transfer_one(request) {
+        // Requests of both with the same identifier collide again and again.
+        Err(Error::Bus(BusError::QueueFull)) => return Err(SdoFailure::Disturbed),
+        answer => answer.unwrap(),
+    };
     answer
         .map(|answer| answer.uploaded.map(|uploaded| uploaded.bytes).unwrap_or_default())
         .map_err(|error| error.failure)

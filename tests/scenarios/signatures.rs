@@ -331,7 +331,10 @@ fn values_reported_as_restored_are_factory_defaults() {
         assert!(bus.count("6C6F6164") <= 1, "{place}");
         match result {
             Ok(done) => {
-                assert_eq!(done.verified, Verified::Reset, "{place}");
+                // Without an identity the defaults are unknown, and nothing is compared.
+                let is_identity = |frame: &String| frame.contains("#40081000") || frame.contains("#401810");
+                let may_be_unknown = bus.sent.get(at).is_some_and(is_identity);
+                assert!(done.verified == Verified::Reset || may_be_unknown, "{place}");
                 assert_eq!(bus.look("0x6131:1"), 0x4E_0000u32.to_le_bytes(), "{place}");
                 assert_eq!(bus.look("0x1017"), [0, 0], "{place}");
             }

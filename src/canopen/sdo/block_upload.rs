@@ -172,6 +172,9 @@ impl BlockUpload {
         }
         self.crc = head & 0x04 != 0;
         self.announced = if head & 0x02 != 0 { number(data) } else { None };
+        if head & 0x02 != 0 && self.announced.is_none() {
+            return self.fail(Violation::Short, frame, out);
+        }
         self.state = State::SubBlock { taken: 0, highest: 0, acknowledged: 0, closing: None };
         self.send(0xa3, 0, 0, out);
         Progress::Continue
@@ -254,7 +257,7 @@ impl BlockUpload {
         self.send(0xa1, 0, 0, out);
         let mut bytes = std::mem::take(&mut self.bytes);
         bytes.truncate(length);
-        Progress::Done(Uploaded { bytes, indicated: true, announced: self.announced, misnamed_end: misnamed })
+        Progress::Done(Uploaded { announced: self.announced, misnamed_end: misnamed, ..Uploaded::complete(bytes) })
     }
 
     /// Whether an end frame wrongly declares the whole last segment invalid: the announced size and the CRC

@@ -3,6 +3,7 @@
 //! It is never stricter than sensors in the field, and always reports a deviation.
 
 use super::Uploaded;
+use crate::canopen::frame::Frame;
 use crate::canopen::value::{DataType, Value, WidthError};
 use std::fmt;
 
@@ -41,6 +42,8 @@ pub enum Note {
         /// Bytes delivered.
         found: usize,
     },
+    /// A segment before the last one was not full, twice in the same way.
+    ShortSegment,
     /// The end frame of a block transfer declares the last segment invalid; size and CRC include it.
     MisnamedEnd,
 }
@@ -54,6 +57,7 @@ impl fmt::Display for Note {
             Note::Announced { announced, found } => {
                 write!(f, "the device announced {announced} bytes and delivered {found}")
             }
+            Note::ShortSegment => f.write_str("the device sent a segment in the middle that is not full"),
             Note::MisnamedEnd => {
                 f.write_str("the device calls the last 7 bytes unused; they are kept, since size and CRC include them")
             }
@@ -63,21 +67,27 @@ impl fmt::Display for Note {
 
 /// Bytes that do not fit the type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the device delivered {found} bytes, but {data_type} has {expected}")]
-pub struct FitError {
-    /// The expected type.
-    pub data_type: DataType,
-    /// The size of the type in bytes.
-    pub expected: usize,
-    /// Bytes delivered.
-    pub found: usize,
+pub enum FitError {
+    /// Too few or too many bytes.
+    #[error("the device delivered {found} bytes, but {data_type} has {expected}")]
+    Width {
+        /// The expected type.
+        data_type: DataType,
+        /// The size of the type in bytes.
+        expected: usize,
+        /// Bytes delivered.
+        found: usize,
+    },
+    /// An expedited answer has fewer bytes than it declares, and the type needs the missing ones or is unknown.
+    #[error("the frame has fewer bytes than it declares: {0}")]
+    Truncated(Frame),
 }
 
 /// Converts delivered bytes to `data_type`; with `None` the bytes stay as they are.
 ///
 /// If no size is indicated, the width of the type decides and further bytes are ignored. If a size is indicated, more
 /// bytes than the type has are accepted if the excess is zero or the sign of a negative integer. An integer in fewer
-/// bytes has the same value.
+/// bytes has the same value, unless the length contradicts the announced one.
 ///
 /// # Errors
 /// The bytes do not fit the type.
@@ -85,12 +95,17 @@ pub fn fit(data_type: Option<DataType>, uploaded: &Uploaded) -> Result<Fitted, F
     let found = uploaded.bytes.len();
     let odd = uploaded.announced.filter(|&size| usize::try_from(size) != Ok(found));
     let odd = odd.map(|announced| Note::Announced { announced, found });
+    let odd = odd.or(uploaded.has_short_segment.then_some(Note::ShortSegment));
     let odd = odd.or(uploaded.misnamed_end.then_some(Note::MisnamedEnd));
+    let suffices = |data_type: DataType| data_type.width().is_some_and(|width| width <= found);
+    if let Some(frame) = uploaded.truncated.filter(|_| !data_type.is_some_and(suffices)) {
+        return Err(FitError::Truncated(frame));
+    }
     let Some(data_type) = data_type else {
         let note = if uploaded.indicated { odd } else { Some(Note::SizeNotIndicated) };
         return Ok(Fitted { value: Value::Bytes(uploaded.bytes.clone()), note });
     };
-    let error = |error: WidthError| FitError { data_type, expected: error.expected, found };
+    let error = |error: WidthError| FitError::Width { data_type, expected: error.expected, found };
     let Some(expected) = data_type.width() else {
         return Ok(Fitted { value: data_type.decode(&uploaded.bytes).map_err(error)?, note: odd });
     };
@@ -100,8 +115,8 @@ pub fn fit(data_type: Option<DataType>, uploaded: &Uploaded) -> Result<Fitted, F
             DataType::Integer(_) => u8::try_from(found).ok().map(DataType::Integer),
             _ => None,
         };
-        let narrow = narrow.filter(|_| uploaded.indicated && found > 0);
-        let narrow = narrow.ok_or(FitError { data_type, expected, found })?;
+        let narrow = narrow.filter(|_| uploaded.indicated && found > 0 && !uploaded.has_doubtful_length());
+        let narrow = narrow.ok_or(FitError::Width { data_type, expected, found })?;
         let value = narrow.decode(&uploaded.bytes).map_err(error)?;
         return Ok(Fitted { value, note: Some(Note::Narrower { expected, found }) });
     }
@@ -115,7 +130,7 @@ pub fn fit(data_type: Option<DataType>, uploaded: &Uploaded) -> Result<Fitted, F
         let note = Some(Note::Wider { expected, found });
         return Ok(Fitted { value: data_type.decode(counted).map_err(error)?, note });
     }
-    Err(FitError { data_type, expected, found })
+    Err(FitError::Width { data_type, expected, found })
 }
 
 #[cfg(test)]
@@ -123,7 +138,7 @@ mod tests {
     use super::*;
 
     fn uploaded(bytes: &[u8], indicated: bool) -> Uploaded {
-        Uploaded { bytes: bytes.to_vec(), indicated, announced: None, misnamed_end: false }
+        Uploaded { indicated, ..Uploaded::complete(bytes.to_vec()) }
     }
 
     fn text(data_type: DataType, uploaded: &Uploaded) -> Result<(String, Option<Note>), FitError> {
@@ -167,8 +182,23 @@ mod tests {
 
     #[test]
     fn a_size_that_differs_from_the_announced_one_is_noted() {
-        let answer = Uploaded { bytes: b"MH-4-CAN".to_vec(), indicated: true, announced: Some(9), misnamed_end: false };
+        let answer = Uploaded { announced: Some(9), ..Uploaded::complete(b"MH-4-CAN".to_vec()) };
         let note = Some(Note::Announced { announced: 9, found: 8 });
         assert_eq!(text(DataType::VisibleString, &answer), Ok(("MH-4-CAN".into(), note)));
+        // A number with missing bytes is another number.
+        let answer = Uploaded { announced: Some(4), ..Uploaded::complete(vec![0xfe, 0xff]) };
+        assert!(text(DataType::Integer(4), &answer).is_err());
+        assert!(text(DataType::Integer(2), &answer).is_ok());
+    }
+
+    #[test]
+    fn a_truncated_expedited_answer_is_used_if_the_type_needs_no_more() {
+        let frame = "585#431710002C01".parse().expect("a frame");
+        let answer = Uploaded { truncated: Some(frame), ..Uploaded::complete(vec![0x2c, 0x01]) };
+        assert_eq!(text(DataType::Unsigned(2), &answer), Ok(("300".into(), None)));
+        for data_type in [DataType::Unsigned(4), DataType::Integer(3), DataType::Real32, DataType::VisibleString] {
+            assert_eq!(text(data_type, &answer), Err(FitError::Truncated(frame)), "{data_type}");
+        }
+        assert_eq!(fit(None, &answer), Err(FitError::Truncated(frame)));
     }
 }

@@ -17,8 +17,31 @@ pub struct Uploaded {
     pub indicated: bool,
     /// The size in bytes that a segmented or block transfer announced.
     pub announced: Option<u32>,
+    /// Whether a segment before the last one had fewer than seven bytes.
+    pub has_short_segment: bool,
+    /// The expedited answer, if it has fewer bytes than it declares. The missing bytes are never filled.
+    pub truncated: Option<Frame>,
     /// Whether the end frame of a block transfer declared a segment invalid that size and CRC include. It is kept.
     pub misnamed_end: bool,
+}
+
+impl Uploaded {
+    /// Bytes whose size the server indicated.
+    pub fn complete(bytes: Vec<u8>) -> Uploaded {
+        Uploaded {
+            bytes,
+            indicated: true,
+            announced: None,
+            has_short_segment: false,
+            truncated: None,
+            misnamed_end: false,
+        }
+    }
+
+    /// Whether the length contradicts the announced one or a segment is short in the middle: bytes may be missing.
+    pub fn has_doubtful_length(&self) -> bool {
+        self.has_short_segment || self.announced.is_some_and(|size| usize::try_from(size) != Ok(self.bytes.len()))
+    }
 }
 
 /// An upload in progress.
@@ -29,6 +52,7 @@ pub struct Upload {
     state: State,
     bytes: Vec<u8>,
     announced: Option<u32>,
+    has_short_segment: bool,
     accept_60: bool,
 }
 
@@ -42,7 +66,8 @@ impl Upload {
     /// An upload of `object` from `node`. With `accept_60`, command specifier 60h counts as an answer without a size
     /// ([`crate::device::quirk::Quirk::UploadAnswered60`]).
     pub fn new(node: NodeId, object: ObjectId, accept_60: bool) -> Upload {
-        Upload { node, object, state: State::Initiated, bytes: Vec::new(), announced: None, accept_60 }
+        let (state, bytes) = (State::Initiated, Vec::new());
+        Upload { node, object, state, bytes, announced: None, has_short_segment: false, accept_60 }
     }
 
     /// The request that starts the transfer.
@@ -95,12 +120,7 @@ impl Upload {
         let expedited = command & 0x02 != 0;
         let indicated = command & 0x01 != 0;
         if command == 0x60 && self.accept_60 {
-            return Progress::Done(Uploaded {
-                bytes: data[4..].to_vec(),
-                indicated: false,
-                announced: None,
-                misnamed_end: false,
-            });
+            return Progress::Done(Uploaded { indicated: false, ..Uploaded::complete(data[4..].to_vec()) });
         }
         if command >> 5 != 2 {
             let violation = if command == 0x60 { Violation::WriteAcknowledgeToRead } else { Violation::Command };
@@ -108,17 +128,16 @@ impl Upload {
         }
         if expedited {
             let unused = if indicated { usize::from(command >> 2 & 3) } else { 0 };
-            // A short frame has fewer bytes than it declares. The present bytes are used and never padded.
+            // If a short frame has fewer bytes than it declares, the type decides whether they suffice.
             let end = data.len().min(8 - unused).max(4);
-            return Progress::Done(Uploaded {
-                bytes: data[4..end].to_vec(),
-                indicated,
-                announced: None,
-                misnamed_end: false,
-            });
+            let truncated = (indicated && data.len() < 8 - unused).then_some(*frame);
+            return Progress::Done(Uploaded { indicated, truncated, ..Uploaded::complete(data[4..end].to_vec()) });
         }
-        self.announced = if indicated { number(data) } else { None };
         self.state = State::Segments { toggle: false };
+        self.announced = if indicated { number(data) } else { None };
+        if indicated && self.announced.is_none() {
+            return self.fail(Violation::Short, frame, out);
+        }
         out.push(self.segment_request(false));
         Progress::Continue
     }
@@ -129,15 +148,17 @@ impl Upload {
         }
         let data = frame.data();
         let unused = usize::from(command >> 1 & 7);
-        let end = data.len().min(8 - unused).max(1);
-        self.bytes.extend_from_slice(&data[1..end]);
+        let Some(part) = data.get(1..8 - unused) else { return self.fail(Violation::Short, frame, out) };
+        self.bytes.extend_from_slice(part);
         if self.bytes.len() > LONGEST {
             return self.fail(Violation::TooLong, frame, out);
         }
         if command & 0x01 != 0 {
             let bytes = std::mem::take(&mut self.bytes);
-            return Progress::Done(Uploaded { bytes, indicated: true, announced: self.announced, misnamed_end: false });
+            let (announced, has_short_segment) = (self.announced, self.has_short_segment);
+            return Progress::Done(Uploaded { announced, has_short_segment, ..Uploaded::complete(bytes) });
         }
+        self.has_short_segment |= unused > 0;
         self.state = State::Segments { toggle: !toggle };
         out.push(self.segment_request(!toggle));
         Progress::Continue

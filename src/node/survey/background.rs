@@ -18,6 +18,8 @@ pub struct BackgroundSurvey {
     overrides: Overrides,
     answers: BTreeMap<ObjectId, Result<Answer, SdoError>>,
     pending: BTreeMap<Ticket, ObjectId>,
+    /// Whether the latest object was not answered.
+    is_silent: bool,
 }
 
 /// Why a run of the survey stopped.
@@ -62,7 +64,7 @@ impl BackgroundSurvey {
     pub fn start(node: NodeId, overrides: &Overrides, master: &mut Master<'_>) -> BackgroundSurvey {
         let own = overrides.iter().filter(|(other, _)| **other == node);
         let overrides = own.map(|(&node, model)| (node, model.clone())).collect();
-        let mut survey = BackgroundSurvey { node, overrides, answers: BTreeMap::new(), pending: BTreeMap::new() };
+        let mut survey = BackgroundSurvey { node, overrides, answers: BTreeMap::new(), pending: BTreeMap::new(), is_silent: false };
         // The first run has no answers: it only sends requests.
         let _ = survey.run(master);
         survey
@@ -76,12 +78,14 @@ impl BackgroundSurvey {
         master: &mut Master<'_>,
     ) -> Option<Result<Node, Error>> {
         let object = self.pending.remove(&ticket)?;
-        // A node that does not answer one request is not sent the others.
-        if let Err(error) = result
-            && matches!(error.failure, SdoFailure::NoAnswer { .. })
-        {
+        let error = result.as_ref().err().filter(|error| matches!(error.failure, SdoFailure::NoAnswer { .. }));
+        let was_silent = std::mem::replace(&mut self.is_silent, error.is_some());
+        if let Some(error) = error {
+            // The others are asked again, unless the node is silent twice in a row.
             master.forget(std::mem::take(&mut self.pending).into_keys());
-            return Some(Err(Error::Sdo(error.clone())));
+            if was_silent {
+                return Some(Err(Error::Sdo(error.clone())));
+            }
         }
         self.answers.insert(object, result.clone());
         if self.pending.is_empty() { self.run(master) } else { None }

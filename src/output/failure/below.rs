@@ -2,7 +2,9 @@
 
 use super::{Place, Words};
 use crate::bus::replay::{FileFormat, RecordingError};
+use crate::canopen::id::NodeId;
 use crate::canopen::lss::Service;
+use crate::master::SecondAnswer;
 use crate::tasks::failure::{BusError, ExpressionError, LssError, Operation, SdoError, SdoFailure};
 use std::path::Path;
 
@@ -77,14 +79,28 @@ pub(super) fn sdo(error: &SdoError) -> Words {
                 _ => words,
             }
         }
+        SdoFailure::TwoDevices(_) | SdoFailure::NotWritten(_) => words.hint(format!(
+            "disconnect one of them, or give one another node-ID: cangauge lss scan; to see both answers: cangauge \
+             scan {} --trace -",
+            error.node
+        )),
         SdoFailure::Disturbed => words.hint("stop the other program for a moment, or try again"),
         SdoFailure::NoAnswer { .. }
         | SdoFailure::Refused(_)
         | SdoFailure::Violation(..)
+        | SdoFailure::WrongLength { .. }
         | SdoFailure::NotANumber
         | SdoFailure::Ambiguous
         | SdoFailure::Cancelled => words,
     }
+}
+
+/// A node sent two answers to one request.
+pub fn second_answer(node: NodeId, answers: SecondAnswer) -> String {
+    if answers.differs() {
+        return format!("node {node}: {}", SdoFailure::TwoDevices(Some(answers)));
+    }
+    format!("node {node}: answers arrive twice: two devices have node-ID {node}, or a bridge repeats frames")
 }
 
 /// An LSS service failed.

@@ -18,6 +18,8 @@ mod scan;
 pub(super) mod settings;
 pub(super) mod store;
 
+pub use below::second_answer;
+
 use super::json;
 use super::notes::{NoteText, effect};
 use crate::canopen::id::NodeId;

@@ -1,0 +1,200 @@
+//! One SDO transfer in progress.
+
+use super::Timing;
+use super::foreign_traffic::ForeignTraffic;
+use super::machine::Machine;
+use super::request::{Operation, Request, SdoError, SdoFailure, Ticket};
+use super::send::Outgoing;
+use super::transfer::{Blocks, TransferKind, is_about_object};
+use crate::bus::{Mono, Received};
+use crate::canopen::frame::Frame;
+use crate::canopen::object::ObjectId;
+use crate::canopen::sdo::{AbortCode, TransferError, Uploaded};
+use std::time::Duration;
+
+/// A transfer in progress.
+#[derive(Debug)]
+pub(super) struct Active {
+    pub(super) ticket: Ticket,
+    pub(super) request: Request,
+    pub(super) machine: Machine,
+    /// Set when our last frame was sent. Other traffic never extends it.
+    pub(super) deadline: Option<Mono>,
+    /// The number of our frames that still wait to be sent.
+    pub(super) unsent: usize,
+    pub(super) attempts_left: u32,
+    /// When the first request was sent. Earlier frames do not answer it.
+    pub(super) asked_at: Option<Mono>,
+    pub(super) foreign: ForeignTraffic,
+    /// The caller's transfer. It waits while this one, a barrier read, makes sure that no stale answer is pending.
+    pub(super) deferred: Option<(Ticket, Request)>,
+    /// Another master wrote the same object. Its acknowledge looks like ours.
+    pub(super) ambiguous: bool,
+    /// The bytes of a first read whose length is doubtful. The object is read once more.
+    pub(super) doubtful: Option<Vec<u8>>,
+    /// The request was sent more than once, so more than one answer may come.
+    pub(super) is_repeated: bool,
+}
+
+/// What follows from the end of a read.
+pub(super) enum Verdict {
+    /// The bytes are the answer.
+    Accepted,
+    /// The object is read once more.
+    Again,
+    /// The length is wrong.
+    WrongLength,
+}
+
+impl Active {
+    pub(super) fn new(ticket: Ticket, request: Request, accept_60: bool, timing: &Timing) -> Active {
+        // If the server does not answer a block request, the next request is a segmented one, not a retry.
+        let attempts = if request.falls_back() { 0 } else { timing.retries };
+        let attempts_left = if request.repeatable { attempts } else { 0 };
+        let machine = request.machine(accept_60);
+        let (deadline, asked_at, deferred) = (None, None, None);
+        let foreign = ForeignTraffic::default();
+        Active {
+            ticket,
+            request,
+            machine,
+            deadline,
+            unsent: 0,
+            attempts_left,
+            asked_at,
+            foreign,
+            deferred,
+            ambiguous: false,
+            doubtful: None,
+            is_repeated: false,
+        }
+    }
+
+    /// Judges the length of the bytes read. If it contradicts the announced one, the object is read once more. The same
+    /// bytes are then accepted, with a note.
+    pub(super) fn judge(&mut self, uploaded: Option<&Uploaded>, accept_60: bool) -> Verdict {
+        let Some(uploaded) = uploaded else { return Verdict::Accepted };
+        match self.doubtful.take() {
+            None if uploaded.has_doubtful_length() => {
+                self.doubtful = Some(uploaded.bytes.clone());
+                self.machine = self.request.machine(accept_60);
+                self.asked_at = None;
+                Verdict::Again
+            }
+            Some(first) if first != uploaded.bytes || self.request.is_exact => Verdict::WrongLength,
+            None | Some(_) => Verdict::Accepted,
+        }
+    }
+
+    /// The failure of a transfer that unexpected frames disturbed.
+    pub(super) fn disturbance(&self) -> SdoFailure {
+        if self.foreign.is_requested() { SdoFailure::Disturbed } else { SdoFailure::TwoDevices(None) }
+    }
+
+    /// Queues frames for sending. They replace frames of this transfer that are still in the queue.
+    pub(super) fn enqueue(&mut self, frames: Vec<Frame>, outgoing: &mut Outgoing) {
+        if self.unsent > 0 {
+            outgoing.drop_ticket(self.ticket);
+        }
+        self.unsent = frames.len();
+        self.deadline = None;
+        for frame in frames {
+            outgoing.push(frame, Some(self.ticket));
+        }
+    }
+
+    /// Whether a frame answers a segment that still waits to be sent. Then it comes from another device with the same
+    /// node-ID. Not checked for an initiate, which may be a retry of an answered one, and for an abort, which may come
+    /// at any time.
+    pub(super) fn is_answered_before_sent(&self, frame: &Frame) -> bool {
+        let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
+        self.unsent > 0 && in_segments && frame.data().first() != Some(&0x80)
+    }
+
+    /// Waits for a foreign transfer to end, then restarts; `false` if the transfer must not be repeated or the time for
+    /// that is over. No abort is sent, because it would end the foreign transfer.
+    pub(super) fn back_off(&mut self, accept_60: bool, now: Mono, timing: &Timing, outgoing: &mut Outgoing) -> bool {
+        let limit = self.timeout(timing) * (1 + timing.retries);
+        if !self.request.repeatable || !self.foreign.back_off(now, limit) {
+            return false;
+        }
+        self.enqueue(Vec::new(), outgoing);
+        self.machine = self.request.machine(accept_60);
+        self.asked_at = None;
+        self.deadline = self.foreign.back_off_until();
+        true
+    }
+
+    /// Records a foreign frame. Whether our transfer can continue.
+    pub(super) fn record_foreign(
+        &mut self,
+        accept_60: bool,
+        received: &Received,
+        timing: &Timing,
+        outgoing: &mut Outgoing,
+    ) -> bool {
+        let now = received.at.mono;
+        self.foreign.record(&received.frame, now);
+        if let Some(until) = self.foreign.back_off_until() {
+            self.deadline = Some(until);
+            return true;
+        }
+        let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
+        !in_segments || !self.foreign.conflicts() || self.back_off(accept_60, now, timing, outgoing)
+    }
+
+    /// Whether the segmented transfer that has just ended may contain foreign segments.
+    pub(super) fn is_suspect(&self, uploaded: Option<&Uploaded>) -> bool {
+        let in_segments = self.machine.has_begun() && !self.machine.is_in_blocks();
+        let delivered = uploaded.map_or(0, |uploaded| uploaded.bytes.len());
+        in_segments && self.foreign.is_suspect(uploaded.and_then(|uploaded| uploaded.announced), delivered)
+    }
+
+    /// Restarts a segmented upload of a large object as a block upload.
+    pub(super) fn restart_in_blocks(&mut self, accept_60: bool, out: &mut Vec<Frame>) {
+        out.clear();
+        self.machine.abort(AbortCode::GENERAL, out);
+        self.request.blocks = Blocks::First { threshold: 0 };
+        self.attempts_left = 0;
+        self.machine = self.request.machine(accept_60);
+        out.push(self.machine.request());
+    }
+
+    /// Whether the transfer failed only because the server does not support block transfer.
+    pub(super) fn lacks_block_transfer(&self, error: TransferError) -> bool {
+        // An abort code about the object itself would come again. A write with an unknown answer may have had an
+        // effect and is not repeated.
+        let refused = match error {
+            TransferError::Aborted(code) => !is_about_object(code),
+            TransferError::Violation(..) => self.request.operation() == Operation::Read,
+            TransferError::NoAnswer => false,
+        };
+        refused && self.request.falls_back() && !self.machine.has_begun()
+    }
+
+    pub(super) fn way(&self) -> TransferKind {
+        if self.machine.is_in_blocks() {
+            TransferKind::Blocks
+        } else if self.request.refused_blocks {
+            TransferKind::PlainFallback
+        } else {
+            TransferKind::Plain
+        }
+    }
+
+    pub(super) fn timeout(&self, timing: &Timing) -> Duration {
+        self.request.timeout.unwrap_or(timing.timeout)
+    }
+
+    pub(super) fn error(&self, failure: SdoFailure) -> SdoError {
+        SdoError { node: self.request.node, object: self.request.object, operation: self.request.operation(), failure }
+    }
+
+    /// Records a request of another master. If it writes the same object, an acknowledge may be for either of us.
+    pub(super) fn record_request(&mut self, frame: &Frame) {
+        if let [command, a, b, c, ..] = frame.data() {
+            let same = ObjectId::from_multiplexer([*a, *b, *c]) == self.request.object;
+            self.ambiguous |= same && command >> 5 == 1 && self.request.operation() == Operation::Write;
+        }
+    }
+}

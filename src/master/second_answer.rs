@@ -1,0 +1,275 @@
+//! Detects a second answer to one request: two devices with one node-ID, or a bridge that repeats frames.
+//!
+//! A server answers each request once. Requests of another master and repeated requests cause further answers as well,
+//! so no conclusion is drawn from these.
+
+use super::request::Operation;
+use crate::bus::Mono;
+use crate::canopen::frame::Frame;
+use crate::canopen::object::ObjectId;
+use std::collections::{BTreeSet, VecDeque};
+use std::time::Duration;
+
+/// How long answers may belong to a request of another master.
+const FOREIGN_ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// The longest wait for a second answer.
+const LONGEST_WAIT: Duration = Duration::from_millis(20);
+
+/// The number of earlier answers that are recognised if they arrive once more.
+const HISTORY: usize = 16;
+
+/// What happens if two devices answer with one node-ID.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OnTwoDevices {
+    /// Transfers with it fail.
+    #[default]
+    Fail,
+    /// The same, and the failure says that nothing was written: for commands that write.
+    RefuseWrites,
+    /// Transfers continue, and the object with two answers is unknown: for scans, which report it.
+    Report,
+}
+
+/// Two answers to one request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SecondAnswer {
+    /// The answer that was used.
+    pub first: Frame,
+    /// The other one.
+    pub second: Frame,
+}
+
+impl SecondAnswer {
+    /// The object.
+    pub(super) fn object(self) -> Option<ObjectId> {
+        multiplexer(&self.second)
+    }
+
+    /// Whether the answers differ, so that they come from two devices.
+    pub fn differs(self) -> bool {
+        self.first != self.second
+    }
+}
+
+/// The answers of one node.
+#[derive(Debug, Default)]
+pub(super) struct Answers {
+    /// The first frame of the latest answer, and what it answers.
+    initial: Option<(Frame, Operation)>,
+    /// The latest frame that was used.
+    latest: Option<Frame>,
+    /// Whether `initial` may be a late repetition of an earlier answer.
+    is_ambiguous: bool,
+    /// Earlier values of `initial`.
+    history: VecDeque<Frame>,
+    /// Objects whose request was repeated or dropped. More than one answer may come.
+    repeated: BTreeSet<ObjectId>,
+    foreign_until: Option<Mono>,
+    finding: Option<SecondAnswer>,
+    /// When a second answer to the latest request would have arrived.
+    wait_until: Option<Mono>,
+    /// Whether the time for a second answer has passed once without one.
+    is_single: bool,
+    /// Whether [`Answers::needs_check`] was called.
+    is_checked: bool,
+}
+
+impl Answers {
+    /// The differing answers, else the repeated one.
+    pub(super) fn finding(&self) -> Option<SecondAnswer> {
+        self.finding
+    }
+
+    pub(super) fn differing(&self) -> Option<SecondAnswer> {
+        self.finding.filter(|finding| finding.differs())
+    }
+
+    /// Whether the node must be asked for its serial number before the first write: nothing is known of it, or its
+    /// answers arrive twice. `true` only once.
+    pub(super) fn needs_check(&mut self) -> bool {
+        let is_first = !std::mem::replace(&mut self.is_checked, true);
+        is_first && (self.latest.is_none() || self.finding.is_some())
+    }
+
+    /// The request for this object was repeated or dropped.
+    pub(super) fn on_repeated(&mut self, object: ObjectId) {
+        self.repeated.insert(object);
+    }
+
+    /// Another master sent a request.
+    pub(super) fn on_foreign_request(&mut self, at: Mono) {
+        self.foreign_until = Some(at + FOREIGN_ANSWER_TIMEOUT);
+    }
+
+    /// A frame was used as an answer; `asked_at` is given if it is the first one of its transfer.
+    pub(super) fn on_answer(&mut self, frame: Frame, operation: Operation, asked_at: Option<Mono>, at: Mono) {
+        self.latest = Some(frame);
+        let Some(asked_at) = asked_at else { return };
+        // The time for a second answer to the previous request is over.
+        self.is_single |= self.initial.is_some() && self.wait_until.is_none_or(|until| until <= at);
+        self.is_ambiguous = self.history.contains(&frame);
+        self.initial = Some((frame, operation));
+        self.history.push_back(frame);
+        if self.history.len() > HISTORY {
+            self.history.pop_front();
+        }
+        let wait = (at.since(asked_at) * 2 + Duration::from_millis(2)).min(LONGEST_WAIT);
+        self.wait_until = Some(at + wait);
+    }
+
+    /// Whether this frame repeats the latest one and answers nothing: a segment whose successor is expected, or an
+    /// answer to the previous request, which was of another kind.
+    pub(super) fn is_repetition(&self, frame: &Frame, operation: Operation, is_in_segments: bool, at: Mono) -> bool {
+        let is_other = self.initial.is_some_and(|(_, previous)| previous != operation);
+        self.latest == Some(*frame) && (is_in_segments || is_other) && !self.may_be_foreign(at)
+    }
+
+    fn may_be_foreign(&self, at: Mono) -> bool {
+        self.foreign_until.is_some_and(|until| at < until)
+    }
+
+    /// A frame that answers nothing. Whether it is a second answer.
+    pub(super) fn on_unexpected(&mut self, frame: &Frame, at: Mono) -> bool {
+        let Some((initial, operation)) = self.initial else { return false };
+        let object = multiplexer(frame);
+        if self.may_be_foreign(at) || object.is_some_and(|object| self.repeated.contains(&object)) {
+            return false;
+        }
+        if self.latest == Some(*frame) || self.history.contains(frame) {
+            self.finding.get_or_insert(SecondAnswer { first: *frame, second: *frame });
+            return true;
+        }
+        let is_second = object.is_some() && object == multiplexer(&initial) && answers(frame, operation, &initial);
+        if is_second && !self.is_ambiguous && self.differing().is_none() {
+            self.finding = Some(SecondAnswer { first: initial, second: *frame });
+        }
+        is_second
+    }
+
+    /// Until when a second answer may arrive; `None` if the node is known to be single.
+    pub(super) fn wait_until(&self) -> Option<Mono> {
+        self.wait_until.filter(|_| !self.is_single || self.finding.is_some())
+    }
+
+    /// The time until `now` has passed.
+    pub(super) fn on_waited(&mut self, now: Mono) {
+        if self.wait_until.is_some_and(|until| until <= now) {
+            self.wait_until = None;
+            self.is_single = true;
+        }
+    }
+}
+
+fn multiplexer(frame: &Frame) -> Option<ObjectId> {
+    match frame.data() {
+        [_, a, b, c, ..] => Some(ObjectId::from_multiplexer([*a, *b, *c])),
+        _ => None,
+    }
+}
+
+/// Whether a frame has the form of an answer to the request that `initial` answers.
+fn answers(frame: &Frame, operation: Operation, initial: &Frame) -> bool {
+    let command = |frame: &Frame| frame.data().first().copied().unwrap_or_default();
+    // A server may abort a segmented transfer that it began.
+    let is_whole = operation == Operation::Write || command(initial) & 0x02 != 0 || command(initial) == 0x80;
+    match (command(frame), operation) {
+        (0x80, _) => is_whole,
+        (0x60, Operation::Write) => true,
+        (0x60, Operation::Read) => command(initial) == 0x60,
+        (other, Operation::Read) => other >> 5 == 2,
+        (_, Operation::Write) => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(millis: u64) -> Mono {
+        Mono::at(Duration::from_millis(millis))
+    }
+
+    fn frame(text: &str) -> Frame {
+        text.parse().expect("a frame")
+    }
+
+    /// Answers to one request each, at 10, 20, … ms.
+    fn after(answers: &[(&str, Operation)]) -> Answers {
+        let mut log = Answers::default();
+        for (at, &(text, operation)) in (1..).zip(answers) {
+            log.on_answer(frame(text), operation, Some(ms(at * 10 - 1)), ms(at * 10));
+        }
+        log
+    }
+
+    const SERIAL: &str = "585#4318100434120000";
+    const OTHER_SERIAL: &str = "585#4318100499880000";
+
+    #[test]
+    fn a_differing_second_answer_shows_two_devices() {
+        for (first, second, operation) in [
+            (SERIAL, OTHER_SERIAL, Operation::Read),
+            (SERIAL, "585#8018100411000906", Operation::Read),
+            ("585#8018100411000906", SERIAL, Operation::Read),
+            ("585#4108100008000000", "585#4108100003000000", Operation::Read),
+            ("585#6017100000000000", "585#8017100022000008", Operation::Write),
+        ] {
+            let mut log = after(&[(first, operation)]);
+            assert!(log.on_unexpected(&frame(second), ms(11)), "{second}");
+            let expected = SecondAnswer { first: frame(first), second: frame(second) };
+            assert_eq!(log.differing(), Some(expected), "{second}");
+        }
+    }
+
+    #[test]
+    fn a_repeated_answer_is_no_proof_of_two_devices() {
+        let mut log = after(&[(SERIAL, Operation::Read), ("585#4F01100000000000", Operation::Read)]);
+        for late in [SERIAL, "585#4F01100000000000"] {
+            assert!(log.on_unexpected(&frame(late), ms(21)));
+        }
+        assert!(log.finding().is_some() && log.differing().is_none());
+        // The first answer to the second request may be the late one to the first request.
+        let mut log = after(&[(SERIAL, Operation::Read), (SERIAL, Operation::Read)]);
+        assert!(log.on_unexpected(&frame(OTHER_SERIAL), ms(21)));
+        assert_eq!(log.differing(), None);
+    }
+
+    #[test]
+    fn other_answers_prove_nothing() {
+        let mut log = after(&[(SERIAL, Operation::Read)]);
+        // Another object, an acknowledge of an earlier write, a segment.
+        for other in ["585#4318100134120000", "585#6018100400000000", "585#0018100400000000", "585#"] {
+            assert!(!log.on_unexpected(&frame(other), ms(11)), "{other}");
+        }
+        log.on_foreign_request(ms(11));
+        assert!(!log.on_unexpected(&frame(OTHER_SERIAL), ms(900)));
+        let mut log = after(&[(SERIAL, Operation::Read)]);
+        log.on_repeated(ObjectId::new(0x1018, 4));
+        assert!(!log.on_unexpected(&frame(OTHER_SERIAL), ms(11)));
+        assert_eq!(log.finding(), None);
+    }
+
+    #[test]
+    fn a_repetition_ends_no_later_transfer() {
+        let acknowledge = "585#6017100000000000";
+        let log = after(&[(acknowledge, Operation::Write)]);
+        assert!(log.is_repetition(&frame(acknowledge), Operation::Read, false, ms(11)));
+        assert!(!log.is_repetition(&frame(acknowledge), Operation::Write, false, ms(11)));
+        assert!(!log.is_repetition(&frame("585#6017100100000000"), Operation::Read, false, ms(11)));
+        assert!(log.is_repetition(&frame(acknowledge), Operation::Write, true, ms(11)));
+    }
+
+    #[test]
+    fn the_wait_for_a_second_answer_is_short_and_comes_once() {
+        let mut log = after(&[(SERIAL, Operation::Read)]);
+        assert_eq!(log.wait_until(), Some(ms(14)), "twice the answer time, and 2 ms");
+        log.on_waited(ms(14));
+        log.on_answer(frame(SERIAL), Operation::Read, Some(ms(30)), ms(31));
+        assert_eq!(log.wait_until(), None);
+        // With repeated answers, every value is compared.
+        assert!(log.on_unexpected(&frame(SERIAL), ms(32)));
+        assert_eq!(log.wait_until(), Some(ms(35)));
+        assert!(Answers::default().needs_check());
+    }
+}

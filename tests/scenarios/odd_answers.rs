@@ -1,0 +1,247 @@
+//! Answers of the wrong length, and more than one answer to a request.
+
+use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
+use cangauge::bus::time::Mono;
+use cangauge::canopen::frame::Frame;
+use cangauge::canopen::id::NodeId;
+use cangauge::canopen::object::ObjectId;
+use cangauge::canopen::sdo::{DownloadSize, Note, Violation};
+use cangauge::canopen::value::{DataType, Value};
+use cangauge::master::{Answer, Blocks, Error, Master, OnTwoDevices, Request, SdoError, SdoFailure, Timing};
+use cangauge::node::survey::identify;
+use cangauge::node::{self, Node, Overrides, write};
+use std::time::Duration;
+
+const NAME: ObjectId = ObjectId::new(0x1008, 0);
+const SERIAL: ObjectId = ObjectId::new(0x1018, 4);
+const HEARTBEAT: ObjectId = ObjectId::new(0x1017, 0);
+
+/// What follows one request: the start of the request, and the answers to it.
+type Step = (&'static str, &'static [&'static str]);
+
+/// A server that answers by a list. A step is used once, except the last one for a request.
+struct Script(Vec<Step>);
+
+impl Station for Script {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+        let text = frame.to_string();
+        let Some(at) = self.0.iter().position(|(request, _)| text.starts_with(request)) else { return };
+        let (request, answers) = self.0[at];
+        if self.0[at + 1..].iter().any(|(other, _)| *other == request) {
+            self.0.remove(at);
+        }
+        for answer in answers {
+            out.send(answer.parse().expect("a frame"));
+        }
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+fn node() -> NodeId {
+    NodeId::new(5).expect("a node-ID")
+}
+
+/// Runs `work` with a server.
+fn with<T>(steps: &[Step], work: impl FnOnce(&mut Master<'_>) -> T) -> T {
+    let mut bus = MemoryBus::new(Clock::Virtual).with_bit_rate(1_000_000);
+    bus.attach(Script(steps.to_vec()));
+    let timing = Timing { timeout: Duration::from_millis(100), retries: 0 };
+    let mut master = Master::new(&mut bus, timing);
+    work(&mut master)
+}
+
+fn read(steps: &[Step], request: Request) -> Result<Answer, SdoError> {
+    with(steps, |master| master.transfer_one(request).expect("the bus works"))
+}
+
+fn value(answer: &Answer, data_type: Option<DataType>) -> Result<(Value, Option<Note>), SdoError> {
+    answer.value(node(), NAME, data_type)
+}
+
+const ASK_NAME: &str = "605#400810";
+const FIRST: &str = "605#60";
+const ABC: &[&str] = &["585#0941424300000000"];
+
+#[test]
+fn shorter_than_announced_is_accepted_if_read_twice_alike() {
+    let steps: [Step; 2] = [(ASK_NAME, &["585#4108100064000000"]), (FIRST, ABC)];
+    let answer = read(&steps, Request::read(node(), NAME)).expect("the same bytes come twice");
+    let expected = (Value::Text("ABC".to_owned()), Some(Note::Announced { announced: 100, found: 3 }));
+    assert_eq!(value(&answer, Some(DataType::VisibleString)), Ok(expected));
+    // A number with missing bytes has no value.
+    assert!(value(&answer, Some(DataType::Unsigned(4))).is_err());
+    // A file never gets them.
+    let error = read(&steps, Request::read(node(), NAME).exact(true)).expect_err("3 of 100 bytes");
+    let frame = ABC[0].parse().expect("a frame");
+    assert_eq!(error.failure, SdoFailure::WrongLength { announced: Some(100), delivered: 3, frame });
+}
+
+#[test]
+fn other_bytes_in_the_second_read_are_no_value() {
+    for (first, second) in [(ABC, &["585#0941424400000000"] as &[&str]), (&["585#0741424344000000"], ABC)] {
+        let steps: [Step; 3] = [(ASK_NAME, &["585#4108100064000000"]), (FIRST, first), (FIRST, second)];
+        let error = read(&steps, Request::read(node(), NAME)).expect_err("the bytes differ");
+        assert!(matches!(error.failure, SdoFailure::WrongLength { announced: Some(100), .. }), "{error}");
+    }
+}
+
+#[test]
+fn short_segment_in_the_middle_is_read_again() {
+    let steps: [Step; 3] = [
+        (ASK_NAME, &["585#4008100000000000"]),
+        (FIRST, &["585#0841424300000000"]),
+        ("605#70", &["585#1944454600000000"]),
+    ];
+    let answer = read(&steps, Request::read(node(), NAME)).expect("the same bytes come twice");
+    let expected = (Value::Text("ABCDEF".to_owned()), Some(Note::ShortSegment));
+    assert_eq!(value(&answer, Some(DataType::VisibleString)), Ok(expected));
+}
+
+#[test]
+fn frame_with_fewer_bytes_than_it_declares_is_no_value() {
+    let initiate: Step = (ASK_NAME, &["585#4108100008000000"]);
+    for steps in [
+        vec![initiate, (FIRST, &["585#004D482D"])],
+        vec![initiate, (FIRST, &["585#01414243444546"])],
+        vec![initiate, (FIRST, &["585#"]), ("605#70", ABC)],
+        vec![(ASK_NAME, &["585#41081000"]), (FIRST, ABC)],
+        vec![(ASK_NAME, &["585#4108100008"]), (FIRST, ABC)],
+    ] {
+        let error = read(&steps, Request::read(node(), NAME)).expect_err("bytes are missing");
+        let is_short = matches!(error.failure, SdoFailure::Violation(Violation::Short, _));
+        let is_empty = matches!(error.failure, SdoFailure::NoAnswer { .. });
+        assert!(is_short || is_empty, "{error}");
+    }
+    // Without padding, and complete.
+    let steps: [Step; 2] = [(ASK_NAME, &["585#4108100003000000"]), (FIRST, &["585#09414243"])];
+    let answer = read(&steps, Request::read(node(), NAME)).expect("complete");
+    assert_eq!(value(&answer, None), Ok((Value::Bytes(b"ABC".to_vec()), None)));
+    let answer = read(&[("605#401710", &["585#4B171000E803"])], Request::read(node(), HEARTBEAT)).expect("complete");
+    assert_eq!(value(&answer, None), Ok((Value::Bytes(vec![0xe8, 3]), None)));
+}
+
+#[test]
+fn block_of_another_length_than_announced_is_read_again() {
+    const LAST: &str = "585#8141424344454647";
+    let steps: [Step; 4] = [
+        ("605#A40810", &["585#C208100064000000"]),
+        ("605#A3", &[LAST]),
+        ("605#A2", &["585#C100000000000000"]),
+        ("605#A2", &["585#C500000000000000"]),
+    ];
+    let request = || Request::read(node(), NAME).blocks(Blocks::Only);
+    let error = read(&steps, request()).expect_err("7 bytes, then 6");
+    assert!(matches!(error.failure, SdoFailure::WrongLength { announced: Some(100), delivered: 6, .. }), "{error}");
+    assert!(read(&steps[..3], request()).is_ok_and(|answer| answer.uploaded.is_some_and(|read| read.bytes.len() == 7)));
+}
+
+const TWICE_SERIAL: &[&str] = &["585#4318100434120000", "585#4318100434120000"];
+const TWO_SERIALS: &[&str] = &["585#4318100434120000", "585#4318100499880000"];
+const ACKNOWLEDGED_TWICE: &[&str] = &["585#6017100000000000", "585#6017100000000000"];
+const WRITES: &str = "605#2B171000";
+
+#[test]
+fn answers_that_arrive_twice_disturb_nothing() {
+    let steps: [Step; 5] = [
+        ("605#40181004", TWICE_SERIAL),
+        (ASK_NAME, &["585#410810000A000000", "585#410810000A000000"]),
+        (FIRST, &["585#0041424344454647", "585#0041424344454647"]),
+        ("605#70", &["585#1941424300000000", "585#1941424300000000"]),
+        (WRITES, ACKNOWLEDGED_TWICE),
+    ];
+    let steps = [&steps[..], &[("605#401710", &["585#4B171000F4010000", "585#4B171000F4010000"] as &[&str])]].concat();
+    with(&steps, |master| {
+        let bytes = |answer: Answer| answer.uploaded.map(|read| read.bytes).unwrap_or_default();
+        let read = |master: &mut Master<'_>, object| master.transfer_one(Request::read(node(), object)).expect("bus");
+        assert_eq!(read(master, NAME).map(bytes).as_deref(), Ok(b"ABCDEFGABC" as &[u8]));
+        let written = write::write_and_verify(master, &Node::new(node()), HEARTBEAT, &[0xf4, 1], DataType::Unsigned(2));
+        assert!(written.is_ok(), "{written:?}");
+        assert_eq!(read(master, SERIAL).map(bytes).as_deref(), Ok(b"\x34\x12\0\0" as &[u8]));
+        let found = master.second_answers();
+        assert!(matches!(found[..], [(_, answers)] if !answers.differs()), "{found:?}");
+    });
+}
+
+#[test]
+fn two_devices_get_no_write() {
+    // The first request of the command is the write; the serial numbers are compared before it.
+    let steps: [Step; 2] = [("605#40181004", TWO_SERIALS), (WRITES, ACKNOWLEDGED_TWICE)];
+    with(&steps, |master| {
+        master.set_on_two_devices(OnTwoDevices::RefuseWrites);
+        match write::write(master, &Node::new(node()), HEARTBEAT, &[0xf4, 1]) {
+            Err(node::Error::Sdo(error)) => assert!(matches!(error.failure, SdoFailure::NotWritten(_)), "{error}"),
+            other => panic!("{other:?}"),
+        }
+        let error = master.transfer_one(Request::write(node(), HEARTBEAT, vec![1, 0], DownloadSize::Indicated));
+        assert!(error.expect("the bus works").is_err());
+    });
+}
+
+#[test]
+fn differing_answers_are_no_value_in_any_transfer() {
+    for answers in [
+        TWO_SERIALS,
+        &["585#4318100434120000", "585#8018100411000906"],
+        &["585#4218100401000000", "585#4218100402000000"],
+    ] {
+        let error = read(&[("605#40181004", answers)], Request::read(node(), SERIAL)).expect_err("two devices");
+        assert!(matches!(error.failure, SdoFailure::TwoDevices(Some(_))), "{error}");
+    }
+    // Two names: the segments of both devices arrive.
+    let steps: [Step; 3] = [
+        (ASK_NAME, &["585#4108100008000000", "585#4108100003000000"]),
+        (FIRST, &["585#0041424344454647", "585#0958595A00000000"]),
+        ("605#70", &["585#0D41000000000000"]),
+    ];
+    let error = read(&steps, Request::read(node(), NAME)).expect_err("two devices");
+    assert!(matches!(error.failure, SdoFailure::TwoDevices(_)), "{error}");
+}
+
+/// The identity of a device that answers 1000h, vendor, product, revision and name, except as `odd` says.
+fn identity_with(odd: &[Step]) -> Result<Vec<Node>, Error> {
+    let steps: [Step; 7] = [
+        ("605#40001000", &["585#4300100094010200"]),
+        ("605#40181001", &["585#4318100199090000"]),
+        ("605#40181002", &["585#4318100202000000"]),
+        ("605#40181003", &["585#4318100303000000"]),
+        ("605#40181004", &["585#4318100404000000"]),
+        (ASK_NAME, &["585#4108100003000000"]),
+        (FIRST, ABC),
+    ];
+    let is_odd = |step: &&Step| odd.iter().any(|(request, _)| *request == step.0);
+    let steps: Vec<Step> = odd.iter().chain(steps.iter().filter(|step| !is_odd(step))).copied().collect();
+    with(&steps, |master| identify(master, &[node()], &Overrides::new()))
+}
+
+#[test]
+fn optional_object_that_fails_is_unknown() {
+    let name: &[Step] = &[(ASK_NAME, &[])];
+    let toggled: &[Step] = &[(FIRST, &["585#1141424344454600"])];
+    let product: &[Step] = &[("605#40181002", &[])];
+    let refused: &[Step] = &[("605#40181002", &["585#8018100211000906"])];
+    let short: &[Step] = &[("605#40181002", &["585#43181002"])];
+    for (odd, has_name, has_product) in [
+        (name, false, true),
+        (toggled, false, true),
+        (product, true, false),
+        (refused, true, false),
+        (short, true, false),
+    ] {
+        let node = identity_with(odd).expect("one object stops nothing").pop().expect("a node");
+        let identity = &node.identity;
+        assert_eq!((identity.device_type, identity.vendor), (Some(0x0002_0194), Some(0x999)), "{odd:?}");
+        assert_eq!((identity.revision, identity.serial), (Some(3), Some(4)), "{odd:?}");
+        assert_eq!((identity.name.is_some(), identity.product.is_some()), (has_name, has_product), "{odd:?}");
+    }
+    let dead: Vec<Step> = (1..=4).map(|_| ("605#401810", &[] as &[&str])).collect();
+    assert!(identity_with(&dead).is_err(), "silent to everything else");
+}
