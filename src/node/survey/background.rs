@@ -64,7 +64,8 @@ impl BackgroundSurvey {
     pub fn start(node: NodeId, overrides: &Overrides, master: &mut Master<'_>) -> BackgroundSurvey {
         let own = overrides.iter().filter(|(other, _)| **other == node);
         let overrides = own.map(|(&node, model)| (node, model.clone())).collect();
-        let mut survey = BackgroundSurvey { node, overrides, answers: BTreeMap::new(), pending: BTreeMap::new(), is_silent: false };
+        let mut survey =
+            BackgroundSurvey { node, overrides, answers: BTreeMap::new(), pending: BTreeMap::new(), is_silent: false };
         // The first run has no answers: it only sends requests.
         let _ = survey.run(master);
         survey
