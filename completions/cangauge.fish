@@ -62,6 +62,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "minmax" -d 'Show 
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "errors" -d 'Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "bus" -d 'List CAN interfaces, bring them up and down, find the bit rate of a bus'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "pdo" -d 'Show, change and watch the transmit PDOs of nodes'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "config" -d 'Show all settings of a device as a file, compare them with a file, and set them from a file'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "autozero" -d 'Set the zero of a channel (6125h), with checks before and after'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "zero" -d 'Set the zero of a channel (6125h), with checks before and after'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "store" -d 'Save settings to non-volatile memory (1010h)'
@@ -1114,6 +1115,110 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from help" -f -a "map" -d 'Set the mapping and the transmission of a TPDO'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from help" -f -a "watch" -d 'Show received TPDOs, decoded, until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l ignore-lock -d 'Continue although another program uses the same nodes'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -s q -l quiet -d 'Print less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -s v -l verbose -d 'Print more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -f -a "dump" -d 'Show all settings of a device, as a file that apply reads'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -f -a "diff" -d 'Compare a device with a file, two devices, or two files; exit 1 if anything differs'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -f -a "apply" -d 'Set a device as a file says: check the file, write what differs, read everything back'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l ignore-lock -d 'Continue although another program uses the same nodes'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s q -l quiet -d 'Print less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s v -l verbose -d 'Print more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l changed -d 'Omit settings that are factory defaults'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l ignore-lock -d 'Continue although another program uses the same nodes'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s q -l quiet -d 'Print less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s v -l verbose -d 'Print more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l address -d 'Compare [address], too'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l with-calibration -d 'Compare [calibration], too'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l state-home -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l home -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l ignore-lock -d 'Continue although another program uses the same nodes'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s q -l quiet -d 'Print less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s v -l verbose -d 'Print more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l store -d 'Save to non-volatile memory (1010h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l reset -d 'Reset the node after the store, and read everything again'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l dry-run -d 'Show the writes; change nothing'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l exact -d 'Set settings that are not in the file to their factory defaults'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l address -d 'Set [address], too: node-ID, bit rate, explicit COB-IDs, SYNC producer. For one node only'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l with-calibration -d 'Set [calibration], too. The serial number must be equal'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l rollback -d 'Go back to the settings before the last apply that failed or was killed'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from help" -f -a "dump" -d 'Show all settings of a device, as a file that apply reads'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from help" -f -a "diff" -d 'Compare a device with a file, two devices, or two files; exit 1 if anything differs'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from help" -f -a "apply" -d 'Set a device as a file says: check the file, write what differs, read everything back'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l channel -d 'Channel [default: the only one with a zero]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l limit -d 'Largest accepted reading: 0.1 (in the present unit), 100mbar, 2% (of the measuring range) [default: 1%]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l samples -d 'Number of readings before and after, 100 ms apart' -r
@@ -1350,29 +1455,30 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s q -l q
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "nmt" -d 'Send NMT commands and show NMT states'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "lss" -d 'Set the node-ID and bit rate of devices (LSS, CiA 305, or objects of the device)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "info" -d 'Show everything about a device on one page'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "unit" -d 'Show or set the physical unit of a signal (6131h)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "filter" -d 'Show or set the filter of a signal: type (61A0h) and constant (61A1h)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "limits" -d 'Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "minmax" -d 'Show the lowest and highest value that the device has measured, or reset them'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "errors" -d 'Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "bus" -d 'List CAN interfaces, bring them up and down, find the bit rate of a bus'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "pdo" -d 'Show, change and watch the transmit PDOs of nodes'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "autozero" -d 'Set the zero of a channel (6125h), with checks before and after'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "store" -d 'Save settings to non-volatile memory (1010h)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "restore" -d 'Restore factory defaults (1011h); node-ID and bit rate stay'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "objects" -d 'Show what a description or an EDS states about a device\'s objects'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "devices" -d 'List the device descriptions, show one as TOML, or check a file'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "completions" -d 'Print the completion script for a shell'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo autozero store restore sim objects devices completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "nmt" -d 'Send NMT commands and show NMT states'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "lss" -d 'Set the node-ID and bit rate of devices (LSS, CiA 305, or objects of the device)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "info" -d 'Show everything about a device on one page'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "unit" -d 'Show or set the physical unit of a signal (6131h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "filter" -d 'Show or set the filter of a signal: type (61A0h) and constant (61A1h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "limits" -d 'Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "minmax" -d 'Show the lowest and highest value that the device has measured, or reset them'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "errors" -d 'Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "bus" -d 'List CAN interfaces, bring them up and down, find the bit rate of a bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "pdo" -d 'Show, change and watch the transmit PDOs of nodes'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "config" -d 'Show all settings of a device as a file, compare them with a file, and set them from a file'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "autozero" -d 'Set the zero of a channel (6125h), with checks before and after'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "store" -d 'Save settings to non-volatile memory (1010h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "restore" -d 'Restore factory defaults (1011h); node-ID and bit rate stay'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "objects" -d 'Show what a description or an EDS states about a device\'s objects'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "devices" -d 'List the device descriptions, show one as TOML, or check a file'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "completions" -d 'Print the completion script for a shell'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "start" -d 'Set nodes to OPERATIONAL: they send their TPDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "stop" -d 'Set nodes to STOPPED: only NMT, heartbeat and LSS work'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "preop" -d 'Set nodes to PRE-OPERATIONAL: everything except PDOs works'
@@ -1398,5 +1504,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from pdo" -f -a "show" -d 'Show the settings of TPDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from pdo" -f -a "map" -d 'Set the mapping and the transmission of a TPDO'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from pdo" -f -a "watch" -d 'Show received TPDOs, decoded, until Ctrl-C'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "dump" -d 'Show all settings of a device, as a file that apply reads'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "diff" -d 'Compare a device with a file, two devices, or two files; exit 1 if anything differs'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "apply" -d 'Set a device as a file says: check the file, write what differs, read everything back'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "show" -d 'Print a description as TOML'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "check" -d 'Report each mistake in a description file with its line'

@@ -35,6 +35,18 @@ pub(super) fn several(asked: usize, failures: Vec<Failure>) -> Result<(), Severa
     }
 }
 
+/// The same if a node can have several failures, such as the mistakes of a file.
+///
+/// # Errors
+/// The failures; the first one of each node counts.
+pub(super) fn several_each(asked: usize, failures: Vec<Vec<Failure>>) -> Result<(), Several> {
+    let kinds: Vec<Kind> = failures.iter().filter_map(|of_node| of_node.first().map(Failure::kind)).collect();
+    match combined(asked, &kinds) {
+        None => Ok(()),
+        Some(kind) => Err(Several { kind, failures: failures.into_iter().flatten().collect() }),
+    }
+}
+
 /// The kind that decides the exit code if `kinds` are the failures of `asked` nodes. `None` without a failure.
 ///
 /// A bus failure and Ctrl-C end the command at once, so they decide alone. Otherwise: `partial` if some nodes

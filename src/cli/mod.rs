@@ -5,6 +5,7 @@ mod autozero;
 mod bus;
 mod check;
 mod completions;
+mod config;
 mod descriptions;
 mod devices;
 mod each;
@@ -217,6 +218,7 @@ commands! {
     Errors(errors::Errors): "errors";
     Bus(bus::BusCommand): "bus";
     Pdo(pdo::Pdo): "pdo";
+    Config(config::Config): "config";
     Autozero(autozero::Autozero): "autozero" | "zero";
     Store(store::Store): "store";
     Restore(store::Restore): "restore";
@@ -233,6 +235,7 @@ impl Command {
             Command::Scan(_) | Command::Read(_) | Command::Info(_) => true,
             Command::Objects(_) | Command::Devices(_) => true,
             Command::Sdo(sdo) => sdo.only_reads(),
+            Command::Config(config) => config.only_reads(),
             _ => false,
         }
     }
@@ -303,8 +306,18 @@ impl Global {
     }
 
     /// Prints reports if the format is for programs. People get a note on stderr.
+    /// Prints reports if the format is for programs, else what `text` writes.
+    pub(crate) fn print_or<R: Report>(
+        &self,
+        reports: &[R],
+        text: impl FnOnce(&mut dyn io::Write) -> io::Result<()>,
+    ) -> anyhow::Result<()> {
+        if self.prints_text() { text(&mut io::stdout().lock()).map_err(exit::stdout) } else { self.print(reports) }
+    }
+
+    /// Prints reports if the format is for programs. A note on stderr tells people.
     pub(crate) fn print_data<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
-        if self.prints_text() { Ok(()) } else { self.print(reports) }
+        self.print_or(reports, |_| Ok(()))
     }
 
     /// Prints reports if the format is JSON: results of a command that failed.

@@ -2,6 +2,7 @@
 
 pub mod assign;
 pub mod catalog;
+pub mod config_file;
 pub mod description;
 pub mod dictionary;
 pub mod eds;

@@ -7,6 +7,7 @@
 //! - [`state`]: NMT states, commands, reset and the restart;
 //! - [`scan`] and [`targets`]: the nodes on the bus, and those that `all` means;
 //! - [`overheard`]: what other masters read and write;
+//! - [`mod@offline`]: a node as its description has it, without a bus;
 //! - [`names`]: the objects, types and signals behind names.
 //!
 //! Errors are types ([`Error`]); their texts are in `output`.
@@ -14,6 +15,7 @@
 mod error;
 mod facts;
 pub mod names;
+pub mod offline;
 pub mod overheard;
 pub mod read;
 pub mod scan;

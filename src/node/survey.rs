@@ -327,7 +327,7 @@ fn find_signals<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Sto
     Ok(())
 }
 
-fn described(node: &Node, entry: &SignalEntry) -> Signal {
+pub(super) fn described(node: &Node, entry: &SignalEntry) -> Signal {
     Signal {
         name: entry.name.clone(),
         channel: entry.channel,

@@ -2,6 +2,7 @@
 
 pub mod autozero;
 pub mod check_progress;
+pub mod config;
 pub mod console;
 pub mod csv;
 pub mod devices;

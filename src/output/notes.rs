@@ -4,7 +4,7 @@
 
 use super::console::Console;
 use super::failure::host::up_by_hand;
-use super::failure::{self, autozero, pdo, settings, store};
+use super::failure::{self, autozero, config, pdo, settings, store};
 use super::lss;
 use super::report::Cell;
 use crate::canopen::id::NodeId;
@@ -74,6 +74,7 @@ pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> NoteText {
             .command("start it again", format!("cangauge nmt start {number}")),
         Effect::Autozero(effect) => autozero::effect(&number, effect),
         Effect::Lss(effect) => failure::lss::effect(effect),
+        Effect::Config(effect) => config::effect(&number, effect),
         Effect::Pdo(effect) => pdo::effect(&number, effect),
         Effect::Settings(effect) => settings::effect(&number, effect),
         Effect::State(state) => state_text(&number, *state),
@@ -100,6 +101,7 @@ pub fn note(note: &Note) -> NoteText {
         ),
         Fact::Autozero(fact) => autozero::fact(note.node, fact),
         Fact::Lss(fact) => lss::fact(fact),
+        Fact::Config(fact) => config::fact(fact),
         Fact::Pdo(fact) => pdo::fact(fact),
         Fact::Settings(fact) => settings::fact(fact),
         Fact::State(state) => state_text(&note.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string()), *state),

@@ -7,7 +7,7 @@ pub use crate::master::{LssError, Operation, SdoError, SdoFailure};
 pub use crate::measure::expression::ExpressionError;
 
 use super::note::Effect;
-use super::{autozero, check, detect, host, log, lss, nmt, pdo, read, scan, settings, store};
+use super::{autozero, check, config, detect, host, log, lss, nmt, pdo, read, scan, settings, store};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::Service;
 use crate::canopen::object::ObjectId;
@@ -84,6 +84,8 @@ pub enum Cause {
     Settings(settings::SettingsFailure),
     /// Nothing was recorded, or a recording ended early.
     Log(log::LogFailure),
+    /// Settings were not applied.
+    Config(Box<config::ConfigFailure>),
     /// A check failed or had no data.
     Check(check::CheckFailure),
     /// A node-ID or a bit rate was not set.
@@ -128,6 +130,7 @@ impl Cause {
             Cause::Settings(cause) => cause.kind(),
             Cause::Log(cause) => cause.kind(),
             Cause::Check(cause) => cause.kind(),
+            Cause::Config(cause) => cause.kind(),
             Cause::Lss(cause) => cause.kind(),
             Cause::Detect(cause) => cause.kind(),
             Cause::Autozero(cause) => cause.kind(),

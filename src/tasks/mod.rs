@@ -2,6 +2,7 @@
 
 pub mod autozero;
 pub mod check;
+pub mod config;
 pub mod detect;
 pub mod diagnosis;
 pub mod failure;

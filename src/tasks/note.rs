@@ -3,6 +3,7 @@
 //! These types contain no text for people. [`crate::output::notes`] turns them into text.
 
 use super::autozero::{AutozeroEffect, AutozeroFact};
+use super::config::{ConfigEffect, ConfigFact};
 use super::lss::{LssEffect, LssFact};
 use super::pdo::{PdoEffect, PdoFact};
 use super::settings::{SettingsEffect, SettingsFact};
@@ -30,6 +31,8 @@ pub enum Effect {
     Autozero(AutozeroEffect),
     /// A change of node-ID or bit rate failed.
     Lss(Box<LssEffect>),
+    /// Settings were applied in part.
+    Config(Box<ConfigEffect>),
     /// A change of a TPDO failed.
     Pdo(PdoEffect),
     /// A change of a setting failed.
@@ -83,6 +86,8 @@ pub enum Fact {
     Autozero(AutozeroFact),
     /// An LSS task reports a step or a warning.
     Lss(Box<LssFact>),
+    /// Settings were applied.
+    Config(ConfigFact),
     /// A TPDO was changed.
     Pdo(PdoFact),
     /// A setting was changed or shown.
@@ -100,6 +105,7 @@ impl Fact {
     pub fn is_warning(&self) -> bool {
         match self {
             Fact::Lss(fact) => fact.event.is_warning(),
+            Fact::Config(fact) => fact.is_warning(),
             Fact::Pdo(fact) => fact.is_warning(),
             Fact::Settings(fact) => fact.is_warning(),
             Fact::State(_) => true,

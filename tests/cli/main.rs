@@ -5,6 +5,7 @@ mod args;
 mod autozero;
 mod bus;
 mod check;
+mod config;
 mod descriptions;
 mod devices;
 mod examples;

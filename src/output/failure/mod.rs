@@ -6,6 +6,7 @@
 pub(super) mod autozero;
 mod below;
 mod check;
+pub(super) mod config;
 mod detect;
 pub mod host;
 mod log;
@@ -226,6 +227,7 @@ fn words(failure: &Failure) -> Words {
         Cause::Settings(cause) => settings::words(failure, cause),
         Cause::Log(cause) => log::words(failure, cause),
         Cause::Check(cause) => check::words(failure, cause),
+        Cause::Config(cause) => config::words(cause),
         Cause::Lss(cause) => lss::words(failure, cause),
         Cause::Detect(cause) => detect::words(cause),
         Cause::Autozero(cause) => autozero::words(failure, cause),

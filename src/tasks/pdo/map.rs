@@ -1,8 +1,9 @@
 //! Sets the mapping and the parameters of a TPDO as a transaction.
 
 use super::change::Change;
-use super::failure::{PdoEffect, PdoFact, PdoFailure, not_read};
+use super::failure::{PdoEffect, PdoFact, PdoFailure, StepWrite, not_read};
 use super::identifiers;
+use super::plan;
 use super::request::PdoRequest;
 use super::session::Session;
 use super::settings::Settings;
@@ -53,24 +54,7 @@ pub fn map(
         return Err(Failure::at(node.id, PdoFailure::Multiplexed { number }));
     }
     let wanted = request.settings(&old, mapping, &node)?;
-    check(&mut session, &old, &wanted)?;
-    let model = node.model.as_deref();
-    let mut change = Change {
-        session,
-        old,
-        wanted,
-        remap: model.map(|model| model.description.pdo.remap).unwrap_or_default(),
-        is_described: model.is_some_and(|model| !model.description.objects.is_empty()),
-        never_off: false,
-        state: StateSwitch::default(),
-        current: None,
-        failed_at: None,
-        confirmed: None,
-        notes: Vec::new(),
-    };
-    change.run()?;
-    let Change { session, wanted, notes: of_change, .. } = change;
-    let Session { writes, master, .. } = session;
+    let Changed { writes, wanted, notes: of_change } = change_settings(session, old, wanted)?;
     let note = |fact: PdoFact| Note::of_node(node.id, fact);
     if writes == 0 {
         notes.insert(0, note(PdoFact::AlreadySet { number }));
@@ -83,6 +67,64 @@ pub fn map(
     }
     notes.extend(of_change);
     Ok(MapReport { shown: TpdoReport::new(&node, wanted), writes, stored: stored.is_some(), notes })
+}
+
+/// A change of a TPDO that was carried out.
+pub(in crate::tasks) struct Changed {
+    /// The number of writes.
+    pub writes: u32,
+    /// The settings now.
+    pub wanted: Settings,
+    /// What else there is to report.
+    pub notes: Vec<Note>,
+}
+
+/// Reads the settings of a TPDO.
+///
+/// # Errors
+/// The node rejects a read or does not answer; bus errors and Ctrl-C.
+pub(in crate::tasks) fn read(master: &mut Master<'_>, node: &Node, number: TpdoNumber) -> Result<Settings, Failure> {
+    let settings = Settings::read(&mut Session::new(master, node), number, may_have_inhibit_time(node, number));
+    settings.map_err(|error| not_read(node.id, numbers(node), error))
+}
+
+/// Changes the settings of a TPDO of a known node as a transaction: see [`map()`].
+///
+/// # Errors
+/// As [`map()`].
+pub(in crate::tasks) fn change(
+    master: &mut Master<'_>,
+    node: &Node,
+    old: Settings,
+    wanted: Settings,
+) -> Result<Changed, Failure> {
+    change_settings(Session::new(master, node), old, wanted)
+}
+
+/// The writes of [`change`], if the device rejects none of them.
+pub(in crate::tasks) fn steps(node: &Node, old: &Settings, wanted: &Settings) -> Vec<StepWrite> {
+    let remap = node.model.as_ref().map(|model| model.description.pdo.remap).unwrap_or_default();
+    plan::writes(old, wanted, remap, false)
+}
+
+fn change_settings(mut session: Session<'_, '_>, old: Settings, wanted: Settings) -> Result<Changed, Failure> {
+    check(&mut session, &old, &wanted)?;
+    let model = session.node.model.as_deref();
+    let mut change = Change {
+        remap: model.map(|model| model.description.pdo.remap).unwrap_or_default(),
+        is_described: model.is_some_and(|model| !model.description.objects.is_empty()),
+        session,
+        old,
+        wanted,
+        never_off: false,
+        state: StateSwitch::default(),
+        current: None,
+        failed_at: None,
+        confirmed: None,
+        notes: Vec::new(),
+    };
+    change.run()?;
+    Ok(Changed { writes: change.session.writes, wanted: change.wanted, notes: change.notes })
 }
 
 /// What to store to keep the settings of a TPDO: only the communication settings, if the device has a group for them.

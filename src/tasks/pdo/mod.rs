@@ -19,7 +19,9 @@ mod watch;
 pub use failure::{Incomplete, Occupant, Parameter, PdoEffect, PdoFact, PdoFailure, StepError, StepWrite};
 
 pub use map::{MapReport, map};
+pub(super) use map::{change, read, steps};
 pub use request::{Item, PdoRequest, Trigger};
+pub(super) use request::{entry_of, text_of};
 pub use settings::Settings;
 pub use show::{MappedItem, TpdoReport, show};
 pub use watch::{WatchEvent, watch};

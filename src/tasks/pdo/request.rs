@@ -168,6 +168,34 @@ fn named(node: &Node, name: &str) -> Result<ObjectId, Failure> {
     }
 }
 
+/// The entry for an item as `pdo map` and files write it: `pressure`, `pressure.status`, `0x9130:1/32`. Needs no bus.
+///
+/// # Errors
+/// Unknown names, wrong numbers of bits, objects of unknown width.
+pub(in crate::tasks) fn entry_of(node: &Node, text: &str) -> Result<MappingEntry, Failure> {
+    let (what, bits) = match text.split_once('/') {
+        None => (text, None),
+        Some((what, bits)) => (what, Some(bits.parse().ok().filter(|bits| (1..=64).contains(bits)))),
+    };
+    let is_address = what.starts_with(|first: char| first.is_ascii_digit());
+    let object = match is_address {
+        true => what.parse().map_err(|_| Failure::at(node.id, unknown_name(node, what)))?,
+        false => named(node, what)?,
+    };
+    match bits.unwrap_or_else(|| width(node, object)) {
+        Some(bits) => Ok(MappingEntry { object, bits }),
+        None => Err(Failure::at(node.id, PdoFailure::WidthUnknown { object })),
+    }
+}
+
+/// The shortest text from which [`entry_of`] reads this entry.
+pub(in crate::tasks) fn text_of(node: &Node, entry: MappingEntry) -> String {
+    let signals = node.signals.iter().flat_map(|signal| [signal.name.clone(), format!("{}.status", signal.name)]);
+    let texts = signals.chain([node.name_of(entry.object), entry.object.to_string()]);
+    let mut fitting = texts.filter(|text| entry_of(node, text).is_ok_and(|found| found == entry));
+    fitting.next().unwrap_or_else(|| format!("{}/{}", entry.object, entry.bits))
+}
+
 fn unknown_name(node: &Node, name: &str) -> PdoFailure {
     let signals: Vec<String> = node.signals.iter().map(|signal| signal.name.clone()).collect();
     let with_status = node.signals.iter().filter(|signal| signal.status.is_some());

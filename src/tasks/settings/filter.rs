@@ -114,7 +114,7 @@ fn constant_object(signal: &Signal) -> ObjectId {
 }
 
 /// The meaning of a filter type (61A0h), from the description, else from CiA 404.
-pub(super) fn meaning(node: &Node, signal: &Signal, code: u64) -> String {
+pub(in crate::tasks) fn meaning(node: &Node, signal: &Signal, code: u64) -> String {
     let described = node.described(kind_object(signal)).and_then(|entry| entry.meaning(code));
     described.map_or_else(
         || match code {

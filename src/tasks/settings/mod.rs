@@ -91,7 +91,7 @@ fn measured(node: &Node, signal: &Signal, object: ObjectId, value: &Value) -> Op
 
 /// The bytes of a number in the unit of a signal. An integer object counts in steps of the last of its `digits` decimal
 /// digits.
-fn encode_quantity(number: f64, data_type: DataType, digits: u8) -> Result<Vec<u8>, QuantityError> {
+pub(super) fn encode_quantity(number: f64, data_type: DataType, digits: u8) -> Result<Vec<u8>, QuantityError> {
     let text = match data_type {
         DataType::Real32 | DataType::Real64 => number.to_string(),
         _ => {

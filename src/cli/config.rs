@@ -1,0 +1,134 @@
+//! `cangauge config`.
+
+mod apply;
+mod diff;
+mod journal;
+
+use super::args::Nodes;
+use super::exit::FileError;
+use super::{Global, descriptions};
+use crate::bus::claim::Claim;
+use crate::canopen::id::NodeId;
+use crate::device::catalog;
+use crate::device::config_file::{Document, Item};
+use crate::node::Node;
+use crate::node::offline::offline;
+use crate::output::config::write_toml;
+use crate::tasks::Failure;
+use crate::tasks::config::{ConfigFailure, Mistake, Problem, read};
+use clap::{Args, Subcommand};
+use std::fs::File;
+use std::io::Read;
+
+/// Show all settings of a device as a file, compare them with a file, and set them from a file
+///
+/// The file is TOML with the sections [device], [address], [node], [signal.NAME], [tpdo.N], [object] and [calibration].
+/// Values have units: "100ms", "3.2 bar". The whole file is checked before the first write; only what differs is
+/// written, and everything is read back.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  cangauge -b sim config dump 1 > mh4.toml\n  cangauge -b sim config dump 127 --changed\n  cangauge config diff 1 mh4.toml\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1-16 mh4.toml --store"
+)]
+pub(crate) struct Config {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+#[command(defer = true)]
+enum Action {
+    /// Show all settings of a device, as a file that apply reads
+    Dump(Dump),
+    /// Compare a device with a file, two devices, or two files; exit 1 if anything differs
+    Diff(diff::Diff),
+    /// Set a device as a file says: check the file, write what differs, read everything back
+    Apply(apply::Apply),
+}
+
+#[derive(Debug, Args)]
+struct Dump {
+    /// Node-ID: 5, 0x7f
+    node: NodeId,
+    /// Omit settings that are factory defaults
+    #[arg(long)]
+    changed: bool,
+}
+
+impl Config {
+    /// The nodes that no other cangauge may use at the same time.
+    pub(super) fn claim(&self) -> Claim {
+        match &self.action {
+            Action::Dump(dump) => Claim::Nodes(vec![dump.node]),
+            Action::Diff(diff) => diff.claim(),
+            Action::Apply(apply) => apply.claim(),
+        }
+    }
+
+    /// Whether the command only reads: a description of another device is then a warning.
+    pub(super) fn only_reads(&self) -> bool {
+        !matches!(self.action, Action::Apply(_))
+    }
+
+    pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
+        match &self.action {
+            Action::Dump(dump) => dump.run(global),
+            Action::Diff(diff) => diff.run(global),
+            Action::Apply(apply) => apply.run(global),
+        }
+    }
+}
+
+impl Dump {
+    fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let overrides = descriptions::overrides(global, &[self.node])?;
+        let snapshot = global.with_master(|master| Ok(read(master, self.node, &overrides, None)?))?;
+        let dump = snapshot.dump(self.changed);
+        global.print_or(&dump.rows, |out| write_toml(&dump, out))
+    }
+}
+
+/// The longest file that is read.
+const MAX_FILE: u64 = 16 << 20;
+
+/// Reads a file with settings.
+fn document(file: &str) -> anyhow::Result<Document> {
+    let mut text = String::new();
+    File::open(file)
+        .and_then(|opened| opened.take(MAX_FILE).read_to_string(&mut text))
+        .map_err(|source| FileError { what: format!("read {file}"), source })?;
+    parse(file, &text)
+}
+
+fn parse(file: &str, text: &str) -> anyhow::Result<Document> {
+    Document::parse(text).map_err(|error| {
+        let problem = Problem::Syntax { message: error.message };
+        mistakes(file, vec![Mistake { place: error.place, key: String::new(), problem }])
+    })
+}
+
+/// The mistakes of a file as one error.
+fn mistakes(file: &str, mistakes: Vec<Mistake>) -> anyhow::Error {
+    let failures = ConfigFailure::of_mistakes(file, None, mistakes);
+    match super::exit::several_each(1, vec![failures]) {
+        Err(several) => several.into(),
+        Ok(()) => anyhow::anyhow!("{file}: no mistake"),
+    }
+}
+
+/// The device that a file is for, as its description has it. `None` if the file names none, or an unknown one.
+fn described(document: &Document) -> Option<Node> {
+    let Item::Text(kind) = &document.get("device.kind")?.value else { return None };
+    let model = catalog::by_name(kind)?;
+    (!model.description.signals.is_empty()).then(|| offline(NodeId::MIN, &model))
+}
+
+/// The failures of several nodes, each with its own.
+type Failures = Vec<Vec<Failure>>;
+
+/// Splits the positional arguments: the file is the last one.
+fn nodes_and_file(words: &[String]) -> Option<(Nodes, &str)> {
+    match words {
+        [nodes, file] => Some((nodes.parse().ok()?, file)),
+        _ => None,
+    }
+}

@@ -1,0 +1,213 @@
+//! `cangauge config apply`.
+
+use super::journal::{FileJournal, Folder, latest};
+use super::{Failures, described, document, mistakes, nodes_and_file, parse};
+use crate::bus::claim::Claim;
+use crate::canopen::id::NodeId;
+use crate::cli::args::Nodes;
+use crate::cli::exit::several_each;
+use crate::cli::{Global, descriptions, open};
+use crate::device::config_file::Document;
+use crate::master::Master;
+use crate::node::Overrides;
+use crate::output::config::{AppliedReport, LineReport};
+use crate::output::failure::ErrorMessage;
+use crate::output::notes;
+use crate::tasks::config::diff::check_offline;
+use crate::tasks::config::{Applied, ConfigFailure, Line, Options, Sections, Snapshot, Wishes, apply, lines, read};
+use crate::tasks::{Failure, Kind, Note};
+use clap::Args;
+
+/// Set a device as a file says: check the file, write what differs, read everything back
+///
+/// Order: sensor type, unit, digits, filter, limits, other objects, guarding and heartbeat, TPDOs, COB-IDs, store, and
+/// last node-ID and bit rate. A second run prints "0 changes". If a write fails, the command says what was written and
+/// what was not; the same command continues, and --rollback goes back.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1 mh4.toml --store --reset\n  cangauge config apply 1-16 mh4.toml --store\n  cangauge config apply 1 --rollback"
+)]
+pub(super) struct Apply {
+    /// Nodes (5, 0x7f, 1-16, 1,5, all), and the file
+    #[arg(required = true, value_names = ["NODES", "FILE"], num_args = 1..=2)]
+    words: Vec<String>,
+    /// Save to non-volatile memory (1010h)
+    #[arg(long)]
+    store: bool,
+    /// Reset the node after the store, and read everything again
+    #[arg(long, requires = "store")]
+    reset: bool,
+    /// Show the writes; change nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// Set settings that are not in the file to their factory defaults
+    #[arg(long)]
+    exact: bool,
+    /// Set [address], too: node-ID, bit rate, explicit COB-IDs, SYNC producer. For one node only
+    #[arg(long)]
+    address: bool,
+    /// Set [calibration], too. The serial number must be equal
+    #[arg(long)]
+    with_calibration: bool,
+    /// Go back to the settings before the last apply that failed or was killed
+    #[arg(long, conflicts_with_all = ["exact", "address", "with_calibration"])]
+    rollback: bool,
+    #[command(flatten)]
+    folder: Folder,
+}
+
+/// What was done with one node.
+enum Outcome {
+    Applied(Box<Applied>),
+    Lines(Vec<Line>, Vec<Note>),
+}
+
+impl Apply {
+    fn nodes(&self) -> Option<Nodes> {
+        match (self.rollback, nodes_and_file(&self.words), self.words.as_slice()) {
+            (_, Some((nodes, _)), _) => Some(nodes),
+            (true, None, [nodes]) => nodes.parse().ok(),
+            _ => None,
+        }
+    }
+
+    pub(super) fn claim(&self) -> Claim {
+        self.nodes().map_or(Claim::Nothing, |nodes| nodes.claim())
+    }
+
+    pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let Some(nodes) = self.nodes() else { return Err(self.usage().into()) };
+        let document = match nodes_and_file(&self.words).filter(|_| !self.rollback) {
+            Some((_, file)) => {
+                let document = document(file)?;
+                if let Some(node) = described(&document) {
+                    check_offline(&document, &node).map_err(|found| mistakes(file, found))?;
+                }
+                Some(document)
+            }
+            None => None,
+        };
+        let is_one = matches!(&nodes, Nodes::These(nodes) if nodes.len() == 1);
+        if self.address && !is_one {
+            let message = "--address is for one node: two nodes cannot have the same node-ID";
+            return Err(ErrorMessage::usage(message).into());
+        }
+        let (asked, done, failures) = global.with_master(|master| {
+            let nodes = open::nodes(master, global, &nodes)?;
+            let overrides = descriptions::overrides_on(master, global, &nodes)?;
+            let (mut done, mut failures) = (Vec::new(), Failures::new());
+            for &node in &nodes {
+                match self.one(global, master, node, document.as_ref(), &overrides) {
+                    Ok(outcome) => done.push(outcome),
+                    Err(of_node) => {
+                        let ends =
+                            of_node.iter().any(|failure| matches!(failure.kind(), Kind::Interrupted | Kind::Bus));
+                        failures.push(of_node);
+                        if ends {
+                            break;
+                        }
+                    }
+                }
+            }
+            Ok((nodes.len(), done, failures))
+        })?;
+        self.report(global, done)?;
+        Ok(several_each(asked, failures)?)
+    }
+
+    fn usage(&self) -> ErrorMessage {
+        let [first, rest @ ..] = self.words.as_slice() else { return ErrorMessage::usage("no nodes and no file") };
+        match (first.parse::<Nodes>(), rest.is_empty()) {
+            (Ok(_), true) => ErrorMessage::usage("which file? cangauge config apply NODES FILE"),
+            (Ok(_), false) | (Err(_), true) => ErrorMessage::usage("which nodes? cangauge config apply NODES FILE"),
+            (Err(error), false) => ErrorMessage::usage(error),
+        }
+    }
+
+    fn options(&self) -> Options {
+        let mut arguments: Vec<&str> = self.words.last().map(String::as_str).into_iter().collect();
+        let flags = [
+            (self.store, "--store"),
+            (self.reset, "--reset"),
+            (self.exact, "--exact"),
+            (self.address, "--address"),
+            (self.with_calibration, "--with-calibration"),
+        ];
+        arguments.extend(flags.iter().filter(|(is_given, _)| *is_given).map(|(_, flag)| *flag));
+        Options {
+            sections: Sections { address: self.address, calibration: self.with_calibration || self.rollback },
+            exact: self.exact,
+            store: self.store,
+            reset: self.reset,
+            arguments: arguments.join(" "),
+        }
+    }
+
+    /// Works on one node.
+    fn one(
+        &self,
+        global: &Global,
+        master: &mut Master<'_>,
+        node: NodeId,
+        document: Option<&Document>,
+        overrides: &Overrides,
+    ) -> Result<Outcome, Vec<Failure>> {
+        let one = |failure: Failure| vec![failure];
+        master.listen_to(&[node]).map_err(|error| one(error.into()))?;
+        let snapshot = read(master, node, overrides, document).map_err(one)?;
+        let mut journal = FileJournal::new(&self.folder, master.bus().name(), &snapshot, global);
+        let (file, document) = match document {
+            Some(document) => (self.words.last().cloned().unwrap_or_default(), document.clone()),
+            None => {
+                let (file, text) = latest(&self.folder, master.bus().name(), &snapshot).map_err(one)?;
+                let unreadable = || Failure::at(node, ConfigFailure::Journal { reason: file.clone() });
+                let document = parse(&file, &text).map_err(|_| one(unreadable()))?;
+                (file, document)
+            }
+        };
+        let wishes: Result<Wishes, _> = snapshot.check(&document);
+        let wishes = wishes.map_err(|found| ConfigFailure::of_mistakes(&file, Some(node), found))?;
+        let options = self.options();
+        if self.dry_run {
+            crate::tasks::config::check_device(&wishes, &snapshot, self.with_calibration).map_err(one)?;
+            let (lines, notes) = lines(&wishes, &snapshot, &options);
+            return Ok(Outcome::Lines(lines, notes));
+        }
+        let applied = apply(master, snapshot, &wishes, &options, overrides, &mut journal).map_err(one)?;
+        Ok(Outcome::Applied(Box::new(applied)))
+    }
+
+    fn report(&self, global: &Global, done: Vec<Outcome>) -> anyhow::Result<()> {
+        let (mut reports, mut steps, mut all_notes) = (Vec::new(), Vec::new(), Vec::new());
+        for outcome in done {
+            match outcome {
+                Outcome::Applied(applied) => {
+                    all_notes.extend(applied.notes.iter().cloned());
+                    reports.push(AppliedReport(*applied));
+                }
+                Outcome::Lines(lines, notes) => {
+                    all_notes.extend(notes);
+                    steps.extend(lines.into_iter().map(LineReport));
+                }
+            }
+        }
+        if self.dry_run {
+            global.print(&steps)?;
+        } else {
+            global.print(&reports)?;
+        }
+        all_notes.iter().for_each(|note| notes::print(&global.console(), note));
+        if let [only] = reports.as_slice() {
+            global.console().note(&format!("node {}: {}", only.0.node, only.sentence()));
+        }
+        Ok(())
+    }
+}
+
+/// The text of a snapshot, for the journal.
+pub(super) fn text_of(snapshot: &Snapshot) -> Vec<u8> {
+    let mut text = Vec::new();
+    // Writing to memory does not fail.
+    let _ = crate::output::config::write_toml(&snapshot.dump(false), &mut text);
+    text
+}

@@ -1,0 +1,100 @@
+//! The journal: what a device held before a change, until the change is complete.
+//!
+//! One file for each device, named after the bus and the identity. It is written and synced before the first write, kept
+//! if the change fails or the program is killed, and removed after success.
+
+use super::apply::text_of;
+use crate::cli::Global;
+use crate::tasks::Failure;
+use crate::tasks::config::{ConfigFailure, Journal, Snapshot};
+use clap::Args;
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Where the journal is.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Folder {
+    #[arg(long, env = "XDG_STATE_HOME", hide = true, hide_env = true)]
+    state_home: Option<PathBuf>,
+    #[arg(long, env = "HOME", hide = true, hide_env = true)]
+    home: Option<PathBuf>,
+}
+
+impl Folder {
+    fn path(&self) -> Option<PathBuf> {
+        let state = self.state_home.clone().filter(|path| path.is_absolute());
+        let state = state.or_else(|| Some(self.home.as_ref()?.join(".local/state")));
+        Some(state?.join("cangauge"))
+    }
+}
+
+/// The file of a device: bus, vendor, product and serial number; without a serial number the node-ID.
+fn file(folder: &Folder, bus: &str, snapshot: &Snapshot) -> Option<PathBuf> {
+    let identity = &snapshot.node.identity;
+    let code = |number: Option<u32>| number.map_or_else(|| "-".to_owned(), |number| format!("{number:X}"));
+    let specimen = match identity.serial.filter(|serial| *serial != 0) {
+        Some(serial) => serial.to_string(),
+        None => format!("node{}", snapshot.node.id),
+    };
+    let bus: String = bus.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+    let name = format!("{bus}_{}_{}_{specimen}.toml", code(identity.vendor), code(identity.product));
+    Some(folder.path()?.join(name))
+}
+
+/// The journal of one device.
+pub(super) struct FileJournal<'a> {
+    path: Option<PathBuf>,
+    global: &'a Global,
+}
+
+impl<'a> FileJournal<'a> {
+    pub(super) fn new(folder: &Folder, bus: &str, snapshot: &Snapshot, global: &'a Global) -> FileJournal<'a> {
+        FileJournal { path: file(folder, bus, snapshot), global }
+    }
+}
+
+impl Journal for FileJournal<'_> {
+    fn begin(&mut self, before: &Snapshot) -> Result<(), Failure> {
+        let Some(path) = &self.path else {
+            self.global
+                .console()
+                .note("no journal: neither XDG_STATE_HOME nor HOME is set; --rollback is not possible");
+            return Ok(());
+        };
+        // A change that was not completed before: what the device held before that one counts.
+        if path.exists() {
+            return Ok(());
+        }
+        let write = || {
+            fs::create_dir_all(path.parent().unwrap_or(path))?;
+            let mut file = File::create_new(path)?;
+            file.write_all(&text_of(before))?;
+            file.sync_all()
+        };
+        write().map_err(|error| {
+            let reason = format!("{}: {error}", path.display());
+            Failure::at(before.node.id, ConfigFailure::Journal { reason })
+        })
+    }
+
+    fn finish(&mut self) {
+        if let Some(path) = &self.path {
+            // A file that remains is older than the settings: --rollback says so, as its values differ.
+            let _ = fs::remove_file(path);
+        }
+    }
+}
+
+/// What a device held before a change that was not completed: the name of the file, and its text.
+///
+/// # Errors
+/// [`ConfigFailure::NoJournal`].
+pub(super) fn latest(folder: &Folder, bus: &str, snapshot: &Snapshot) -> Result<(String, String), Failure> {
+    let path = file(folder, bus, snapshot);
+    let text = path.as_ref().and_then(|path| fs::read_to_string(path).ok());
+    match path.zip(text) {
+        Some((path, text)) => Ok((path.display().to_string(), text)),
+        None => Err(Failure::at(snapshot.node.id, ConfigFailure::NoJournal)),
+    }
+}

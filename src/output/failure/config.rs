@@ -1,0 +1,139 @@
+//! Text for causes, effects and notes: settings were not applied, and what to report about it.
+
+use super::Words;
+use crate::output::notes::NoteText;
+use crate::tasks::config::{ConfigEffect, ConfigFact, ConfigFailure, Mistake, Problem};
+
+/// The message and the hint for a cause.
+pub(super) fn words(cause: &ConfigFailure) -> Words {
+    match cause {
+        ConfigFailure::Mistake { file, mistake } => of_mistake(file, mistake),
+        ConfigFailure::Condition { place, key, wanted, found } => {
+            let found = found.as_ref().map_or_else(|| "unknown".to_owned(), ToString::to_string);
+            let words = Words::new(format!("another device: {key} is {found}, the file has {wanted} (line {place})"));
+            match key.as_str() {
+                "calibration.serial" => words.hint("omit --with-calibration: a calibration is for one device only"),
+                _ => words.hint("compare both: cangauge config diff NODE FILE"),
+            }
+        }
+        ConfigFailure::NoSerial { place } => {
+            Words::new(format!("[calibration] needs the serial number of its device (line {place})"))
+                .hint("add: serial = NUMBER; or omit --with-calibration")
+        }
+        ConfigFailure::NotKept { settings, is_after_reset } => {
+            let list: Vec<String> = settings
+                .iter()
+                .map(|(key, wanted, found)| {
+                    let found = found.as_ref().map_or_else(|| "not readable".to_owned(), ToString::to_string);
+                    format!("{key} is {found}, not {wanted}")
+                })
+                .collect();
+            let when = if *is_after_reset { "after the reset" } else { "read back" };
+            Words::new(format!("{when}: {}", list.join(", ")))
+        }
+        ConfigFailure::OthersOnBus { nodes } => {
+            let list: Vec<String> = nodes.iter().map(ToString::to_string).collect();
+            Words::new(format!("on the bus: node {}: nothing was changed", list.join(", ")))
+                .hint("a node-ID must be free, and a bit rate is only set on a bus with one node")
+        }
+        ConfigFailure::Journal { reason } => Words::new(format!("the journal cannot be written: {reason}")),
+        ConfigFailure::NoJournal => Words::new("nothing to roll back: the last change of this device was complete"),
+    }
+}
+
+/// `mh4.toml:12:5: tpdo.1.event-timer: "100" is not a duration (100ms, 1s)`.
+fn of_mistake(file: &str, mistake: &Mistake) -> Words {
+    let key = if mistake.key.is_empty() { String::new() } else { format!("{}: ", mistake.key) };
+    let Words { message, hint, .. } = of_problem(&mistake.problem);
+    Words { message: format!("{file}:{}: {key}{message}", mistake.place), hint, place: None }
+}
+
+fn of_problem(problem: &Problem) -> Words {
+    let list = |words: &[String]| words.join(", ");
+    Words::new(match problem {
+        Problem::Syntax { message } => message.clone(),
+        Problem::UnknownKey { device, nearest } => {
+            let owner = device.as_ref().map(|title| format!("{title} has no such setting"));
+            let message = owner.unwrap_or_else(|| "no such setting".to_owned());
+            if nearest.is_empty() { message } else { format!("{message} (nearest: {})", list(nearest)) }
+        }
+        Problem::Twice { other } => format!("the same setting as {other}"),
+        Problem::Type { expected, found } => format!("{found} instead of {expected}"),
+        Problem::NotADuration { text } => format!("\"{text}\" is not a duration (100ms, 1s)"),
+        Problem::DurationStep { tick: 1000 } => "the device counts in whole milliseconds".to_owned(),
+        Problem::DurationStep { tick } => format!("the device counts in steps of {tick}us"),
+        Problem::UnknownUnit { text } => format!("\"{text}\" is not a known unit (bar, kPa, degC)"),
+        Problem::NotAQuantity { text } => format!("\"{text}\" is not a number with a unit (\"3.2 bar\")"),
+        Problem::NoUnit => {
+            "a number without a unit, and the file sets no unit for this signal (\"3.2 bar\")".to_owned()
+        }
+        Problem::OtherQuantity { from, to } => format!("{from} cannot be converted to {to}, the unit of the signal"),
+        Problem::TooFine { digits } => format!("the device has {digits} decimal digits: the number is too fine"),
+        Problem::Value(error) => error.to_string(),
+        Problem::Range { low, high } => match (low.is_empty(), high.is_empty()) {
+            (_, true) => format!("below the lowest value {low}"),
+            (true, false) => format!("above the highest value {high}"),
+            (false, false) => format!("not in the range {low} to {high}"),
+        },
+        Problem::Allowed { values } => format!("the device accepts only {}", list(values)),
+        Problem::Word { text, known } => format!("\"{text}\" is not one of: {}", list(known)),
+        Problem::Transmission { text } => {
+            format!("\"{text}\" is not a transmission type (acyclic, sync:1 to sync:240, event, timer, 0 to 255)")
+        }
+        Problem::NotACobId { text } => format!("\"{text}\" is not an 11-bit identifier (0x1A5) or \"default\""),
+        Problem::Restricted { id } => format!("CiA 301 reserves the identifier 0x{id:X} for other services"),
+        Problem::SameId { id, other } => format!("the identifier 0x{id:X} is also that of {other}"),
+        Problem::NoId => "a TPDO that is on needs an identifier: add its cob-id to [address]".to_owned(),
+        Problem::NotABitRate { text } => format!("\"{text}\" is not a bit rate (250k, 1M)"),
+        Problem::Bits { bits } => format!("{bits} bits: a TPDO has at most 64"),
+        Problem::Entries { high } => format!("the device maps at most {high} objects in this TPDO"),
+        Problem::Mapping(cause) => return super::words(cause),
+        Problem::NotMappable { object, text } => format!("the device cannot map {text} ({object}) here"),
+        Problem::Fixed { present: Some(present) } => format!("the device has {present} and cannot change it"),
+        Problem::Fixed { present: None } => "the device cannot change it".to_owned(),
+        Problem::Crossed { other, value } => format!("beyond {other}, which is {value}"),
+        Problem::Excluded { other, value } => {
+            format!("the device accepts it only if {other} is 0, and that is {value}")
+        }
+    })
+}
+
+/// The text for an effect.
+pub(in crate::output) fn effect(node: &str, effect: &ConfigEffect) -> NoteText {
+    let written: Vec<&str> = effect.written.iter().map(|row| row.key.as_str()).collect();
+    let missing = effect.missing.join(", ");
+    let message = match (written.is_empty(), missing.is_empty()) {
+        (true, _) => "nothing was written".to_owned(),
+        (false, true) => format!("written: {}", written.join(", ")),
+        (false, false) => format!("written: {}; not written: {missing}", written.join(", ")),
+    };
+    let told = NoteText::new("applied-in-part", message);
+    match written.is_empty() {
+        true => told,
+        false => told.command(
+            "continue",
+            format!(
+                "cangauge config apply {node} {}; go back: cangauge config apply {node} --rollback",
+                effect.arguments
+            ),
+        ),
+    }
+}
+
+/// The text for a note.
+pub(in crate::output) fn fact(fact: &ConfigFact) -> NoteText {
+    match fact {
+        ConfigFact::Ignored { section, keys } => {
+            let option = if *section == "address" { "--address" } else { "--with-calibration" };
+            NoteText::new("section-ignored", format!("not set: {} ({option} sets them)", keys.join(", ")))
+        }
+        ConfigFact::NotInFile { keys } => NoteText::new(
+            "not-in-file",
+            format!("not the factory default and not in the file: {} (--exact sets them)", keys.join(", ")),
+        ),
+        ConfigFact::RateAfterRestart { rate } => NoteText::new(
+            "rate-after-restart",
+            format!("{} kbit/s is stored, and takes effect when the device starts again", rate / 1000),
+        ),
+    }
+}

@@ -1,0 +1,433 @@
+//! Compares a file with a device before anything is written: keys, types, units, ranges, and what excludes each other.
+
+use super::dump::path;
+use super::problem::{Mistake, Problem};
+use super::setting::{Form, Setting, Stage};
+use super::snapshot::Snapshot;
+use super::value::{Content, Scales, SignalScale};
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::{DataType, Value};
+use crate::device::config_file::{Document, Entry, Item};
+use crate::device::dictionary;
+use crate::device::nearest::distance;
+use crate::device::scalar::Scalar;
+use crate::device::unit::Unit;
+use crate::measure::sample::Number;
+use crate::node::Node;
+use crate::node::names::nearest;
+
+/// A setting with the value that a file gives it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanted {
+    /// The setting.
+    pub setting: Setting,
+    /// The value as the device holds it.
+    pub content: Content,
+    /// The value in the file; its place is for messages.
+    pub entry: Entry,
+}
+
+/// The contents of a file for one device.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wishes {
+    /// The settings.
+    pub wanted: Vec<Wanted>,
+    /// The conditions of `[device]`, and the serial number of `[calibration]`.
+    pub conditions: Vec<Entry>,
+    /// The units and digits as they will be.
+    pub scales: Scales,
+}
+
+/// Which sections of a file are used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sections {
+    /// `[address]`.
+    pub address: bool,
+    /// `[calibration]`.
+    pub calibration: bool,
+}
+
+impl Sections {
+    /// Whether a key is in a section that is used.
+    pub fn include(self, key: &str) -> bool {
+        match key.split('.').next() {
+            Some("address") => self.address,
+            Some("calibration") => self.calibration,
+            _ => true,
+        }
+    }
+}
+
+/// The conditions that `[device]` can contain, besides `device.range.SIGNAL`.
+const CONDITIONS: [&str; 5] =
+    ["device.kind", "device.vendor", "device.product", "device.reference", "calibration.serial"];
+
+/// Checks a file against a node. `present` is what the device holds; without it, only what a description tells is
+/// checked.
+///
+/// # Errors
+/// Every mistake, in the order of the places.
+pub fn check(
+    document: &Document,
+    node: &Node,
+    settings: &[Setting],
+    present: Option<&Snapshot>,
+) -> Result<Wishes, Vec<Mistake>> {
+    let mut check = Check { node, settings, present, scales: Scales::of(node), mistakes: Vec::new() };
+    check.renew_scales(document);
+    let mut wishes = Wishes::default();
+    for entry in &document.entries {
+        if CONDITIONS.contains(&entry.key.as_str()) || entry.key.starts_with("device.range.") {
+            match condition(entry) {
+                Ok(()) => wishes.conditions.push(entry.clone()),
+                Err(problem) => check.mistake(entry, problem),
+            }
+        } else if let Some(wanted) = check.entry(entry, &wishes) {
+            wishes.wanted.push(wanted);
+        }
+    }
+    if check.mistakes.is_empty() {
+        check.together(&wishes);
+    }
+    let mut mistakes = check.mistakes;
+    mistakes.sort_by_key(|mistake| mistake.place);
+    wishes.scales = check.scales;
+    if mistakes.is_empty() { Ok(wishes) } else { Err(mistakes) }
+}
+
+/// The form of a condition.
+fn condition(entry: &Entry) -> Result<(), Problem> {
+    let is_number = matches!(entry.key.as_str(), "device.vendor" | "device.product" | "calibration.serial");
+    match &entry.value {
+        Item::Text(text) if entry.key.starts_with("device.range.") => match range(text) {
+            Some(_) => Ok(()),
+            None => Err(Problem::NotAQuantity { text: text.clone() }),
+        },
+        item if is_number => match number(item) {
+            Some(_) => Ok(()),
+            None => Err(Problem::Type { expected: "a number (0x47)", found: item.kind() }),
+        },
+        Item::Text(_) => Ok(()),
+        item => Err(Problem::Type { expected: "text in quotes", found: item.kind() }),
+    }
+}
+
+/// A number of 32 bits, as an integer or as text.
+pub(super) fn number(item: &Item) -> Option<u32> {
+    match item {
+        Item::Integer(number) => u32::try_from(*number).ok(),
+        Item::Text(text) => crate::canopen::id::parse_u32(text),
+        _ => None,
+    }
+}
+
+/// A measuring range: its start, if it is given, its end and its unit.
+pub(super) fn range(text: &str) -> Option<(Option<f64>, f64, Unit)> {
+    let quantity = |text: &str| -> Option<(f64, Unit)> {
+        let (number, unit) = text.trim().split_once(' ').unwrap_or((text.trim(), ""));
+        let unit = if unit.is_empty() { Unit::NONE } else { Unit::from_symbol(unit)? };
+        Some((number.parse::<f64>().ok().filter(|number| number.is_finite())?, unit))
+    };
+    match text.split_once(" to ") {
+        None => quantity(text).map(|(end, unit)| (None, end, unit)),
+        Some((start, end)) => {
+            let ((start, from), (end, to)) = (quantity(start)?, quantity(end)?);
+            (from == to).then_some((Some(start), end, to))
+        }
+    }
+}
+
+struct Check<'a> {
+    node: &'a Node,
+    settings: &'a [Setting],
+    present: Option<&'a Snapshot>,
+    scales: Scales,
+    mistakes: Vec<Mistake>,
+}
+
+impl Check<'_> {
+    fn mistake(&mut self, entry: &Entry, problem: Problem) {
+        let is_key = matches!(problem, Problem::UnknownKey { .. } | Problem::Twice { .. });
+        let place = if is_key { entry.key_at } else { entry.value_at };
+        self.mistakes.push(Mistake { place, key: entry.key.clone(), problem });
+    }
+
+    /// Units and digits as they will be.
+    fn renew_scales(&mut self, document: &Document) {
+        let is_offline = self.present.is_none();
+        for (scale, signal) in self.scales.signals.iter_mut().zip(&self.node.signals) {
+            if is_offline {
+                *scale = SignalScale::default();
+            }
+            let value = |name: &str| document.get(&format!("signal.{}.{name}", signal.name)).map(|entry| &entry.value);
+            if let Some(Item::Text(text)) = value("unit") {
+                (scale.unit, scale.is_in_file) = (Unit::from_symbol(text).or(scale.unit), true);
+            }
+            if let Some(Item::Integer(digits)) = value("digits") {
+                scale.digits = u8::try_from(*digits).ok().filter(|digits| *digits <= 9).or(scale.digits);
+            }
+        }
+    }
+
+    /// The setting with this key.
+    fn find(&self, key: &str) -> Option<&Setting> {
+        let own = self.settings.iter().find(|setting| setting.key == key);
+        let explicit = || {
+            let key = key.strip_prefix("address.")?;
+            self.settings.iter().find(|setting| setting.key == key && matches!(setting.form, Form::CobId(_)))
+        };
+        let by_object = || {
+            let object = object_of(self.node, key)?;
+            self.settings.iter().find(|setting| setting.object == object && setting.key.starts_with("object."))
+        };
+        own.or_else(explicit).or_else(by_object)
+    }
+
+    fn entry(&mut self, entry: &Entry, before: &Wishes) -> Option<Wanted> {
+        let Some(setting) = self.find(&entry.key).cloned() else {
+            let problem = self.unknown(&entry.key);
+            self.mistake(entry, problem);
+            return None;
+        };
+        if let Some(other) = before.wanted.iter().find(|wanted| wanted.setting.key == setting.key) {
+            self.mistake(entry, Problem::Twice { other: other.entry.key.clone() });
+            return None;
+        }
+        let read = setting.read(self.node, &self.scales, &entry.value);
+        match read.and_then(|content| self.allowed(&setting, content, &entry.value)) {
+            Ok(content) => content.map(|content| {
+                // An explicit COB-ID belongs to [address], wherever it is written.
+                let key = path(&setting, &content);
+                Wanted { entry: Entry { key, ..entry.clone() }, content, setting }
+            }),
+            Err(problem) => {
+                self.mistake(entry, problem);
+                None
+            }
+        }
+    }
+
+    /// Why a key is unknown: the object behind it belongs to another key, or names are similar.
+    fn unknown(&self, key: &str) -> Problem {
+        let object = object_of(self.node, key);
+        let owner = object.and_then(|object| {
+            self.settings
+                .iter()
+                .find(|setting| setting.object == object && object.index != 0)
+                .map(|found| found.key.clone())
+        });
+        let known = self.settings.iter().map(|setting| setting.key.clone());
+        let known = known.chain(CONDITIONS.map(str::to_owned));
+        let last = key.rsplit('.').next().map_or(0, str::len);
+        let is_near = |other: &String| distance(key, other) <= 1 + last / 2;
+        let nearest =
+            owner.map_or_else(|| nearest(key, known).into_iter().filter(is_near).collect(), |owner| vec![owner]);
+        let title = self.node.model.as_ref().map(|model| model.description.title.clone());
+        Problem::UnknownKey { device: title, nearest }
+    }
+
+    /// Checks the limits that the description states.
+    fn allowed(&self, setting: &Setting, content: Option<Content>, item: &Item) -> Result<Option<Content>, Problem> {
+        let Some(content) = content else { return Ok(None) };
+        if !setting.is_writable {
+            let present = self.present.and_then(|present| Some((present.content(setting)?, present.show(setting))));
+            return match present {
+                None if self.present.is_none() => Ok(Some(content)),
+                Some((found, _)) if found == content => Ok(Some(content)),
+                present => Err(Problem::Fixed { present: present.and_then(|(_, item)| item) }),
+            };
+        }
+        match (&content, &setting.form) {
+            (Content::Mapping(entries), Form::Signals(number)) => {
+                let count = self.node.model.as_ref().and_then(|model| model.dictionary.get(number.mapping(0)));
+                let high = count.and_then(|entry| entry.high.as_ref()).and_then(Scalar::as_f64);
+                if high.is_some_and(|high| entries.len() as f64 > high) {
+                    let high = high.unwrap_or_default().to_string();
+                    return Err(Problem::Entries { high });
+                }
+                self.mappable(*number, entries, item)?;
+            }
+            (Content::Bytes(bytes), form) if !matches!(form, Form::Quantity(..)) => self.in_range(setting, bytes)?,
+            _ => {}
+        }
+        Ok(Some(content))
+    }
+
+    fn mappable(
+        &self,
+        number: crate::canopen::pdo::TpdoNumber,
+        entries: &[crate::canopen::pdo::MappingEntry],
+        item: &Item,
+    ) -> Result<(), Problem> {
+        let Some(model) = self.node.model.as_ref() else { return Ok(()) };
+        let texts: &[String] = if let Item::List(list) = item { list } else { &[] };
+        let mapped = self.present.into_iter().flat_map(|present| &present.tpdos).flat_map(|tpdo| &tpdo.mapping);
+        let mapped: Vec<ObjectId> = mapped.map(|entry| entry.object).collect();
+        for (at, entry) in (1..=u8::MAX).zip(entries) {
+            let known = model.dictionary.get(entry.object);
+            let is_allowed = self
+                .node
+                .described(number.mapping(at))
+                .is_none_or(|described| described.allow.is_empty() || described.allows(f64::from(entry.word())));
+            let is_mappable = known.is_none_or(|known| known.pdo) || mapped.contains(&entry.object);
+            if !is_allowed || !is_mappable {
+                let text = texts.get(usize::from(at) - 1).cloned().unwrap_or_else(|| item.to_string());
+                return Err(Problem::NotMappable { object: entry.object, text });
+            }
+        }
+        Ok(())
+    }
+
+    fn in_range(&self, setting: &Setting, bytes: &[u8]) -> Result<(), Problem> {
+        let value = setting.data_type.decode(bytes).ok();
+        let Some(number) = value.as_ref().and_then(Value::as_f64) else { return Ok(()) };
+        let shown = |number: f64| {
+            let text = format!("{number}");
+            let bytes = setting.data_type.encode_text(&text).ok();
+            let item = bytes.map(|bytes| setting.show(self.node, &self.scales, &Content::Bytes(bytes)));
+            item.map_or(text, |item| item.to_string())
+        };
+        let entry = self.node.model.as_ref().and_then(|model| model.dictionary.get(setting.object));
+        let limit = |scalar: Option<&Scalar>| scalar.and_then(Scalar::as_f64);
+        let low = limit(entry.and_then(|entry| entry.low.as_ref()));
+        let high = limit(entry.and_then(|entry| entry.high.as_ref()));
+        if low.is_some_and(|low| number < low) || high.is_some_and(|high| number > high) {
+            let text = |limit: Option<f64>| limit.map_or_else(String::new, shown);
+            return Err(Problem::Range { low: text(low), high: text(high) });
+        }
+        let described = self.node.described(setting.object);
+        match described.filter(|described| !described.allows(number)) {
+            Some(described) => {
+                let range = |range: &crate::device::scalar::NumberRange| match (range.low, range.high) {
+                    (low, high) if low == high => shown(low.into()),
+                    (low, high) => format!("{} to {}", shown(low.into()), shown(high.into())),
+                };
+                Err(Problem::Allowed { values: described.allow.iter().map(range).collect() })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Checks values that depend on each other, as they will be.
+    fn together(&mut self, wishes: &Wishes) {
+        let mut found = Vec::new();
+        for wanted in &wishes.wanted {
+            found.extend(self.crossed(wanted, wishes).map(|problem| (wanted.entry.clone(), problem)));
+            found.extend(self.excluded(wanted, wishes).map(|problem| (wanted.entry.clone(), problem)));
+            found.extend(self.same_id(wanted, wishes).map(|problem| (wanted.entry.clone(), problem)));
+        }
+        found.into_iter().for_each(|(entry, problem)| self.mistake(&entry, problem));
+    }
+
+    /// The value that a setting will have.
+    fn future(&self, setting: &Setting, wishes: &Wishes) -> Option<Content> {
+        let wanted = wishes.wanted.iter().find(|wanted| wanted.setting.key == setting.key);
+        wanted.map(|wanted| wanted.content.clone()).or_else(|| self.present?.content(setting))
+    }
+
+    fn crossed(&self, wanted: &Wanted, wishes: &Wishes) -> Option<Problem> {
+        let (base, name) = wanted.setting.key.rsplit_once('.')?;
+        let (other, is_lower) = match name {
+            "lower" => ("upper", true),
+            "upper" => ("lower", false),
+            "span-start" => ("span-end", true),
+            "span-end" => ("span-start", false),
+            _ => return None,
+        };
+        let other = self.find(&format!("{base}.{other}"))?;
+        let is_in_file = wishes.wanted.iter().any(|wanted| wanted.setting.key == other.key);
+        let rescales = self.present.is_some_and(|present| present.scales != self.scales);
+        // Reported once, at the lower end.
+        if is_in_file && !is_lower || !is_in_file && (rescales || self.present.is_none()) {
+            return None;
+        }
+        let number = |setting: &Setting, content: &Content| match content {
+            Content::Bytes(bytes) => Number::from_value(&setting.data_type.decode(bytes).ok()?, 0).map(Number::as_f64),
+            _ => None,
+        };
+        let content = self.future(other, wishes)?;
+        let (own, theirs) = (number(&wanted.setting, &wanted.content)?, number(other, &content)?);
+        let is_crossed = if is_lower { own > theirs } else { theirs > own };
+        let value = other.show(self.node, &self.scales, &content);
+        is_crossed.then(|| Problem::Crossed { other: other.key.clone(), value })
+    }
+
+    /// Heartbeat and guarding, on devices that accept only one of them.
+    fn excluded(&self, wanted: &Wanted, wishes: &Wishes) -> Option<Problem> {
+        let is_on = |content: &Content| matches!(content, Content::Bytes(bytes) if bytes.iter().any(|byte| *byte != 0));
+        if !is_on(&wanted.content) {
+            return None;
+        }
+        let others = &self.node.described(wanted.setting.object)?.only_if_zero;
+        let mut others = self.settings.iter().filter(|setting| others.contains(&setting.object));
+        others.find_map(|other| {
+            let content = self.future(other, wishes).filter(is_on)?;
+            let value = other.show(self.node, &self.scales, &content);
+            Some(Problem::Excluded { other: other.key.clone(), value })
+        })
+    }
+
+    /// Identifiers that two senders would share, and TPDOs without an identifier.
+    fn same_id(&self, wanted: &Wanted, wishes: &Wishes) -> Option<Problem> {
+        // Without the device the node-ID is unknown, and with it the identifiers that follow from it.
+        self.present?;
+        let is_id = |setting: &&Setting| matches!(setting.form, Form::CobId(_));
+        let is_on = |setting: &Setting| match setting.stage {
+            Stage::Tpdo(number) => {
+                let enabled = self.find(&format!("tpdo.{}.enabled", number.get()));
+                let content = enabled.and_then(|enabled| self.future(enabled, wishes));
+                content.is_none_or(|content| content == Content::Number(1))
+            }
+            _ => true,
+        };
+        let id = |setting: &Setting| match self.future(setting, wishes) {
+            Some(Content::Number(id)) => Some(id),
+            _ => None,
+        };
+        let own = match wanted.setting.form {
+            Form::CobId(_) => &wanted.setting,
+            Form::Bit(31, false) => self.find(&wanted.setting.key.replace("enabled", "cob-id"))?,
+            _ => return None,
+        };
+        let number = id(own).filter(|_| is_on(own))?;
+        if number == 0 && matches!(own.stage, Stage::Tpdo(_)) {
+            return Some(Problem::NoId);
+        }
+        let mut others = self.settings.iter().filter(is_id).filter(|other| other.key != own.key && is_on(other));
+        let other = others.find(|other| id(other) == Some(number))?;
+        Some(Problem::SameId { id: number, other: other.key.clone() })
+    }
+}
+
+/// The object that a key of `[object]` names.
+fn object_of(node: &Node, key: &str) -> Option<ObjectId> {
+    let name = key.strip_prefix("object.")?;
+    name.parse().ok().or_else(|| node.entry_by_name(name).map(|entry| entry.object))
+}
+
+/// Objects that a file names and that are no setting of the catalog, although the device may have them.
+pub(super) fn named_objects(document: &Document, node: &Node, settings: &[Setting]) -> Vec<Setting> {
+    let mut extra: Vec<Setting> = Vec::new();
+    for entry in &document.entries {
+        let Some(object) = object_of(node, &entry.key) else { continue };
+        let Some(known) = node.entry(object) else { continue };
+        let is_known = settings.iter().chain(&extra).any(|setting| setting.object == object);
+        let is_plain = known.access.is_readable() && known.access.is_writable() && known.data_type != DataType::Domain;
+        let is_command = matches!(object.index, 0x1003 | 0x1010 | 0x1011 | 0x1400..=0x1bff);
+        let acts = node.described(object).is_some_and(|described| described.signature.is_some());
+        if is_known || !is_plain || is_command || acts {
+            continue;
+        }
+        let name =
+            if dictionary::spellings(&known.full_name()).is_empty() { object.to_string() } else { known.full_name() };
+        extra.push(Setting {
+            key: format!("object.{name}"),
+            object,
+            data_type: node.known_type(object).unwrap_or(DataType::OctetString),
+            form: Form::Plain,
+            stage: Stage::Object,
+            is_writable: true,
+        });
+    }
+    extra
+}

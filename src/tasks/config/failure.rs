@@ -1,0 +1,137 @@
+//! Causes of failures and effects: settings were not applied.
+
+use super::apply::Row;
+use super::problem::Mistake;
+use crate::canopen::id::NodeId;
+use crate::device::config_file::{Item, Place};
+use crate::tasks::failure::Cause;
+use crate::tasks::note::{Effect, Fact};
+use crate::tasks::{Failure, Kind};
+
+/// Settings were not applied.
+#[derive(Clone, Debug)]
+pub enum ConfigFailure {
+    /// A mistake in a file.
+    Mistake {
+        /// The file.
+        file: String,
+        /// The mistake.
+        mistake: Box<Mistake>,
+    },
+    /// The device is not what `[device]` says.
+    Condition {
+        /// The place of the condition in the file.
+        place: Place,
+        /// Its key.
+        key: String,
+        /// What the file says.
+        wanted: Item,
+        /// What the device says; `None` if it does not say.
+        found: Option<Item>,
+    },
+    /// Calibration values without a serial number.
+    NoSerial {
+        /// The place of the first value.
+        place: Place,
+    },
+    /// Settings have other values than were written.
+    NotKept {
+        /// Key, value of the file, value of the device.
+        settings: Vec<(String, Item, Option<Item>)>,
+        /// Whether the device was reset before.
+        is_after_reset: bool,
+    },
+    /// The bit rate is not changed while other nodes are on the bus.
+    OthersOnBus {
+        /// The other nodes.
+        nodes: Vec<NodeId>,
+    },
+    /// The journal could not be written.
+    Journal {
+        /// The reason.
+        reason: String,
+    },
+    /// Nothing to roll back.
+    NoJournal,
+}
+
+/// What an application of settings that failed left behind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConfigEffect {
+    /// The settings that were written.
+    pub written: Vec<Row>,
+    /// The keys that were not.
+    pub missing: Vec<String>,
+    /// What the user typed after the node.
+    pub arguments: String,
+}
+
+/// What there is to report about settings that were applied.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ConfigFact {
+    /// Keys of sections that were ignored.
+    Ignored {
+        /// `address` or `calibration`.
+        section: &'static str,
+        /// The keys.
+        keys: Vec<String>,
+    },
+    /// Settings that differ from the factory defaults and are not in the file.
+    NotInFile {
+        /// The keys.
+        keys: Vec<String>,
+    },
+    /// A new bit rate takes effect when the device starts again.
+    RateAfterRestart {
+        /// The bit rate in bit/s.
+        rate: u32,
+    },
+}
+
+impl ConfigFailure {
+    /// The kind, which decides the exit code.
+    pub fn kind(&self) -> Kind {
+        match self {
+            ConfigFailure::Mistake { .. } | ConfigFailure::NoSerial { .. } => Kind::Usage,
+            ConfigFailure::Condition { .. } | ConfigFailure::OthersOnBus { .. } | ConfigFailure::NoJournal => {
+                Kind::CheckFailed
+            }
+            ConfigFailure::NotKept { .. } => Kind::Unexpected,
+            ConfigFailure::Journal { .. } => Kind::Io,
+        }
+    }
+
+    /// The failures for the mistakes of a file.
+    pub fn of_mistakes(file: &str, node: Option<NodeId>, mistakes: Vec<Mistake>) -> Vec<Failure> {
+        let failure = |mistake: Mistake| {
+            let cause = ConfigFailure::Mistake { file: file.to_owned(), mistake: Box::new(mistake) };
+            Failure { node, ..Failure::general(cause) }
+        };
+        mistakes.into_iter().map(failure).collect()
+    }
+}
+
+impl ConfigFact {
+    /// Whether the user should act on it.
+    pub fn is_warning(&self) -> bool {
+        matches!(self, ConfigFact::NotInFile { .. } | ConfigFact::RateAfterRestart { .. })
+    }
+}
+
+impl From<ConfigFailure> for Cause {
+    fn from(cause: ConfigFailure) -> Cause {
+        Cause::Config(Box::new(cause))
+    }
+}
+
+impl From<ConfigEffect> for Effect {
+    fn from(effect: ConfigEffect) -> Effect {
+        Effect::Config(Box::new(effect))
+    }
+}
+
+impl From<ConfigFact> for Fact {
+    fn from(fact: ConfigFact) -> Fact {
+        Fact::Config(fact)
+    }
+}

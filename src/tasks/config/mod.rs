@@ -1,0 +1,64 @@
+//! All settings of a device at once: dump them, compare them, apply a file.
+//!
+//! One table ([`setting`]) has every setting with its key, object, form of values and stage. [`Snapshot`] reads them;
+//! a file is [`crate::device::config_file::Document`].
+
+mod apply;
+mod check;
+mod conditions;
+pub mod diff;
+mod dump;
+mod failure;
+mod identity;
+mod lines;
+mod order;
+mod problem;
+pub mod setting;
+mod snapshot;
+pub mod value;
+
+pub use apply::{Applied, Journal, Options, Row as ChangedRow, apply, targets};
+use check::named_objects;
+pub use check::{Sections, Wanted, Wishes, check};
+pub use conditions::check_device;
+pub use dump::{Dump, Row, SECTIONS};
+pub use failure::{ConfigEffect, ConfigFact, ConfigFailure};
+pub use identity::{Kind, Range};
+pub use lines::{Line, Step, lines};
+pub use problem::{Mistake, Problem};
+pub use snapshot::Snapshot;
+
+use crate::canopen::id::NodeId;
+use crate::device::config_file::Document;
+use crate::master::Master;
+use crate::node::Overrides;
+use crate::tasks::Failure;
+use crate::tasks::settings::open;
+
+/// Reads all settings of a node, and the objects that a file names besides.
+///
+/// # Errors
+/// A node that does not answer; bus errors and Ctrl-C.
+pub fn read(
+    master: &mut Master<'_>,
+    node: NodeId,
+    overrides: &Overrides,
+    document: Option<&Document>,
+) -> Result<Snapshot, Failure> {
+    let node = open(master, node, overrides)?;
+    let mut settings = setting::settings(&node);
+    if let Some(document) = document {
+        settings.extend(named_objects(document, &node, &settings));
+    }
+    Snapshot::read(master, node, settings)
+}
+
+impl Snapshot {
+    /// Checks a file against the device.
+    ///
+    /// # Errors
+    /// Every mistake, in the order of the places.
+    pub fn check(&self, document: &Document) -> Result<Wishes, Vec<Mistake>> {
+        check(document, &self.node, &self.settings, Some(self))
+    }
+}

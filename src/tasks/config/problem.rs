@@ -1,0 +1,169 @@
+//! Mistakes in a file with settings.
+
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::ValueError;
+use crate::device::config_file::{Item, Place};
+use crate::device::unit::Unit;
+use crate::tasks::Failure;
+
+/// A mistake with its place.
+#[derive(Clone, Debug)]
+pub struct Mistake {
+    /// Where it is.
+    pub place: Place,
+    /// The key; empty for a mistake of the syntax.
+    pub key: String,
+    /// What is wrong.
+    pub problem: Problem,
+}
+
+/// What is wrong in a file.
+#[derive(Clone, Debug)]
+pub enum Problem {
+    /// The text is not TOML.
+    Syntax {
+        /// What the parser expected.
+        message: String,
+    },
+    /// No device has such a key, or this device does not have it.
+    UnknownKey {
+        /// The title of the device, if the key is only missing there.
+        device: Option<String>,
+        /// Similar keys, at most three, the nearest first.
+        nearest: Vec<String>,
+    },
+    /// The value of another key has the same meaning.
+    Twice {
+        /// The other key.
+        other: String,
+    },
+    /// The value has another type.
+    Type {
+        /// What is expected, with an example.
+        expected: &'static str,
+        /// What is there.
+        found: &'static str,
+    },
+    /// Not a duration with its unit.
+    NotADuration {
+        /// The text.
+        text: String,
+    },
+    /// The device counts in steps of so many microseconds.
+    DurationStep {
+        /// The step.
+        tick: u32,
+    },
+    /// Not a unit.
+    UnknownUnit {
+        /// The text.
+        text: String,
+    },
+    /// Not a number with a unit.
+    NotAQuantity {
+        /// The text.
+        text: String,
+    },
+    /// A number without a unit, and the file sets no unit for the signal.
+    NoUnit,
+    /// Units of different quantities.
+    OtherQuantity {
+        /// The unit in the file.
+        from: Unit,
+        /// The unit of the signal.
+        to: Unit,
+    },
+    /// An integer with these digits cannot hold the number.
+    TooFine {
+        /// The decimal digits.
+        digits: u8,
+    },
+    /// The value does not fit the type of the object.
+    Value(ValueError),
+    /// The number is out of range.
+    Range {
+        /// The lowest number.
+        low: String,
+        /// The highest number.
+        high: String,
+    },
+    /// The device accepts only these values.
+    Allowed {
+        /// The values.
+        values: Vec<String>,
+    },
+    /// Not one of the words.
+    Word {
+        /// The text.
+        text: String,
+        /// The words.
+        known: Vec<String>,
+    },
+    /// Not a transmission type.
+    Transmission {
+        /// The text.
+        text: String,
+    },
+    /// Not an identifier.
+    NotACobId {
+        /// The text.
+        text: String,
+    },
+    /// CiA 301 reserves the identifier.
+    Restricted {
+        /// The identifier.
+        id: u16,
+    },
+    /// Two PDOs or services have the same identifier.
+    SameId {
+        /// The identifier.
+        id: u32,
+        /// The other key.
+        other: String,
+    },
+    /// A TPDO that is switched on needs an identifier.
+    NoId,
+    /// Not a bit rate.
+    NotABitRate {
+        /// The text.
+        text: String,
+    },
+    /// More bits than a frame has.
+    Bits {
+        /// The bits.
+        bits: u32,
+    },
+    /// More entries than the device has.
+    Entries {
+        /// The number of entries that it has.
+        high: String,
+    },
+    /// An entry of a mapping is wrong.
+    Mapping(Box<Failure>),
+    /// The device cannot map the object.
+    NotMappable {
+        /// The object.
+        object: ObjectId,
+        /// The entry as the file writes it.
+        text: String,
+    },
+    /// The value is fixed.
+    Fixed {
+        /// The value of the device; `None` if it is unknown.
+        present: Option<Item>,
+    },
+    /// The lower end is above the upper end.
+    Crossed {
+        /// The key of the other end.
+        other: String,
+        /// Its value.
+        value: Item,
+    },
+    /// Only one of two settings may be on.
+    Excluded {
+        /// The other key.
+        other: String,
+        /// Its value.
+        value: Item,
+    },
+}

@@ -1,0 +1,367 @@
+//! `config dump`, `diff` and `apply`.
+
+use super::{ALL, Bench};
+
+const DPS: &str = r#"# Settings of Honeywell DPS, written by cangauge config dump.
+# Set them again: cangauge config apply NODE FILE
+
+[device]
+kind = "dps"  # Honeywell DPS
+vendor = "0x362"
+product = "0x443150"
+# revision 0x10000, serial number 20002
+range.pressure = "100.000 psi"
+reference = "gauge"
+
+[address]
+# Set only with --address.
+node-id = 127
+bit-rate = "250k"
+
+[node]
+heartbeat = "0ms"
+
+[signal.pressure]
+unit = "psi"
+digits = 3  # fixed
+span-start = "0.000 psi"
+span-end = "100.000 psi"
+
+[tpdo.1]
+enabled = true
+cob-id = "default"  # default
+signals = ["pressure"]
+transmission = "timer"
+event-timer = "100ms"  # default
+
+[calibration]
+# Values of this one device: set only with --with-calibration.
+# calibrated 2016-04-01
+serial = 20002
+
+[calibration.pressure]
+offset = "0.000 psi"
+"#;
+
+#[test]
+fn a_dump_has_every_setting_of_the_device_and_no_other() {
+    let bench = Bench::of(ALL);
+    bench.run("config dump 127").prints(DPS);
+    let mh4 = bench.run("config dump 1").exit(0).stdout;
+    for line in
+        ["filter = \"none\"", "upper = \"10 bar\"", "range.pressure = \"0 bar to 10 bar\"", "startup = \"wait\""]
+    {
+        assert!(mh4.contains(line), "{line}: {mh4}");
+    }
+    assert!(!mh4.contains("-i16") && !mh4.contains("0x7"), "one family only: {mh4}");
+    let mc1609 = bench.run("config dump 3").exit(0).stdout;
+    assert!(
+        mc1609.contains("[signal.ch16]\nsensor-type = 2  # thermocouple type K\nunit = \"degC\"  # fixed"),
+        "{mc1609}"
+    );
+    assert_eq!(mc1609.matches("[tpdo.").count(), 4);
+}
+
+#[test]
+fn a_dump_only_reads_and_is_the_same_each_time() {
+    let bench = Bench::of(ALL);
+    for node in ["1", "2", "3", "127"] {
+        let first = bench.run(&format!("config dump {node}")).exit(0);
+        let writes = writes(&first).len();
+        assert_eq!(writes, 0);
+        assert_eq!(bench.run(&format!("config dump {node}")).exit(0).stdout, first.stdout);
+    }
+}
+
+#[test]
+fn the_short_form_omits_defaults_and_json_has_rows() {
+    let bench = Bench::described("[[device]]\nkind = \"d20\"\nnode = 2\nset = { \"0x1017\" = 500 }\n");
+    let short = bench.run("config dump 2 --changed").exit(0).stdout;
+    assert!(short.contains("heartbeat = \"500ms\"") && !short.contains("guard-time"), "{short}");
+    let rows = bench.run("config dump 2 --format json").exit(0).json();
+    let row = |key: &str| rows.iter().find(|row| row["setting"] == key).unwrap_or_else(|| panic!("{key}"));
+    assert_eq!(row("node.heartbeat")["value"], "500ms");
+    assert_eq!(
+        (row("node.heartbeat")["default"].as_bool(), row("node.guard-time")["default"].as_bool()),
+        (Some(false), Some(true))
+    );
+    assert_eq!(row("tpdo.1.signals")["value"], serde_json::json!(["process-value-integer"]));
+}
+
+/// A file for the MH-4 with one line more.
+fn with(section: &str, line: &str) -> String {
+    format!("[device]\nkind = \"mh4\"\n[{section}]\n{line}\n")
+}
+
+/// Section, line, place, and the message after the key.
+const MISTAKES: [(&str, &str, &str); 34] = [
+    ("node", "heartbeat = 500", "4:13: node.heartbeat: an integer instead of a duration in quotes (\"100ms\")"),
+    ("node", "heartbeat = \"500\"", "4:13: node.heartbeat: \"500\" is not a duration (100ms, 1s)"),
+    ("node", "heartbeat = \"500us\"", "4:13: node.heartbeat: the device counts in whole milliseconds"),
+    ("node", "heartbeat = \"70s\"", "4:13: node.heartbeat: 70000 does not fit u16 (0 to 65535)"),
+    ("node", "hearbeat = \"500ms\"", "4:1: node.hearbeat: WIKA MH-4-CAN has no such setting (nearest: node.heartbeat)"),
+    ("node", "startup = \"never\"", "4:11: node.startup: \"never\" is not one of: wait, auto"),
+    ("node", "startup = 3", "4:11: node.startup: the device accepts only wait, auto"),
+    (
+        "nodes",
+        "heartbeat = \"500ms\"",
+        "4:1: nodes.heartbeat: WIKA MH-4-CAN has no such setting (nearest: node.heartbeat)",
+    ),
+    (
+        "signal.pressure",
+        "unit = \"furlong\"",
+        "4:8: signal.pressure.unit: \"furlong\" is not a known unit (bar, kPa, degC)",
+    ),
+    ("signal.pressure", "unit = \"kPa\"", "4:8: signal.pressure.unit: the device accepts only bar, psi, MPa"),
+    ("signal.pressure", "unit = 5", "4:8: signal.pressure.unit: an integer instead of a unit in quotes (\"bar\")"),
+    ("signal.pressure", "digits = 7", "4:10: signal.pressure.digits: not in the range 0 to 5"),
+    ("signal.pressure", "digits = 1.5", "4:10: signal.pressure.digits: a number with a fraction instead of an integer"),
+    (
+        "signal.pressure",
+        "filter = \"strong\"",
+        "4:10: signal.pressure.filter: \"strong\" is not one of: none, moving, repeating",
+    ),
+    ("signal.pressure", "filter = 3", "4:10: signal.pressure.filter: not in the range none to repeating"),
+    (
+        "signal.pressure",
+        "upper = 8",
+        "4:9: signal.pressure.upper: a number without a unit, and the file sets no unit for this signal (\"3.2 bar\")",
+    ),
+    (
+        "signal.pressure",
+        "upper = \"8 degC\"\nunit = \"bar\"",
+        "4:9: signal.pressure.upper: degC cannot be converted to bar, the unit of the signal",
+    ),
+    (
+        "signal.pressure",
+        "upper = \"much\"",
+        "4:9: signal.pressure.upper: \"much\" is not a number with a unit (\"3.2 bar\")",
+    ),
+    (
+        "signal.pressure",
+        "upper = \"1 bar\"\nlower = \"2 bar\"\nunit = \"bar\"",
+        "5:9: signal.pressure.lower: beyond signal.pressure.upper, which is 1 bar",
+    ),
+    (
+        "signal.presure",
+        "digits = 3",
+        "4:1: signal.presure.digits: WIKA MH-4-CAN has no such setting (nearest: signal.pressure.digits)",
+    ),
+    ("signal.pressure", "span-end = \"5 bar\"", "4:1: signal.pressure.span-end: WIKA MH-4-CAN has no such setting"),
+    (
+        "tpdo.1",
+        "transmission = \"sync:0\"",
+        "4:16: tpdo.1.transmission: \"sync:0\" is not a transmission type (acyclic, sync:1 to sync:240, event, timer, 0 to 255)",
+    ),
+    (
+        "tpdo.1",
+        "transmission = 245",
+        "4:16: tpdo.1.transmission: the device accepts only acyclic to sync:240, timer, event",
+    ),
+    ("tpdo.1", "event-timer = \"90s\"", "4:15: tpdo.1.event-timer: 90000 does not fit u16 (0 to 65535)"),
+    ("tpdo.1", "inhibit-time = \"5ms\"", "4:1: tpdo.1.inhibit-time: WIKA MH-4-CAN has no such setting"),
+    ("tpdo.1", "signals = [\"pressure\", \"presure\"]", "4:11: tpdo.1.signals: it has no object or signal \"presure\""),
+    (
+        "tpdo.1",
+        "signals = [\"pressure\", \"temperature\", \"0x9130:1/32\"]",
+        "4:11: tpdo.1.signals: 96 bits: a TPDO has at most 64",
+    ),
+    (
+        "tpdo.1",
+        "signals = [\"ai-filter-type:1\"]",
+        "4:11: tpdo.1.signals: the device cannot map ai-filter-type:1 (0x61A0:1) here",
+    ),
+    (
+        "tpdo.1",
+        "signals = 3",
+        "4:11: tpdo.1.signals: an integer instead of a list of signals ([\"pressure\", \"pressure.status\"])",
+    ),
+    ("tpdo.1", "enabled = 1", "4:11: tpdo.1.enabled: an integer instead of true or false"),
+    (
+        "tpdo.9",
+        "enabled = true",
+        "4:1: tpdo.9.enabled: WIKA MH-4-CAN has no such setting (nearest: tpdo.1.enabled, tpdo.2.enabled)",
+    ),
+    (
+        "address",
+        "tpdo.1.cob-id = 0x900",
+        "4:17: address.tpdo.1.cob-id: \"2304\" is not an 11-bit identifier (0x1A5) or \"default\"",
+    ),
+    (
+        "address",
+        "tpdo.1.cob-id = \"0x601\"",
+        "4:17: address.tpdo.1.cob-id: CiA 301 reserves the identifier 0x601 for other services",
+    ),
+    ("address", "node-id = 200", "4:11: address.node-id: not in the range 1 to 127"),
+];
+
+#[test]
+fn each_mistake_of_a_file_has_its_place_and_nothing_is_sent() {
+    let bench = Bench::of(ALL);
+    let mut wrong = Vec::new();
+    for (section, line, expected) in MISTAKES {
+        std::fs::write(bench.path("f.toml"), with(section, line)).expect("a file");
+        let done = bench.run("config apply 1 f.toml").exit(2);
+        assert_eq!(done.frames, [""; 0], "{line}");
+        let errors: Vec<&str> = done.stderr.lines().filter(|line| line.starts_with("cangauge: ")).collect();
+        if !matches!(errors[..], [only] if only.starts_with(&format!("cangauge: f.toml:{expected}"))) {
+            wrong.push(done.stderr);
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.concat());
+}
+
+#[test]
+fn a_file_that_is_no_toml_has_its_place() {
+    let bench = Bench::of(ALL);
+    for (text, place) in [("[node\n", "1:6"), ("a = 1\na = 2\n", "2:1"), ("[node]\nheartbeat = 5 0\n", "2:13")] {
+        std::fs::write(bench.path("f.toml"), text).expect("a file");
+        let done = bench.run("config apply 1 f.toml").exit(2);
+        assert!(done.stderr.starts_with(&format!("cangauge: f.toml:{place}: ")), "{text}: {}", done.stderr);
+        assert_eq!(done.frames, [""; 0]);
+    }
+}
+
+/// The settings of another kind of device, measuring range and reference are refused before the first write.
+#[test]
+fn another_device_is_refused() {
+    let bench = Bench::of(ALL);
+    for (node, text, key) in [
+        ("2", "[device]\nkind = \"mh4\"\n", "device.kind is d20, the file has mh4"),
+        ("1", "[device]\nrange.pressure = \"0 bar to 400 bar\"\n", "device.range.pressure is 0 bar to 10 bar"),
+        ("127", "[device]\nreference = \"absolute\"\n", "device.reference is gauge, the file has absolute"),
+        ("127", "[device]\nrange.pressure = \"500 psi\"\n", "device.range.pressure is 100.000 psi"),
+        ("127", "[device]\nproduct = 5\n", "device.product is 0x443150"),
+    ] {
+        std::fs::write(bench.path("f.toml"), format!("{text}[node]\nheartbeat = \"500ms\"\n")).expect("a file");
+        let done = bench.run(&format!("config apply {node} f.toml")).exit(1);
+        assert!(done.stderr.contains(key), "{text}: {}", done.stderr);
+        assert_eq!(writes(&done), [""; 0], "{text}");
+    }
+    std::fs::write(bench.path("f.toml"), "[device]\nrange.pressure = \"6.895 bar\"\n[node]\nheartbeat = \"500ms\"\n")
+        .expect("a file");
+    bench.run("config apply 127 f.toml").exit(0);
+}
+
+/// The requests that write.
+fn writes(done: &super::Done) -> Vec<&str> {
+    let is_write = |frame: &&String| {
+        let specifier = frame.split('#').nth(1).and_then(|data| data.get(..2));
+        frame.starts_with('6') && matches!(specifier, Some("22" | "23" | "27" | "2B" | "2F" | "21" | "20"))
+    };
+    done.frames.iter().filter(is_write).map(String::as_str).collect()
+}
+
+const FILE: &str = r#"[device]
+kind = "mh4"
+[node]
+heartbeat = "500ms"
+[signal.pressure]
+unit = "psi"
+filter = "moving"
+lower = "1 bar"
+upper = 100
+[tpdo.1]
+signals = ["pressure", "temperature"]
+transmission = "timer"
+event-timer = "100ms"
+"#;
+
+#[test]
+fn apply_writes_what_differs_and_reads_it_back() {
+    let bench = Bench::of(ALL);
+    std::fs::write(bench.path("f.toml"), FILE).expect("a file");
+    let done = bench.run("config apply 1 f.toml --store --reset --format json").exit(0);
+    let report = &done.json()[0];
+    assert_eq!((report["verified"].as_str(), report["stored"].as_bool()), (Some("reset"), Some(true)));
+    let settings = report["settings"].as_array().expect("rows");
+    let row = |key: &str| settings.iter().find(|row| row["setting"] == key).unwrap_or_else(|| panic!("{key}"));
+    // 1 bar, in the unit that the device has then.
+    assert_eq!(row("signal.pressure.lower")["after"], "14.503774 psi");
+    assert_eq!(row("signal.pressure.upper")["after"], "100 psi");
+    assert_eq!(row("tpdo.1.signals")["before"], serde_json::json!(["pressure", "pressure.status"]));
+    // The unit comes first, the lower limit before the upper one, which falls, and the store last.
+    let order: Vec<&str> = writes(&done).into_iter().filter_map(|frame| frame.get(6..12)).collect();
+    let at = |object: &str| order.iter().position(|other| *other == object).unwrap_or_else(|| panic!("{object}"));
+    assert!(at("316101") < at("346101") && at("346101") < at("356101") && at("356101") < at("171000"));
+    assert_eq!(order.last(), Some(&"101001"));
+}
+
+#[test]
+fn the_dump_of_a_device_changes_nothing() {
+    let bench = Bench::of(ALL);
+    for node in ["1", "2", "3", "127"] {
+        let dump = bench.run(&format!("config dump {node}")).exit(0).stdout;
+        std::fs::write(bench.path("f.toml"), dump).expect("a file");
+        let done = bench.run(&format!("config apply {node} f.toml --address --with-calibration")).exit(0);
+        assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("", format!("node {node}: 0 changes\n").as_str()));
+        assert_eq!(writes(&done), [""; 0]);
+        bench.run(&format!("config diff {node} f.toml --address --with-calibration")).prints("");
+        let stored = bench.run(&format!("config apply {node} f.toml --store")).exit(0);
+        assert_eq!(writes(&stored).len(), 1, "{stored:?}");
+    }
+}
+
+#[test]
+fn a_dry_run_lists_the_writes() {
+    let bench = Bench::of(ALL);
+    std::fs::write(bench.path("f.toml"), FILE).expect("a file");
+    let done = bench.run("config apply 1 f.toml --dry-run --store").exit(0);
+    assert_eq!(writes(&done), [""; 0]);
+    let lines: Vec<&str> = done.stdout.lines().collect();
+    assert_eq!(lines[0], "cangauge sdo write 1 0x6131:1 0x00AB0000 --type u32  # signal.pressure.unit");
+    assert_eq!(lines.last(), Some(&"cangauge store 1"));
+    for line in lines.iter().filter(|line| !line.contains("0x1A")) {
+        let words: Vec<&str> = line.split("  #").next().unwrap_or_default().split(' ').skip(1).collect();
+        bench.run_words(&words).exit(0);
+    }
+}
+
+#[test]
+fn a_diff_names_what_differs_with_units() {
+    let bench = Bench::of(ALL);
+    std::fs::write(bench.path("f.toml"), FILE).expect("a file");
+    let done = bench.run("config diff 1 f.toml").exit(1);
+    assert!(done.stdout.contains("signal.pressure.upper"), "{}", done.stdout);
+    let row = done.stdout.lines().find(|line| line.starts_with("signal.pressure.upper")).expect("a row");
+    assert_eq!(row.split_whitespace().collect::<Vec<_>>(), ["signal.pressure.upper", "10", "bar", "100", "psi"]);
+    let dump = bench.run("config dump 1").exit(0).stdout;
+    std::fs::write(bench.path("a.toml"), &dump).expect("a file");
+    std::fs::write(bench.path("b.toml"), dump.replace("heartbeat = \"0ms\"", "heartbeat = \"0s\"")).expect("a file");
+    bench.run("config diff a.toml b.toml").prints("");
+    std::fs::write(bench.path("b.toml"), dump.replace("node-id = 1", "node-id = 9")).expect("a file");
+    let done = bench.run("config diff a.toml b.toml --format json").exit(1);
+    assert_eq!(done.json()[0]["setting"], "address.node-id");
+    let bench = Bench::described(
+        "[[device]]\nkind = \"mh4\"\nnode = 1\n[[device]]\nkind = \"mh4\"\nnode = 2\nset = { \"0x1017\" = 500 }\n",
+    );
+    let done = bench.run("config diff 1 2 --format json").exit(1);
+    assert_eq!(done.json(), [serde_json::json!({"setting":"node.heartbeat","before":"0ms","after":"500ms"})]);
+}
+
+/// A replacement has another node-ID, offset, unit and mapping: one command makes all settings equal, except the
+/// calibration.
+#[test]
+fn address_and_calibration_are_set_only_on_request() {
+    let bench = Bench::described("[[device]]\nkind = \"mh4\"\nnode = 1\n");
+    let old = bench.run("config dump 1").exit(0).stdout;
+    let bench = Bench::described(
+        "[[device]]\nkind = \"mh4\"\nnode = 5\nserial = 7\nset = { \"0x6127:1\" = 0.25, \"0x6131:1\" = 0x00AB0000, \"0x1017\" = 100 }\n",
+    );
+    std::fs::write(bench.path("f.toml"), old).expect("a file");
+    let done = bench.run("config apply 5 f.toml --format json").exit(0);
+    let report = &done.json()[0];
+    let notes: Vec<&str> =
+        report["notes"].as_array().expect("notes").iter().filter_map(|note| note["message"].as_str()).collect();
+    assert!(notes.contains(&"not set: address.node-id (--address sets them)"), "{notes:?}");
+    assert!(notes.iter().any(|note| note.starts_with("not set: calibration.pressure.offset")), "{notes:?}");
+    let done = bench.run("config apply 5 f.toml --with-calibration").exit(1);
+    assert!(done.stderr.contains("calibration.serial is 7, the file has 10001"), "{}", done.stderr);
+    assert_eq!(writes(&done), [""; 0]);
+    let done = bench.run("config apply 5 f.toml --address --store --format json").exit(0);
+    let settings = done.json()[0]["settings"].clone();
+    let row = |key: &str| settings.as_array().expect("rows").iter().find(|row| row["setting"] == key).cloned();
+    assert_eq!(row("address.node-id").expect("the node-ID")["after"], 1);
+    let two = bench.run("config apply 5,6 f.toml --address").exit(2);
+    assert_eq!(two.frames, [""; 0]);
+}
