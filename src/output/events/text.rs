@@ -7,6 +7,7 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
 use crate::output::diagnosis;
 use crate::output::failure::ErrorMessage;
+use crate::tasks::Failure;
 use crate::tasks::log::{Change, LogEvent, Remark, TpdoChange};
 use std::time::Duration;
 
@@ -26,20 +27,8 @@ pub fn event_text(event: &LogEvent) -> EventText {
         LogEvent::ReadAgain(node, changes) if changes.is_empty() => {
             of_node(*node, "read-again", Info, format!("node {node} was read again: its setup is unchanged"))
         }
-        LogEvent::ReadAgain(node, changes) => {
-            let changes = changes.iter().map(change_text).collect::<Vec<_>>().join("; ");
-            let text = format!("node {node} has changed, and is recorded with its new setup: {changes}");
-            of_node(*node, "changed", Warning, text)
-        }
-        LogEvent::Unreadable(node, why) => {
-            let why = ErrorMessage::of(why).message;
-            of_node(
-                *node,
-                "unreadable",
-                Warning,
-                format!("{why}: node {node} is not recorded until it can be read again"),
-            )
-        }
+        LogEvent::ReadAgain(node, changes) => of_node(*node, "changed", Warning, changed_text(*node, changes)),
+        LogEvent::Unreadable(node, why) => of_node(*node, "unreadable", Warning, unreadable_text(*node, why)),
         LogEvent::HeartbeatLost(node, since) => {
             let text = format!("node {node}: heartbeat lost, none for {}", format_duration(*since));
             of_node(*node, "heartbeat-lost", Warning, text)
@@ -79,6 +68,15 @@ pub fn event_text(event: &LogEvent) -> EventText {
 
 fn of_node(node: NodeId, event: &'static str, weight: Weight, text: String) -> EventText {
     EventText { event: Some(event), node: Some(node), text, weight }
+}
+
+fn changed_text(node: NodeId, changes: &[Change]) -> String {
+    let changes = changes.iter().map(change_text).collect::<Vec<_>>().join("; ");
+    format!("node {node} has changed, and is recorded with its new setup: {changes}")
+}
+
+fn unreadable_text(node: NodeId, why: &Failure) -> String {
+    format!("{}: node {node} is not recorded until it can be read again", ErrorMessage::of(why).message)
 }
 
 fn times_more(count: u64) -> String {
