@@ -1,6 +1,6 @@
 # Print an optspec for argparse to handle cmd's options that are independent of any subcommand.
 function __fish_cangauge_global_optspecs
-    string join \n b/bus= t/timeout= retries= device= eds= accept-mismatch f/format= trace= ignore-lock q/quiet v/verbose progress= color= h/help V/version
+    string join \n b/bus= t/timeout= retries= device= eds= sdo= accept-mismatch f/format= trace= ignore-lock q/quiet v/verbose progress= color= h/help V/version
 end
 
 function __fish_cangauge_needs_command
@@ -29,6 +29,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -s t -l timeout -d 'Long
 complete -c cangauge -n "__fish_cangauge_needs_command" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_needs_command" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -77,6 +78,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s t -l timeout 
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -99,6 +101,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s t -l timeout -d
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -122,6 +125,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s t -l timeout 
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -143,6 +147,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -173,6 +178,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -196,6 +202,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -219,6 +226,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -242,6 +250,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -265,6 +274,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -288,6 +298,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -310,6 +321,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -332,6 +344,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -362,6 +375,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -386,6 +400,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -415,6 +430,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -465,6 +481,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s t -l timeout -
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -495,6 +512,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s t -l timeout
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -516,6 +534,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -546,6 +565,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -567,6 +587,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -591,6 +612,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -618,6 +640,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -648,6 +671,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -672,6 +696,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -694,6 +719,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -716,6 +742,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -746,6 +773,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s t -l timeout 
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -767,6 +795,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s t -l timeou
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -788,6 +817,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s t -l timeout 
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -814,6 +844,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s t -l timeou
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -839,6 +870,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s t -l timeou
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -860,6 +892,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s t -l timeou
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -882,6 +915,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s t -l timeou
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -904,6 +938,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -930,6 +965,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -951,6 +987,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -973,6 +1010,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -995,6 +1033,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1022,6 +1061,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1047,6 +1087,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1068,6 +1109,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1094,6 +1136,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1227,6 +1270,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s t -l time
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1254,6 +1298,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s t -l timeout 
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1281,6 +1326,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s t -l timeout
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1306,6 +1352,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s t -l timeo
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1328,6 +1375,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s t -l timeout -
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1349,6 +1397,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s t -l timeo
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1370,6 +1419,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fis
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show check help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1394,6 +1444,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1415,6 +1466,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1439,6 +1491,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s t -l t
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"

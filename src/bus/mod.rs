@@ -3,6 +3,7 @@
 //! This layer promises frames with two receive times, waits with a deadline, and a clock. It is the only place with
 //! sockets, clocks, signals and `unsafe`. It knows frames and no protocol.
 
+pub mod channels;
 pub mod claim;
 mod delegate;
 pub mod faults;

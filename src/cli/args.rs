@@ -1,7 +1,7 @@
 //! Types of arguments: nodes, signals, objects, durations. Arguments are checked here, before a bus is opened.
 
 use crate::bus::claim::Claim;
-use crate::canopen::id::NodeId;
+use crate::canopen::id::{CanId, NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::measure::decode::Wanted;
@@ -261,6 +261,40 @@ impl FromStr for Override {
             }
             None => Ok(Override { node: None, what: text.to_owned() }),
         }
+    }
+}
+
+/// An SDO channel named by the user: `0x645:0x5C5`, `5=0x645:0x5C5`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// The node; `None` for the only node of the command.
+    pub node: Option<NodeId>,
+    /// The COB-ID of requests.
+    pub request: CanId,
+    /// The COB-ID of answers.
+    pub response: CanId,
+}
+
+impl FromStr for Channel {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Channel, String> {
+        let (node, ids) = match text.split_once('=') {
+            Some((node, ids)) => (Some(node.parse().map_err(|error| format!("{error}"))?), ids),
+            None => (None, text),
+        };
+        let id = |text: &str| {
+            // 000h is NMT, 001h to 080h are emergency stops and SYNC, 7E4h and 7E5h are LSS.
+            let number = parse_u32(text).and_then(|number| u16::try_from(number).ok());
+            let id = number.filter(|number| (0x81..0x7e4).contains(number)).and_then(CanId::standard);
+            id.ok_or_else(|| format!("\"{text}\" is not a COB-ID for SDO (0x081 to 0x7E3)"))
+        };
+        let (request, response) = ids.split_once(':').ok_or("an SDO channel is TX:RX, for example 0x645:0x5C5")?;
+        let (request, response) = (id(request)?, id(response)?);
+        if request == response {
+            return Err("requests and answers need different COB-IDs".to_owned());
+        }
+        Ok(Channel { node, request, response })
     }
 }
 

@@ -41,7 +41,7 @@ pub(crate) use crate::output::failure::ErrorMessage;
 use crate::output::report::Format;
 use crate::output::report::{Report, Stream, render};
 use anstream::ColorChoice;
-use args::{BusSpec, Duration, Override};
+use args::{BusSpec, Channel, Duration, Override};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use descriptions::Named;
 use exit::{FileError, IntoFailure};
@@ -108,6 +108,11 @@ pub struct Global {
     /// Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes
     #[arg(long, global = true, value_name = "[NODE=]FILE")]
     pub(crate) eds: Vec<Override>,
+
+    /// The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several
+    /// nodes
+    #[arg(long, global = true, value_name = "[NODE=]TX:RX")]
+    pub(crate) sdo: Vec<Channel>,
 
     /// Use a description or EDS of another device (its vendor or product differs)
     #[arg(long, global = true)]

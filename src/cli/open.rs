@@ -1,10 +1,11 @@
 //! Opens the bus, and finds the nodes that the options name.
 
 use super::Global;
-use super::args::{BusSpec, Nodes};
+use super::args::{BusSpec, Channel, Nodes};
 use super::exit::{FileError, IntoFailure};
 use super::file::lock_output;
-use crate::bus::claim::{ClaimError, Claims, IfHeld, Part};
+use crate::bus::channels::{SdoChannel, SdoChannels};
+use crate::bus::claim::{Claim, ClaimError, Claims, IfHeld, Part};
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
 use crate::bus::replay::{Replay, ReplayNote};
@@ -57,6 +58,7 @@ pub(super) fn claim(global: &Global, spec: &BusSpec) -> Result<Claims, Failure> 
 
 /// Opens this bus. With `even_down`, also an interface that is down.
 pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyhow::Result<Box<dyn Bus>> {
+    let channels = channels(global)?;
     let bus: Box<dyn Bus> = match spec {
         BusSpec::Sim(bench) => Box::new(simulated(bench.as_deref())?),
         BusSpec::Replay(file) => {
@@ -71,13 +73,27 @@ pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyho
         BusSpec::SocketCan(name) => socketcan(name, even_down)?,
     };
     // After the bus: without one, an existing trace keeps its content. Nothing was sent yet.
-    Ok(match &global.trace {
+    let bus: Box<dyn Bus> = match &global.trace {
         Some(path) => {
             let (out, name) = trace_output(path)?;
             Box::new(Traced::new(bus, out, &name))
         }
         None => bus,
-    })
+    };
+    Ok(if channels.is_empty() { bus } else { Box::new(SdoChannels::new(bus, &channels)) })
+}
+
+/// The SDO channels that the user named.
+fn channels(global: &Global) -> Result<Vec<SdoChannel>, ErrorMessage> {
+    let only = match &global.claim {
+        Claim::Nodes(nodes) if nodes.len() == 1 => nodes.first().copied(),
+        _ => None,
+    };
+    let channel = |named: &Channel| match named.node.or(only) {
+        Some(node) => Ok(SdoChannel { node, request: named.request, response: named.response }),
+        None => Err(ErrorMessage::usage("--sdo does not say for which node").hint("name it: --sdo 5=0x645:0x5C5")),
+    };
+    global.sdo.iter().map(channel).collect()
 }
 
 fn trace_output(path: &Path) -> anyhow::Result<(Box<dyn Write>, String)> {

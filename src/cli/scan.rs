@@ -73,6 +73,12 @@ impl Scan {
         for other in found.iter().filter(|found| found.is_other_device) {
             global.console().warn(&format!("node {}: the description or EDS is for another device", other.node));
         }
+        let is_silent = |found: &&Found| !found.device.is_identified && found.failure.is_none();
+        for silent in found.iter().filter(is_silent).filter(|_| !self.passive) {
+            global
+                .console()
+                .note(&format!("node {}: it sends heartbeats and does not answer SDO requests", silent.node));
+        }
         let unknown = found.iter().find(|found| found.state.is_none()).filter(|_| !self.passive);
         if let Some(unknown) = unknown {
             global.console().note(&format!(

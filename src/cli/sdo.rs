@@ -11,7 +11,7 @@ use crate::canopen::value::{DataType, parse_hex};
 use crate::master::Master;
 use crate::master::transfer::BlockMode;
 use crate::node::write::is_signature;
-use crate::node::{Form, Node, WriteOptions, names};
+use crate::node::{Form, Node, WriteOptions, Written, names};
 use crate::output::failure::ErrorMessage;
 use crate::output::progress::Transfer;
 use crate::output::sdo::{ObjectValue, ValueForm};
@@ -292,7 +292,13 @@ impl WriteArgs {
                 WriteOptions { form, blocks: self.block.into(), ..WriteOptions::new(&mut progress, &mut watch) };
             for (at, bytes, data_type) in ready {
                 let is_verifiable = self.verify && !is_signature(&bytes);
-                write(master, &node, at, &bytes, is_verifiable.then_some(data_type), &mut options)?;
+                let verify = is_verifiable.then_some(data_type);
+                if let Written::ReadBack(heard) = write(master, &node, at, &bytes, verify, &mut options)? {
+                    let heard = heard.map(|frame| format!("; heard {frame}")).unwrap_or_default();
+                    let message =
+                        format!("node {}: no answer to {at}{heard}; it was read back and holds the value", self.node);
+                    global.console().note(&message);
+                }
                 if self.verify && !is_verifiable {
                     let message =
                         format!("node {}: {at} acknowledged the signature; it cannot be read back", self.node);

@@ -9,7 +9,7 @@ use super::transfer::{Blocks, TransferKind, is_about_object};
 use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{AbortCode, TransferError, Uploaded};
+use crate::canopen::sdo::{AbortCode, TransferError, Uploaded, Violation};
 use std::time::Duration;
 
 /// A transfer in progress.
@@ -162,6 +162,10 @@ impl Active {
 
     /// Whether the transfer failed only because the server does not support block transfer.
     pub(super) fn lacks_block_transfer(&self, error: TransferError) -> bool {
+        // The CRC of some devices includes the padding of the last segment.
+        if matches!(error, TransferError::Violation(Violation::Crc, _)) {
+            return self.request.operation() == Operation::Read && self.request.falls_back();
+        }
         // An abort code about the object itself would come again. A write with an unknown answer may have had an
         // effect and is not repeated.
         let refused = match error {

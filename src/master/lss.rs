@@ -78,12 +78,14 @@ pub struct Lss<'master, 'bus> {
     is_configuring: bool,
     boot_ups: BTreeMap<NodeId, Stamp>,
     faults: Vec<Fault>,
+    /// The first frame of a slave that did not answer the request.
+    heard: Option<Frame>,
 }
 
 impl<'bus> Master<'bus> {
     /// The LSS services.
     pub fn lss(&mut self) -> Lss<'_, 'bus> {
-        Lss { master: self, is_configuring: false, boot_ups: BTreeMap::new(), faults: Vec::new() }
+        Lss { master: self, is_configuring: false, boot_ups: BTreeMap::new(), faults: Vec::new(), heard: None }
     }
 }
 
@@ -300,7 +302,9 @@ impl<'bus> Lss<'_, 'bus> {
     fn error(&self, exchange: &Exchange, error: ExchangeError) -> LssError {
         let service = exchange.service();
         match error {
-            ExchangeError::NoAnswer => LssError::NoAnswer { service, waited: self.timeout_of(exchange) },
+            ExchangeError::NoAnswer => {
+                LssError::NoAnswer { service, waited: self.timeout_of(exchange), heard: self.heard }
+            }
             ExchangeError::Several(frames) => LssError::Several { service, frames },
             ExchangeError::Refused(code) => LssError::Refused { service, code },
             ExchangeError::Violation(violation, frame) => LssError::Violation { service, violation, frame },
@@ -318,6 +322,7 @@ impl<'bus> Lss<'_, 'bus> {
         // Frames received before the request do not answer it.
         self.discard_received()?;
         self.faults.clear();
+        self.heard = None;
         let timeout = self.timeout_of(exchange);
         for attempt in 0..=retries {
             // If only the answer was lost, the slave is in configuration state and ignores the address.
@@ -335,7 +340,9 @@ impl<'bus> Lss<'_, 'bus> {
             let mut deadline = sent + timeout;
             while let Some(received) = self.next(deadline)? {
                 let is_first = !exchange.has_answer();
-                if exchange.on_frame(&received.frame) && is_first && until == Until::Answer {
+                if !exchange.on_frame(&received.frame) {
+                    self.heard.get_or_insert(received.frame);
+                } else if is_first && until == Until::Answer {
                     deadline = deadline.min(received.at.mono + FURTHER_ANSWERS_TIMEOUT);
                 }
             }

@@ -5,6 +5,7 @@
 //! returns what happened. All blocking functions are built on it.
 
 mod active;
+mod clues;
 mod foreign_traffic;
 pub mod lss;
 mod machine;
@@ -14,6 +15,7 @@ mod second_answer;
 mod send;
 pub mod transfer;
 
+pub use clues::Clue;
 pub use lss::{Lss, LssError};
 pub use request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 pub use second_answer::{OnTwoDevices, SecondAnswer};
@@ -96,6 +98,9 @@ pub struct Master<'bus> {
     bus: &'bus mut dyn Bus,
     timing: Timing,
     sdo: SdoClient,
+    filters: Filters,
+    /// Whether the bus delivers all frames, whatever the filters are.
+    receives_all: bool,
     outgoing: Outgoing,
     /// A frame that was received after the deadline. It is handled next.
     pending: Option<Received>,
@@ -107,7 +112,8 @@ impl<'bus> Master<'bus> {
     /// A master on `bus`.
     pub fn new(bus: &'bus mut dyn Bus, timing: Timing) -> Master<'bus> {
         let outgoing = Outgoing::new();
-        Master { bus, timing, sdo: SdoClient::default(), outgoing, pending: None, seen: Mono::START }
+        let (sdo, filters) = (SdoClient::default(), Filters::All);
+        Master { bus, timing, sdo, filters, receives_all: false, outgoing, pending: None, seen: Mono::START }
     }
 
     /// Sets the host's interface to another bit rate in bit/s. Transfers in progress end, and waiting frames are lost.
@@ -141,7 +147,8 @@ impl<'bus> Master<'bus> {
     /// # Errors
     /// The bus rejects the filters.
     pub fn listen(&mut self, filters: &Filters) -> Result<(), Error> {
-        Ok(self.bus.listen(filters)?)
+        self.filters = filters.clone();
+        Ok(if self.receives_all { () } else { self.bus.listen(filters)? })
     }
 
     /// Receives only the SDO channels and the heartbeats of these nodes. On a busy bus, other frames cost time and may
@@ -318,6 +325,11 @@ impl<'bus> Master<'bus> {
             let mut deadline = until;
             for other in [retry_at, self.sdo.next_deadline()].into_iter().flatten() {
                 deadline = deadline.min(other);
+            }
+            if self.sdo.wants_all_frames() != self.receives_all {
+                self.receives_all = !self.receives_all;
+                let filters = if self.receives_all { &Filters::All } else { &self.filters };
+                self.bus.listen(filters)?;
             }
             let event = match self.pending.take() {
                 Some(received) => Event::Frame(received),

@@ -1,5 +1,6 @@
 //! SDO requests, answers and errors.
 
+use super::clues::Clue;
 use super::machine::Machine;
 use super::second_answer::SecondAnswer;
 use super::transfer::{Blocks, TransferKind};
@@ -165,12 +166,14 @@ pub enum SdoFailure {
     #[error("refused by the device ({0})")]
     Refused(AbortCode),
     /// The device did not answer in time.
-    #[error("no answer within {}{}", format_duration(*.waited), if *.started { " in the middle of the transfer" } else { "" })]
+    #[error("no answer within {}{}{}", format_duration(*.waited), if *.started { " in the middle of the transfer" } else { "" }, told(.clue))]
     NoAnswer {
         /// The longest wait for one answer.
         waited: Duration,
         /// Whether the device answered before and then stopped.
         started: bool,
+        /// What was received instead.
+        clue: Clue,
     },
     /// The answer violates the protocol.
     #[error("{0}: {1}")]
@@ -222,4 +225,11 @@ fn two_devices(answers: Option<&SecondAnswer>) -> String {
         }
         None => "more than one answer arrives: two devices have this node-ID, or a bridge repeats frames".to_owned(),
     }
+}
+
+/// What was received instead of an answer.
+fn told(clue: &Clue) -> String {
+    let heard = clue.frame.map(|frame| format!("; heard {frame}")).unwrap_or_default();
+    let state = clue.state.map(|state| format!("; its heartbeat says {state}")).unwrap_or_default();
+    format!("{heard}{state}")
 }

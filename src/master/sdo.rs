@@ -4,6 +4,7 @@
 
 use super::Timing;
 use super::active::{Active, Verdict};
+use super::clues::Clues;
 use super::request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 use super::second_answer::{Answers, OnTwoDevices, SecondAnswer};
 use super::send::Outgoing;
@@ -52,6 +53,7 @@ pub(super) struct SdoClient {
     /// Whether a node has a waiting transfer and none in progress.
     can_start: bool,
     on_two_devices: OnTwoDevices,
+    clues: Clues,
 }
 
 impl SdoClient {
@@ -75,6 +77,11 @@ impl SdoClient {
     /// Whether [`SdoClient::advance`] would start something.
     pub(super) fn can_start(&self) -> bool {
         self.can_start
+    }
+
+    /// Whether frames with other COB-IDs than those of the nodes are wanted.
+    pub(super) fn wants_all_frames(&self) -> bool {
+        self.clues.wants_all_frames()
     }
 
     pub(super) fn has_finished(&self) -> bool {
@@ -125,7 +132,9 @@ impl SdoClient {
         let active = self.nodes.get_mut(&ticket.node).and_then(|node| node.active.as_mut());
         if let Some(active) = active.filter(|active| active.ticket == ticket) {
             active.machine.on_sent();
-            active.asked_at.get_or_insert(now);
+            if active.asked_at.replace(active.asked_at.unwrap_or(now)).is_none() {
+                self.clues.asked(ticket.node, active.request.object);
+            }
             active.unsent = active.unsent.saturating_sub(1);
             if active.unsent == 0 {
                 active.deadline = Some(now + active.timeout(timing));
@@ -149,8 +158,18 @@ impl SdoClient {
     /// Handles a received frame; `false` if it does not belong to one of our transfers.
     pub(super) fn on_frame(&mut self, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
         let id = received.frame.id();
-        let Some(number) = id.sdo_response_node().or_else(|| id.sdo_request_node()) else { return false };
+        let known = id.sdo_response_node().or_else(|| id.sdo_request_node());
+        let Some(number) = known.filter(|node| self.nodes.contains_key(node)) else {
+            self.clues.elsewhere(&received.frame, received.at.mono);
+            return false;
+        };
+        let is_stale = self.nodes.get(&number).is_some_and(|node| node.has_stale(&received.frame));
         let is_ours = self.on_frame_of(number, received, timing, outgoing);
+        if is_ours {
+            self.clues.answered(number);
+        } else if !is_stale {
+            self.clues.on_channel(number, &received.frame, received.at.mono);
+        }
         if let Some(node) = self.nodes.get(&number) {
             self.due = earlier(self.due, node.active.as_ref().and_then(|active| active.deadline));
             self.can_start |= node.active.is_none() && !node.waiting.is_empty();
@@ -253,7 +272,8 @@ impl SdoClient {
                     node.answers.on_repeated(active.request.object);
                     active.request.fall_back();
                     *active = Active::new(active.ticket, active.request.clone(), node.accept_60, timing);
-                    active.enqueue(vec![active.machine.request()], outgoing);
+                    out.push(active.machine.request());
+                    active.enqueue(out, outgoing);
                     return true;
                 }
                 Err(active.error(match error {
@@ -317,9 +337,12 @@ impl SdoClient {
             if !has_begun {
                 node.stale.push(StaleRequest { object: active.request.object, until: now + STALE_LIFETIME });
                 node.answers.on_repeated(active.request.object);
-                if active.attempts_left > 0 {
+                let may_repeat = active.request.repeatable && timing.retries > 0;
+                let is_starting = may_repeat && self.clues.is_starting(active.request.node, now);
+                if active.attempts_left > 0 || is_starting {
                     active.is_repeated = true;
-                    active.attempts_left -= 1;
+                    active.attempts_left = active.attempts_left.saturating_sub(1);
+                    self.clues.repeated(active.request.node);
                     out.push(active.machine.request());
                     active.enqueue(out, outgoing);
                     continue;
@@ -336,7 +359,8 @@ impl SdoClient {
                 continue;
             }
             let waited = active.timeout(timing);
-            let mut error = active.error(SdoFailure::NoAnswer { waited, started: has_begun });
+            let clue = self.clues.end(active.request.node);
+            let mut error = active.error(SdoFailure::NoAnswer { waited, started: has_begun, clue });
             // The error names the deferred request, except a write that was never sent.
             let was_sent = |request: &Request| request.operation() == Operation::Read || request.refused_blocks;
             if let Some((_, request)) = active.deferred.as_ref().filter(|(_, request)| was_sent(request)) {
@@ -352,6 +376,7 @@ impl SdoClient {
         node.waiting.retain(|(waiting, _)| *waiting != ticket);
         if let Some(active) = node.active.take_if(|active| active.ticket == ticket) {
             node.answers.on_repeated(active.request.object);
+            self.clues.end(ticket.node);
         }
         self.can_start |= node.active.is_none() && !node.waiting.is_empty();
     }
@@ -399,6 +424,7 @@ impl SdoClient {
             node.waiting.clear();
         }
         self.finished.clear();
+        self.clues.cancel();
         (self.due, self.can_start) = (None, false);
     }
 }

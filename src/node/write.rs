@@ -15,6 +15,7 @@
 use super::Node;
 use super::error::{Error, shown};
 use crate::bus::Received;
+use crate::canopen::frame::Frame;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, DownloadSize};
 use crate::canopen::value::DataType;
@@ -65,8 +66,8 @@ pub struct WriteOptions<'a> {
 pub enum Written {
     /// The node acknowledged it.
     Acknowledged,
-    /// No answer came, and the object was read back and holds the value.
-    ReadBack,
+    /// No answer came, but perhaps this frame; the object was read back and holds the value.
+    ReadBack(Option<Frame>),
 }
 
 /// Writes an object with the default options.
@@ -124,7 +125,7 @@ pub fn write_with(
             _ if error.operation == Operation::Read => return Err(error.into()),
             _ if !may_be_lost(&error) => return Err(Error::Unknown(error)),
             _ => match read_back(master, node, object, data, options)? {
-                Some(true) => return Ok(Written::ReadBack),
+                Some(true) => return Ok(Written::ReadBack(heard(&error))),
                 Some(false) if options.repeat == Repeat::Once && attempts_left > 0 => attempts_left -= 1,
                 Some(false) => return Err(error.into()),
                 None => return Err(Error::Unknown(error)),
@@ -242,6 +243,14 @@ fn read_back(
     // A node that does not indicate the size sends four bytes for every type.
     let has_width = !uploaded.indicated || uploaded.bytes.len() == data.len();
     Ok(Some(has_width && uploaded.bytes.get(..data.len()) == Some(data)))
+}
+
+/// What was received instead of the answer.
+fn heard(error: &SdoError) -> Option<Frame> {
+    match error.failure {
+        SdoFailure::NoAnswer { clue, .. } => clue.frame,
+        _ => None,
+    }
 }
 
 /// Whether the request or its answer may have been lost. After any other failure the node may act later.

@@ -7,7 +7,7 @@ use crate::canopen::value::{DataType, Value};
 use crate::master::transfer::{BlockMode, Moved};
 use crate::master::{Error, Master, Request};
 use crate::node::write::write_with;
-use crate::node::{self, Node, WriteOptions, names, survey};
+use crate::node::{self, Node, WriteOptions, Written, names, survey};
 use crate::tasks::Failure;
 
 /// A value of an object.
@@ -96,7 +96,7 @@ pub fn find_form(master: &mut Master<'_>, node: &mut Node) -> Result<(), Failure
     }
 }
 
-/// Writes bytes to an object, reads them back if `verify` says so, and compares.
+/// Writes bytes to an object, reads them back if `verify` says so, and compares. Returns how the write was confirmed.
 ///
 /// # Errors
 /// Those of [`write_with`]; an object that reads differently.
@@ -107,13 +107,13 @@ pub fn write(
     data: &[u8],
     verify: Option<DataType>,
     options: &mut WriteOptions<'_>,
-) -> Result<(), Failure> {
-    write_with(master, node, object, data, options)?;
-    let Some(data_type) = verify else { return Ok(()) };
+) -> Result<Written, Failure> {
+    let written = write_with(master, node, object, data, options)?;
+    let Some(data_type) = verify else { return Ok(written) };
     let mut options = ReadOptions { blocks: options.blocks, is_exact: false, progress: &mut *options.progress };
     let found = read(master, &mut node.clone(), object, Some(data_type), &mut options)?.raw;
     if found == data {
-        return Ok(());
+        return Ok(written);
     }
     let (written, found) = (Value::Bytes(data.to_vec()), Value::Bytes(found));
     Err(node::Error::NotKept { node: node.id, object, written, found }.into())

@@ -154,7 +154,7 @@ fn rejected_request_is_exit_4() {
 #[test]
 fn absent_node_is_exit_3() {
     let bench = Bench::of("mh4@1");
-    let hint = "hint: list the nodes that answer: cangauge scan\n";
+    let hint = "hint: check its node-ID, power and cable; list the nodes that answer: cangauge scan\n";
     let done = bench
         .run("sdo read 5 0x6130:1")
         .fails(3, &format!("cangauge: node 5: read 0x6130:1: no answer within 500 ms\n{hint}"));
@@ -167,7 +167,7 @@ fn absent_node_is_exit_3() {
     assert_eq!(
         error,
         json!({"error": {"kind": "no-answer", "exit": 3, "message": "node 5: read 0x6130:1: no answer within 2 s",
-            "node": 5, "object": "0x6130:1", "abort": null, "hint": "list the nodes that answer: cangauge scan"}})
+            "node": 5, "object": "0x6130:1", "abort": null, "hint": "check its node-ID, power and cable; list the nodes that answer: cangauge scan"}})
     );
 }
 
@@ -213,4 +213,29 @@ fn text_from_a_device_is_escaped() {
     assert_eq!(done.json()[0]["value"], "a\u{1b}[2Jb", "JSON has its own escapes");
     let table = bench.run("scan 5").exit(0).stdout;
     assert!(table.contains("a\\x1B[2Jb") && !table.contains('\u{1b}'), "{table}");
+}
+
+#[test]
+fn another_sdo_channel_is_used_as_stated() {
+    let bench = Bench::of("mh4@5");
+    for option in ["--sdo 0x645:0x5C5", "--sdo 5=0x645:0x5C5"] {
+        let done = bench.run(&format!("sdo read 5 0x1000 {option}")).exit(3);
+        assert_eq!(done.frames_of("645"), ["4000100000000000"; 2], "the device answers 605h only");
+        assert_eq!(done.frames_of("605"), [""; 0]);
+    }
+    bench.run("sdo read 5 0x1000 --sdo 6=0x645:0x5C5").exit(0);
+    bench.run("scan --sdo 0x645:0x5C5").refuses("--sdo does not say for which node");
+    bench.run("sdo read 5 0x1000 --sdo 0x645:0x645").exit(2);
+    bench.run("sdo read 5 0x1000 --sdo 0x000:0x585").exit(2);
+}
+
+#[test]
+fn stopped_node_is_named_in_the_error() {
+    let bench = Bench::described(
+        "[[device]]\nkind = \"mh4\"\nnode = 5\nstart = true\nset = { \"0x1017\" = 100 }\nanswers_only = [\"0x1001\"]\n",
+    );
+    let done = bench.run("sdo read 5 0x1000").exit(3);
+    assert!(done.stderr.contains("; its heartbeat says operational"), "{}", done.stderr);
+    let done = bench.run("sdo read 5 0x1001 0x1000").exit(3);
+    assert!(done.stderr.contains("hint: the node answered before: allow it more time with -t 2s"), "{}", done.stderr);
 }

@@ -5,7 +5,7 @@ use cangauge::bus::faults::{FaultPlan, Faulty};
 use cangauge::bus::memory::{Clock, MemoryBus, Outbox, Station};
 use cangauge::bus::time::Mono;
 use cangauge::canopen::frame::Frame;
-use cangauge::canopen::id::NodeId;
+use cangauge::canopen::id::{CanId, NodeId};
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::sdo::DownloadSize;
 use cangauge::canopen::value::{DataType, Value};
@@ -253,7 +253,128 @@ fn other_frames_do_not_extend_the_timeout() {
         let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 0 });
         let error = master.transfer_one(Request::read(node(), ObjectId::new(0x2000, 0))).expect("the bus works");
         let failure = error.expect_err("no node answers").failure;
-        assert_eq!(failure, SdoFailure::NoAnswer { waited: TIMEOUT, started: false }, "{text}");
+        assert!(matches!(failure, SdoFailure::NoAnswer { waited: TIMEOUT, started: false, .. }), "{text}: {failure}");
         assert!(master.now().since_start() < TIMEOUT + Duration::from_millis(20), "{text}: {:?}", master.now());
     }
+}
+
+/// A device of which node 5 reads 1000h and 1017h. It changes each answer.
+struct OddServer(fn(Frame) -> Frame);
+
+impl Station for OddServer {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, frame: &Frame, out: &mut Outbox) {
+        let [command, a, b, c, ..] = *frame.data() else { return };
+        if frame.id() != CanId::sdo_request(node()) {
+            return;
+        }
+        let answer = if command == 0x40 { [0x4b, a, b, c, 0xf4, 1, 0, 0] } else { [0x60, a, b, c, 0, 0, 0, 0] };
+        out.send((self.0)(Frame::full(CanId::sdo_response(node()), answer)));
+    }
+
+    fn wake(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn next_wake(&self) -> Option<Mono> {
+        None
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+const HEARTBEAT: ObjectId = ObjectId::new(0x1017, 0);
+
+/// Index and sub-index of an acknowledge are 0.
+fn without_index(frame: Frame) -> Frame {
+    match frame.data() {
+        [0x60, ..] => Frame::full(frame.id(), [0x60, 0, 0, 0, 0, 0, 0, 0]),
+        _ => frame,
+    }
+}
+
+#[test]
+fn write_acknowledged_with_index_0_is_read_back() {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(OddServer(without_index));
+    let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 1 });
+    let target = cangauge::node::Node::new(node());
+    let written = cangauge::node::write::write(&mut master, &target, HEARTBEAT, &[0xf4, 1]).expect("it is read back");
+    let cangauge::node::Written::ReadBack(Some(heard)) = written else { panic!("{written:?}") };
+    assert_eq!(heard.to_string(), "585#6000000000000000");
+    let error = cangauge::node::write::write(&mut master, &target, HEARTBEAT, &[1, 0]).expect_err("another value");
+    let cangauge::node::Error::Sdo(error) = error else { panic!("{error:?}") };
+    assert!(error.to_string().ends_with("no answer within 100 ms; heard 585#6000000000000000"), "{error}");
+}
+
+#[test]
+fn answer_with_another_cob_id_is_reported() {
+    fn elsewhere(frame: Frame) -> Frame {
+        Frame::new(CanId::standard(0x5c5).expect("an identifier"), frame.data()).expect("a frame")
+    }
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(OddServer(elsewhere));
+    let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 1 });
+    master.listen_to(&[node()]).expect("filters");
+    let error = master.transfer_one(Request::read(node(), HEARTBEAT)).expect("the bus works").expect_err("no answer");
+    assert!(error.to_string().ends_with("; heard 5C5#4B171000F4010000"), "{error}");
+    // The channel that the user states.
+    let channel = cangauge::bus::channels::SdoChannel {
+        node: node(),
+        request: CanId::sdo_request(node()),
+        response: CanId::standard(0x5c5).expect("an identifier"),
+    };
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(OddServer(elsewhere));
+    let mut bus = cangauge::bus::channels::SdoChannels::new(bus, &[channel]);
+    let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 0 });
+    master.listen_to(&[node()]).expect("filters");
+    assert!(master.transfer_one(Request::read(node(), HEARTBEAT)).expect("the bus works").is_ok());
+}
+
+/// A device that sends its boot-up message and answers SDO only from a later moment on.
+struct SlowStart {
+    boots: Option<Mono>,
+    answers_from: Mono,
+}
+
+impl Station for SlowStart {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, now: Mono, frame: &Frame, out: &mut Outbox) {
+        if now >= self.answers_from {
+            OddServer(|answer| answer).receive(now, frame, out);
+        }
+    }
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        if self.boots.take_if(|boots| *boots <= now).is_some() {
+            out.send(Frame::byte(CanId::heartbeat(node()), 0));
+        }
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.boots
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn requests_are_repeated_for_five_seconds_after_a_boot_up() {
+    let at = |milliseconds| Mono::START + Duration::from_millis(milliseconds);
+    for (answers_from, has_answer) in [(2500, true), (4800, true), (9000, false)] {
+        let mut bus = MemoryBus::new(Clock::Virtual);
+        bus.attach(SlowStart { boots: Some(at(10)), answers_from: at(answers_from) });
+        let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 1 });
+        master.listen_to(&[node()]).expect("filters");
+        let result = master.transfer_one(Request::read(node(), HEARTBEAT)).expect("the bus works");
+        assert_eq!(result.is_ok(), has_answer, "{answers_from} ms");
+        assert!(master.now() < at(5300), "it ends 5 s after the boot-up: {:?}", master.now());
+    }
+    // Without a boot-up message, and for a request that must not be repeated, nothing changes.
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    bus.attach(SlowStart { boots: Some(at(10)), answers_from: at(2500) });
+    let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 1 });
+    assert!(master.transfer_one(Request::read(node(), HEARTBEAT).once()).expect("the bus works").is_err());
+    assert!(master.now() < at(300), "{:?}", master.now());
 }

@@ -2,11 +2,15 @@
 
 use super::{Place, Words};
 use crate::bus::replay::{FileFormat, RecordingError};
+use crate::bus::time::format_duration;
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::Service;
+use crate::canopen::nmt::NmtState;
+use crate::canopen::sdo::Violation;
 use crate::master::SecondAnswer;
-use crate::tasks::failure::{BusError, ExpressionError, LssError, Operation, SdoError, SdoFailure};
+use crate::tasks::failure::{BusError, Clue, ExpressionError, LssError, Operation, SdoError, SdoFailure};
 use std::path::Path;
+use std::time::Duration;
 
 /// The bus failed.
 pub(super) fn bus(error: &BusError) -> Words {
@@ -66,7 +70,10 @@ fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
 pub(super) fn sdo(error: &SdoError) -> Words {
     let words = Words::new(error.to_string());
     match error.failure {
-        SdoFailure::NoAnswer { started: false, .. } => words.hint("list the nodes that answer: cangauge scan"),
+        SdoFailure::NoAnswer { waited, started, clue } => match silence_advice(error.node, waited, started, clue) {
+            Some(hint) => words.hint(hint),
+            None => words,
+        },
         SdoFailure::Fit(_) => {
             words.hint(format!("show its bytes: cangauge sdo read {} {} --type hex", error.node, error.object))
         }
@@ -85,8 +92,8 @@ pub(super) fn sdo(error: &SdoError) -> Words {
             error.node
         )),
         SdoFailure::Disturbed => words.hint("stop the other program for a moment, or try again"),
-        SdoFailure::NoAnswer { .. }
-        | SdoFailure::Refused(_)
+        SdoFailure::Violation(Violation::Crc, _) => words.hint("read it without blocks: add --block never"),
+        SdoFailure::Refused(_)
         | SdoFailure::Violation(..)
         | SdoFailure::WrongLength { .. }
         | SdoFailure::NotANumber
@@ -101,6 +108,27 @@ pub fn second_answer(node: NodeId, answers: SecondAnswer) -> String {
         return format!("node {node}: {}", SdoFailure::TwoDevices(Some(answers)));
     }
     format!("node {node}: answers arrive twice: two devices have node-ID {node}, or a bridge repeats frames")
+}
+
+/// What to do about a node that does not answer.
+fn silence_advice(node: NodeId, waited: Duration, started: bool, clue: Clue) -> Option<String> {
+    if let Some(frame) = clue.frame {
+        let channel = frame.id().sdo_response_node();
+        return (channel.is_none()).then(|| {
+            format!("if it answers with another COB-ID, state the channel: --sdo {node}=0xTX:0x{}", frame.id())
+        });
+    }
+    Some(match clue.state {
+        Some(NmtState::Stopped) => format!("a stopped node answers no SDO: cangauge nmt preop {node}"),
+        _ if clue.has_answered || started => {
+            format!(
+                "the node answered before: allow it more time with -t {}",
+                format_duration(waited * 4).replace(' ', "")
+            )
+        }
+        Some(_) => "if its SDO channel is another one, state it: --sdo 0xTX:0xRX".to_owned(),
+        None => "check its node-ID, power and cable; list the nodes that answer: cangauge scan".to_owned(),
+    })
 }
 
 /// An LSS service failed.

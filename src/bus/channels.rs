@@ -1,0 +1,92 @@
+//! A wrapper around a bus for nodes whose SDO channel has other COB-IDs than 600h and 580h + node-ID.
+//!
+//! It exchanges the COB-IDs in both directions, so that all other code sees the usual ones. A trace below it shows the
+//! frames as they are on the bus.
+
+use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, delegate_bus};
+use crate::canopen::frame::Frame;
+use crate::canopen::id::{CanId, NodeId};
+
+/// The SDO channel of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SdoChannel {
+    /// The node.
+    pub node: NodeId,
+    /// The COB-ID of requests to the node.
+    pub request: CanId,
+    /// The COB-ID of its answers.
+    pub response: CanId,
+}
+
+/// A bus with nodes that have other SDO channels.
+pub struct SdoChannels<B> {
+    bus: B,
+    /// COB-IDs that are exchanged: the usual one and the one on the bus.
+    pairs: Vec<(CanId, CanId)>,
+}
+
+impl<B: Bus> SdoChannels<B> {
+    /// Exchanges the COB-IDs of these channels on `bus`.
+    pub fn new(bus: B, channels: &[SdoChannel]) -> SdoChannels<B> {
+        let pairs = channels.iter().flat_map(|channel| {
+            [(CanId::sdo_request(channel.node), channel.request), (CanId::sdo_response(channel.node), channel.response)]
+        });
+        SdoChannels { bus, pairs: pairs.collect() }
+    }
+
+    fn exchanged(&self, id: CanId) -> CanId {
+        let pair = self.pairs.iter().find(|(usual, own)| *usual == id || *own == id);
+        pair.map_or(id, |&(usual, own)| if id == usual { own } else { usual })
+    }
+
+    fn frame(&self, frame: &Frame) -> Frame {
+        let id = self.exchanged(frame.id());
+        if frame.is_remote() { *frame } else { Frame::new(id, frame.data()).unwrap_or(*frame) }
+    }
+}
+
+impl<B: Bus> Bus for SdoChannels<B> {
+    delegate_bus!(self, self.bus => name timestamps is_live waits now mono receive_buffer late_drops finish);
+
+    fn listen(&mut self, filters: &Filters) -> Result<(), BusError> {
+        match filters {
+            Filters::All => self.bus.listen(filters),
+            Filters::Only(ids) => self.bus.listen(&Filters::Only(ids.iter().map(|&id| self.exchanged(id)).collect())),
+        }
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.bus.send(&self.frame(frame))
+    }
+
+    fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
+        Ok(match self.bus.receive(deadline)? {
+            Event::Frame(mut received) => {
+                received.frame = self.frame(&received.frame);
+                Event::Frame(received)
+            }
+            event => event,
+        })
+    }
+}
+
+impl<B: Bus> BitRateControl for SdoChannels<B> {
+    delegate_bus!(self, self.bus => bit_rate can_set_bit_rate set_bit_rate restore_bit_rate);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cob_ids_are_exchanged_in_both_directions() {
+        let id = |number| CanId::standard(number).expect("an identifier");
+        let channel = SdoChannel { node: NodeId::new(5).expect("a node-ID"), request: id(0x645), response: id(0x5c5) };
+        let bus = SdoChannels::new(crate::bus::memory::MemoryBus::new(crate::bus::memory::Clock::Virtual), &[channel]);
+        for (from, to) in [(0x605, 0x645), (0x645, 0x605), (0x585, 0x5c5), (0x5c5, 0x585), (0x705, 0x705)] {
+            assert_eq!(bus.exchanged(id(from)), id(to));
+        }
+        let frame: Frame = "605#4000100000000000".parse().expect("a frame");
+        assert_eq!(bus.frame(&frame).to_string(), "645#4000100000000000");
+    }
+}

@@ -1,0 +1,146 @@
+//! What was received instead of an answer: it explains why a request failed.
+
+use crate::bus::Mono;
+use crate::canopen::frame::Frame;
+use crate::canopen::id::NodeId;
+use crate::canopen::nmt::{Life, NmtState};
+use crate::canopen::object::ObjectId;
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+/// Requests without an answer are repeated for this time after a boot-up message.
+const START_TIME: Duration = Duration::from_secs(5);
+
+/// What was received from a node that did not answer a request.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Clue {
+    /// The first frame that looks like an answer: with another index, or with another COB-ID.
+    pub frame: Option<Frame>,
+    /// The state that its last heartbeat showed.
+    pub state: Option<NmtState>,
+    /// It answered an earlier request.
+    pub has_answered: bool,
+}
+
+/// The clues of all nodes.
+#[derive(Debug, Default)]
+pub(super) struct Clues {
+    states: BTreeMap<NodeId, NmtState>,
+    answered: BTreeSet<NodeId>,
+    /// When the nodes sent their boot-up messages.
+    booted: BTreeMap<NodeId, Mono>,
+    /// The object of the request that waits for the first frame of its answer, and what came instead.
+    open: BTreeMap<NodeId, (ObjectId, Option<Frame>)>,
+    /// Nodes whose request was repeated. Their answers may have another COB-ID.
+    repeated: BTreeSet<NodeId>,
+}
+
+impl Clues {
+    /// A request was sent.
+    pub(super) fn asked(&mut self, node: NodeId, object: ObjectId) {
+        self.open.insert(node, (object, None));
+    }
+
+    /// A request without an answer is repeated.
+    pub(super) fn repeated(&mut self, node: NodeId) {
+        self.repeated.insert(node);
+    }
+
+    /// Whether a node started a short time ago: some devices do not answer for 2 to 3 s after their boot-up message.
+    pub(super) fn is_starting(&self, node: NodeId, now: Mono) -> bool {
+        self.booted.get(&node).is_some_and(|&booted| now.since(booted) < START_TIME)
+    }
+
+    /// Whether frames with other COB-IDs than those of the nodes are wanted.
+    pub(super) fn wants_all_frames(&self) -> bool {
+        !self.repeated.is_empty()
+    }
+
+    /// A node answered.
+    pub(super) fn answered(&mut self, node: NodeId) {
+        self.answered.insert(node);
+        self.end(node);
+    }
+
+    /// A transfer of a node has ended. Returns what was received instead of an answer.
+    pub(super) fn end(&mut self, node: NodeId) -> Clue {
+        self.repeated.remove(&node);
+        let frame = self.open.remove(&node).and_then(|(_, frame)| frame);
+        let (state, has_answered) = (self.states.get(&node).copied(), self.answered.contains(&node));
+        Clue { frame, state, has_answered }
+    }
+
+    /// Forgets the open requests.
+    pub(super) fn cancel(&mut self) {
+        (self.open, self.repeated) = (BTreeMap::new(), BTreeSet::new());
+    }
+
+    /// A frame on the SDO channel of a node that does not belong to our transfer.
+    pub(super) fn on_channel(&mut self, node: NodeId, frame: &Frame, now: Mono) {
+        if frame.id().sdo_request_node().is_some() {
+            // Another master uses the channel: the frames may be its answers.
+            self.open.remove(&node);
+        } else if let Some((_, odd)) = self.open.get_mut(&node) {
+            odd.get_or_insert(*frame);
+        } else if !self.answered.contains(&node) {
+            self.elsewhere(frame, now);
+        }
+    }
+
+    /// A frame with another COB-ID.
+    pub(super) fn elsewhere(&mut self, frame: &Frame, now: Mono) {
+        if let Some((node, life)) = Life::parse(frame) {
+            match life {
+                Life::State(state) => {
+                    self.states.insert(node, state);
+                }
+                Life::BootUp => {
+                    self.states.remove(&node);
+                    self.booted.insert(node, now);
+                }
+            }
+            return;
+        }
+        let [0x41..=0x43 | 0x47 | 0x4b | 0x4f | 0x60 | 0x80, a, b, c, _, _, _, _] = *frame.data() else { return };
+        let object = ObjectId::from_multiplexer([a, b, c]);
+        for (asked, odd) in self.open.values_mut() {
+            if *asked == object {
+                odd.get_or_insert(*frame);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OBJECT: ObjectId = ObjectId::new(0x1017, 0);
+
+    fn clue(frames: &[&str]) -> Clue {
+        let node = NodeId::new(5).expect("a node-ID");
+        let mut clues = Clues::default();
+        clues.asked(node, OBJECT);
+        for text in frames {
+            let frame: Frame = text.parse().expect("a frame");
+            match frame.id().sdo_response_node().or_else(|| frame.id().sdo_request_node()) {
+                Some(other) => clues.on_channel(other, &frame, Mono::START),
+                None => clues.elsewhere(&frame, Mono::START),
+            }
+        }
+        clues.end(node)
+    }
+
+    #[test]
+    fn frames_that_look_like_the_answer_are_kept() {
+        for odd in ["585#6000000000000000", "585#6017100100000000", "5C5#6017100000000000", "586#4B171000F4010000"] {
+            assert_eq!(clue(&[odd]).frame.map(|frame| frame.to_string()).as_deref(), Some(odd));
+        }
+        for other in ["5C5#6018100000000000", "185#6017100000000000AA", "605#4018100100000000", "705#05"] {
+            assert_eq!(clue(&other.parse::<Frame>().map(|_| vec![other]).unwrap_or_default()).frame, None, "{other}");
+        }
+        assert_eq!(clue(&["605#4018100100000000", "585#4318100147000000"]).frame, None, "another master's");
+        assert_eq!(clue(&["705#04"]).state, Some(NmtState::Stopped));
+        assert_eq!(clue(&["705#04", "705#00"]).state, None);
+    }
+}
