@@ -20,9 +20,13 @@ pub(super) fn bus(error: &BusError) -> Words {
             "no node acknowledges the frames: check the sensor's power, the bit rate, the wiring and the 120 ohm \
              terminators; or the bus is overloaded: candump shows the traffic",
         ),
-        BusError::Down(name) => words.hint(format!(
-            "bring it up: sudo ip link set {name} up type can bitrate 250000 (use the sensors' bit rate)"
-        )),
+        // A virtual interface has no bit rate.
+        BusError::Down(name) if name.starts_with("vcan") || name.starts_with("vxcan") => {
+            words.hint(format!("bring it up: sudo cangauge bus up {name}"))
+        }
+        BusError::Down(name) => {
+            words.hint(format!("bring it up: sudo cangauge bus up {name} 250k (use the sensors' bit rate)"))
+        }
         BusError::NoInterface(_) | BusError::NotCan(_) => {
             words.hint("list the interfaces: cangauge bus list; without hardware: --bus sim")
         }

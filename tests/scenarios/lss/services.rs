@@ -97,8 +97,16 @@ fn answer_to_store_is_reported() {
         ),
         (&[0x17], "LSS store configuration: frame too short: 7E4#17", Some(Kind::Unexpected)),
         // The answer to another service is ignored.
-        (&[0x11, 0, 0, 0, 0, 0, 0, 0], "LSS store configuration: no answer within 3 s", Some(Kind::NoAnswer)),
-        (&[0x44, 0, 0, 0, 0, 0, 0, 0], "LSS store configuration: no answer within 3 s", Some(Kind::NoAnswer)),
+        (
+            &[0x11, 0, 0, 0, 0, 0, 0, 0],
+            "LSS store configuration: no answer within 3 s; heard 7E4#1100000000000000",
+            Some(Kind::NoAnswer),
+        ),
+        (
+            &[0x44, 0, 0, 0, 0, 0, 0, 0],
+            "LSS store configuration: no answer within 3 s; heard 7E4#4400000000000000",
+            Some(Kind::NoAnswer),
+        ),
     ] {
         let mut slave = Slave::new(ONE, 5);
         slave.answers.insert(0x17, answer.to_vec());
