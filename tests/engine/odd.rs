@@ -252,7 +252,7 @@ fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
         nodes: vec![node],
         sync_ms,
         poll_ms,
-        duration_ms: 1000,
+        duration_ms: 2500,
         count: None,
         nmt: true,
     };

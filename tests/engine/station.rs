@@ -228,8 +228,8 @@ impl Station for FaultyDevice {
             Some(refusal) if self.device.state().is_some_and(|state| state != State::Stopped) => out.send(refusal),
             _ => self.act(now, out, |device, out| device.receive(now, frame, out)),
         }
-        if let (Some(oddity), Some(node), Some(State::Operational)) =
-            (self.oddity, self.device.node(), self.device.state())
+        if let (Some(oddity), Some(node), Some(State::Operational), CanId::NMT) =
+            (self.oddity, self.device.node(), self.device.state(), frame.id())
         {
             if matches!(oddity, Oddity::Mute(Mute::Dies | Mute::DiesUnseen)) {
                 out.clear();
