@@ -75,7 +75,7 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("signal_hook", &["bus"]),
     ("socket2", &["bus"]),
     ("socketcan", &["bus"]),
-    ("std::env", &["main"]),
+    ("std::env", &["cli", "main"]),
     ("std::fs", &["bus", "cli", "output", "sim"]),
     ("std::io", &["bus", "cli", "output", "sim"]),
     ("std::net", &["bus"]),

@@ -31,6 +31,12 @@ const LINES_AHEAD: usize = 1000;
 /// Times before this moment (March 1973) have no date: they count from the start of the recording.
 const FIRST_DATE: Duration = Duration::from_secs(100_000_000);
 
+/// A longer time between two lines is a step of the clock, from 1970 to the present for example.
+const LONGEST_PAUSE: Duration = Duration::from_secs(24 * 3600);
+
+/// A line may be earlier than the one before by this time: interrupts of two controllers are not in order.
+const DISORDER: Duration = Duration::from_millis(10);
+
 /// A mark that some editors write at the start of a UTF-8 file.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
@@ -48,6 +54,17 @@ pub enum ReplayNote {
     NoDate,
     /// The file ends in the middle of its last line, which has this number and was skipped.
     CutOff(u64),
+    /// The clock was set during the recording. These steps count as no time.
+    ClockSet {
+        /// How many steps.
+        count: u64,
+        /// The line of the first one, counted from 1.
+        line: u64,
+        /// Its size.
+        by: Duration,
+        /// Whether it leads back.
+        is_backwards: bool,
+    },
 }
 
 /// A candump recording as a bus that only receives.
@@ -60,8 +77,12 @@ pub struct Replay {
     number: u64,
     /// The interface in the recording.
     interface: String,
-    /// The wall time of the first line. It is the start of the monotonic time line.
-    begin: Option<Wall>,
+    /// The time of the last line that was read.
+    last: Option<Stamp>,
+    /// The time before the last step backwards, and the size of that step.
+    before_step: Option<(Stamp, Duration)>,
+    /// The time of the last event that was delivered.
+    delivered: Stamp,
     now: Mono,
     /// The next event.
     next: Option<(Stamp, Event)>,
@@ -76,6 +97,7 @@ pub struct Replay {
     /// The number of the last line, if it is not complete.
     cut_off: Option<u64>,
     has_no_date: bool,
+    clock_set: Option<ReplayNote>,
     report: Report,
 }
 
@@ -110,7 +132,9 @@ impl Replay {
             ahead: VecDeque::new(),
             number: 0,
             interface: String::new(),
-            begin: None,
+            last: None,
+            before_step: None,
+            delivered: Stamp::default(),
             now: Mono::START,
             next: None,
             state: State::Reading,
@@ -120,12 +144,48 @@ impl Replay {
             skipped: None,
             cut_off: None,
             has_no_date: false,
+            clock_set: None,
             report,
         }
     }
 
     fn stamp(&self, mono: Mono) -> Stamp {
-        Stamp { mono, wall: self.begin.unwrap_or_default() + mono.since_start() }
+        Stamp { mono, wall: self.delivered.wall + mono.since(self.delivered.mono) }
+    }
+
+    /// The time of a line. The first line starts the monotonic time line. If the clock was set, no time passes.
+    fn place(&mut self, number: u64, wall: Wall) -> Stamp {
+        let Some(last) = self.last else {
+            let first = Stamp { mono: self.now, wall };
+            (self.last, self.delivered) = (Some(first), first);
+            return first;
+        };
+        let (now, before) = (wall.since_epoch(), last.wall.since_epoch());
+        let (forwards, backwards) = (now.saturating_sub(before), before.saturating_sub(now));
+        if let Some((earlier, _)) = self.before_step.take_if(|(_, size)| forwards >= *size) {
+            // Only single lines were early.
+            let mono = earlier.mono + now.saturating_sub(earlier.wall.since_epoch());
+            self.last = Some(Stamp { mono, wall });
+            return Stamp { mono: mono.max(self.now), wall };
+        }
+        let is_step = forwards > LONGEST_PAUSE || backwards > DISORDER;
+        if is_step {
+            self.note_step(number, forwards.max(backwards), !backwards.is_zero());
+            self.before_step = (!backwards.is_zero()).then_some((last, backwards));
+        }
+        let mono = if is_step { last.mono } else { last.mono + forwards };
+        // A frame that is slightly too early moves nothing.
+        if is_step || backwards.is_zero() {
+            self.last = Some(Stamp { mono, wall });
+        }
+        Stamp { mono: mono.max(self.now), wall }
+    }
+
+    fn note_step(&mut self, number: u64, size: Duration, back: bool) {
+        let first = ReplayNote::ClockSet { count: 0, line: number, by: size, is_backwards: back };
+        if let ReplayNote::ClockSet { count, .. } = self.clock_set.get_or_insert(first) {
+            *count += 1;
+        }
     }
 
     fn wrong(&self, line: Option<u64>, error: RecordingError) -> BusError {
@@ -219,10 +279,7 @@ impl Replay {
             let error = RecordingError::SeveralInterfaces(interface, self.interface.clone());
             return Err(self.wrong(Some(number), error));
         }
-        let begin = self.begin.get_or_insert(wall).since_epoch();
-        // If the clock was set back during the recording, the order of the frames stays.
-        let mono = Mono::at(wall.since_epoch().saturating_sub(begin)).max(self.now);
-        let at = Stamp { mono, wall };
+        let at = self.place(number, wall);
         self.next = match event {
             Ok(frame) if !self.filters.wants(&frame) => None,
             Ok(frame) => Some((at, Event::Frame(Received { frame, at }))),
@@ -275,6 +332,9 @@ impl Drop for Replay {
         }
         if let Some(line) = self.cut_off {
             (self.report)(&ReplayNote::CutOff(line));
+        }
+        if let Some(note) = &self.clock_set {
+            (self.report)(note);
         }
     }
 }
@@ -337,6 +397,7 @@ impl Bus for Replay {
         self.fetch()?;
         if let Some((at, event)) = self.next.take_if(|(at, _)| at.mono <= deadline) {
             self.now = self.now.max(at.mono);
+            self.delivered = at;
             return Ok(event);
         }
         if self.state == State::AtEnd {

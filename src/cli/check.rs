@@ -3,7 +3,7 @@
 use super::args::{BusSpec, Duration, Nodes};
 use super::exit::Several;
 use super::file::ReportFile;
-use super::recording::{print_event, refuse_to_send, sync_interval};
+use super::recording::{poll_interval, print_event, refuse_to_send, sync_interval};
 use super::{Global, descriptions, open};
 use crate::bus::Stamp;
 use crate::bus::claim::{Claim, Claims};
@@ -59,7 +59,7 @@ pub(crate) struct Check {
     #[arg(long, value_name = "DUR", requires = "duration", conflicts_with = "poll", value_parser = sync_interval)]
     sync: Option<Duration>,
     /// Read by SDO at this interval
-    #[arg(long, value_name = "DUR", requires = "duration")]
+    #[arg(long, value_name = "DUR", requires = "duration", value_parser = poll_interval)]
     poll: Option<Duration>,
     /// Write the verdicts as JUnit XML for CI servers, one test case per expression and node. An existing file is
     /// replaced

@@ -5,7 +5,7 @@ mod finish;
 mod recorder;
 
 use super::args::{Duration, Nodes, SignalArg};
-use super::recording::{print_verdicts, refuse_to_send, sync_interval};
+use super::recording::{poll_interval, print_verdicts, refuse_to_send, sync_interval};
 use super::{Global, When, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -62,7 +62,7 @@ pub(crate) struct Log {
     #[arg(long, value_name = "DUR", conflicts_with_all = ["poll", "passive"], value_parser = sync_interval)]
     sync: Option<Duration>,
     /// Read by SDO at this interval
-    #[arg(long, value_name = "DUR", conflicts_with = "passive")]
+    #[arg(long, value_name = "DUR", conflicts_with = "passive", value_parser = poll_interval)]
     poll: Option<Duration>,
     /// Send nothing at all
     #[arg(long)]

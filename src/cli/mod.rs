@@ -14,6 +14,7 @@ pub mod exit;
 mod file;
 mod filter;
 mod info;
+mod journal;
 mod limits;
 mod log;
 mod lss;
@@ -38,13 +39,16 @@ use crate::master::{Master, OnTwoDevices, Timing};
 use crate::output;
 use crate::output::console::Console;
 pub(crate) use crate::output::failure::ErrorMessage;
-use crate::output::report::Format;
-use crate::output::report::{Report, Stream, render};
+use crate::output::notes::undone_text;
+
+use crate::output::report::{Format, Report, Stream, render};
+use crate::tasks::journal::Journal;
 use anstream::ColorChoice;
 use args::{BusSpec, Channel, Duration, Override};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use descriptions::Named;
 use exit::{FileError, IntoFailure};
+use journal::FileJournal;
 use std::cell::RefCell;
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
@@ -350,7 +354,10 @@ impl Global {
         let mut bus = open::open_as(self, &spec, false)?;
         let mut master = Master::new(&mut *bus, self.timing(Timing::default().timeout));
         master.set_on_two_devices(self.on_two_devices);
-        let result = descriptions::check_pending(&mut master, self).and_then(|()| work(&mut master, &mut claims));
+        let result = self
+            .undo_left_behind(&mut master, &spec)
+            .and_then(|()| descriptions::check_pending(&mut master, self))
+            .and_then(|()| work(&mut master, &mut claims));
         // The last frames of a command are still sent: an abort, an NMT state to restore.
         master.settle();
         for (node, answers) in master.second_answers() {
@@ -363,6 +370,27 @@ impl Global {
         let result = result?;
         finished?;
         Ok(result)
+    }
+}
+
+impl Global {
+    /// Undoes what a killed program left behind on the nodes of this command.
+    fn undo_left_behind(&self, master: &mut Master<'_>, bus: &BusSpec) -> anyhow::Result<()> {
+        let is_ours = |node: NodeId| match &self.claim {
+            Claim::Nothing => false,
+            Claim::Nodes(nodes) => nodes.contains(&node),
+            Claim::Bus => true,
+        };
+        let mut journal = FileJournal::of(bus);
+        for write in journal.left_behind(&is_ours) {
+            master.listen_to(&[write.node]).or_fail()?;
+            let undone = write.undo(master).or_fail()?;
+            self.console().warn(&undone_text(&write, undone));
+            if !undone.is_open() {
+                journal.remove(&write);
+            }
+        }
+        Ok(())
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::args::{Duration, Nodes};
 use super::exit::{IntoFailure, several, stdout};
+use super::journal::FileJournal;
 use super::{Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -170,6 +171,8 @@ impl Targets {
             // A device that starts by itself leaves PRE-OPERATIONAL at once after a reset.
             Some(state) if kind.is_reset() || state == wanted => return None,
             Some(state) => NmtFailure::OtherState { state, wanted },
+            // The restart is proven, the state is not.
+            None if kind.is_reset() && report.by == Proof::BootUp => return None,
             None if !report.is_present => NmtFailure::NoSign,
             None if kind.is_reset() => NmtFailure::NoBootUp,
             None => NmtFailure::NotConfirmed,
@@ -207,9 +210,10 @@ fn probe_unknown(master: &mut Master<'_>, global: &Global, reports: &mut [StateR
     let ids: Vec<NodeId> = unknown.iter().map(|report| report.node).collect();
     let overrides = descriptions::overrides(global, &ids)?;
     let nodes = identify_each(master, &ids, &overrides).or_fail()?;
+    let mut journal = FileJournal::of(&open::spec(global)?);
     for (report, node) in unknown.iter_mut().zip(nodes) {
         let node = node.unwrap_or_else(|_| Node::new(report.node));
-        let probed = probe(master, &node).or_fail()?;
+        let probed = probe(master, &node, &mut journal).or_fail()?;
         let text = probed.failure.map(|failure| ErrorMessage::of(&failure).message);
         let left = probed.left.map(left_heartbeat);
         if let Some(text) = text {

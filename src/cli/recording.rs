@@ -8,14 +8,23 @@ use crate::output::events::{EventText, Weight};
 use crate::output::failure::ErrorMessage;
 use crate::output::verdict;
 
-/// The shortest interval of SYNC.
-const SHORTEST_SYNC_INTERVAL: std::time::Duration = std::time::Duration::from_millis(1);
+/// The shortest interval of SYNC and polling.
+const SHORTEST_INTERVAL: std::time::Duration = std::time::Duration::from_millis(1);
 
 /// Parses an interval of SYNC.
 pub(super) fn sync_interval(text: &str) -> Result<Duration, String> {
+    interval(text, "SYNC")
+}
+
+/// Parses an interval of polling.
+pub(super) fn poll_interval(text: &str) -> Result<Duration, String> {
+    interval(text, "polling")
+}
+
+fn interval(text: &str, purpose: &str) -> Result<Duration, String> {
     let interval: Duration = text.parse()?;
-    if interval.0 < SHORTEST_SYNC_INTERVAL {
-        Err(format!("\"{text}\" is too short for SYNC (1ms or more)"))
+    if interval.0 < SHORTEST_INTERVAL {
+        Err(format!("\"{text}\" is too short for {purpose} (1ms or more)"))
     } else {
         Ok(interval)
     }

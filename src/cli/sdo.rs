@@ -8,8 +8,8 @@ use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, parse_hex};
-use crate::master::Master;
 use crate::master::transfer::BlockMode;
+use crate::master::{Master, TEXT_LIMIT};
 use crate::node::write::is_signature;
 use crate::node::{Form, Node, WriteOptions, Written, names};
 use crate::output::failure::ErrorMessage;
@@ -17,7 +17,7 @@ use crate::output::progress::Transfer;
 use crate::output::sdo::{ObjectValue, ValueForm};
 use crate::output::text;
 use crate::tasks::Failure;
-use crate::tasks::sdo::{ReadOptions, encode, find_form, read, write};
+use crate::tasks::sdo::{FILE_LIMIT, ReadOptions, encode, find_form, read, write};
 use clap::{Args, Subcommand, ValueEnum};
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -184,6 +184,7 @@ impl ReadArgs {
         let mut file = path.map(|path| OutFile::create(path, self.force)).transpose()?;
         let bar = Transfer::new(global.shows_progress());
         let mut values = Vec::new();
+        let longest = if self.output.is_some() { FILE_LIMIT } else { TEXT_LIMIT };
         let result = global.with_master(|master| {
             master.listen_to(&[self.node]).or_fail()?;
             for object in &self.objects {
@@ -191,7 +192,7 @@ impl ReadArgs {
                 descriptions::warn_about(global, node.model.as_ref(), at.index);
                 let mut progress = |moved| bar.moved(moved);
                 let (blocks, is_exact) = (self.block.into(), self.output.is_some());
-                let mut options = ReadOptions { blocks, is_exact, progress: &mut progress };
+                let mut options = ReadOptions { blocks, longest, is_exact, progress: &mut progress };
                 let read = read(master, &mut node, at, self.data_type, &mut options)?;
                 bar.finish();
                 if let Some(note) = read.note {

@@ -23,6 +23,10 @@ pub(super) struct Active {
     /// The number of our frames that still wait to be sent.
     pub(super) unsent: usize,
     pub(super) attempts_left: u32,
+    /// How often a read that fails in the middle starts again from its initiate.
+    pub(super) restarts_left: u32,
+    /// A read was rejected because of a transfer that the node still had in progress. It was repeated.
+    pub(super) was_rejected: bool,
     /// When the first request was sent. Earlier frames do not answer it.
     pub(super) asked_at: Option<Mono>,
     pub(super) foreign: ForeignTraffic,
@@ -56,6 +60,8 @@ impl Active {
         let foreign = ForeignTraffic::default();
         Active {
             ticket,
+            restarts_left: if request.may_restart() { timing.retries } else { 0 },
+            was_rejected: false,
             request,
             machine,
             deadline,
@@ -160,6 +166,33 @@ impl Active {
         out.push(self.machine.request());
     }
 
+    /// Starts a read again from its initiate after this failure; `false` if that must not be or would not help. `out` has
+    /// the abort for the server.
+    pub(super) fn restart(
+        &mut self,
+        error: TransferError,
+        accept_60: bool,
+        out: &mut Vec<Frame>,
+        outgoing: &mut Outgoing,
+    ) -> bool {
+        let has_begun = self.machine.has_begun();
+        let is_rejected = error == TransferError::Aborted(AbortCode::COMMAND_SPECIFIER);
+        if !has_begun && is_rejected && self.request.may_restart() && !self.was_rejected {
+            // A server with an interrupted transfer rejects the first request, and then is free.
+            self.was_rejected = true;
+        } else if has_begun && is_of_transmission(error) && self.restarts_left > 0 {
+            self.restarts_left -= 1;
+        } else {
+            return false;
+        }
+        self.machine = self.request.machine(accept_60);
+        self.asked_at = None;
+        self.is_repeated = true;
+        out.push(self.machine.request());
+        self.enqueue(std::mem::take(out), outgoing);
+        true
+    }
+
     /// Whether the transfer failed only because the server does not support block transfer.
     pub(super) fn lacks_block_transfer(&self, error: TransferError) -> bool {
         // The CRC of some devices includes the padding of the last segment.
@@ -191,7 +224,7 @@ impl Active {
     }
 
     pub(super) fn error(&self, failure: SdoFailure) -> SdoError {
-        SdoError { node: self.request.node, object: self.request.object, operation: self.request.operation(), failure }
+        self.request.error(failure)
     }
 
     /// Records a request of another master. If it writes the same object, an acknowledge may be for either of us.
@@ -200,5 +233,15 @@ impl Active {
             let same = ObjectId::from_multiplexer([*a, *b, *c]) == self.request.object;
             self.ambiguous |= same && command >> 5 == 1 && self.request.operation() == Operation::Write;
         }
+    }
+}
+
+/// Whether a lost or changed frame can cause this failure in the middle of a transfer.
+fn is_of_transmission(error: TransferError) -> bool {
+    match error {
+        TransferError::Violation(Violation::TooLong, _) => false,
+        TransferError::Violation(..) | TransferError::NoAnswer => true,
+        // 05xx is about the transfer, 06xx and 08xx are about the object.
+        TransferError::Aborted(AbortCode(code)) => code >> 24 == 0x05,
     }
 }

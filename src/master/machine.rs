@@ -18,11 +18,12 @@ pub(super) enum Machine {
 }
 
 impl Machine {
-    pub(super) fn read(node: NodeId, object: ObjectId, accept_60: bool, blocks: Blocks) -> Machine {
+    pub(super) fn read((node, object): (NodeId, ObjectId), limit: usize, accept_60: bool, blocks: Blocks) -> Machine {
+        let in_blocks = |threshold| BlockUpload::new(node, object, threshold, accept_60).up_to(limit);
         match blocks {
-            Blocks::Never | Blocks::WhenLarge => Machine::Read(Upload::new(node, object, accept_60)),
-            Blocks::First { threshold } => Machine::ReadBlocks(BlockUpload::new(node, object, threshold, accept_60)),
-            Blocks::Only => Machine::ReadBlocks(BlockUpload::new(node, object, 0, accept_60)),
+            Blocks::Never | Blocks::WhenLarge => Machine::Read(Upload::new(node, object, accept_60).up_to(limit)),
+            Blocks::First { threshold } => Machine::ReadBlocks(in_blocks(threshold)),
+            Blocks::Only => Machine::ReadBlocks(in_blocks(0)),
         }
     }
 

@@ -17,7 +17,7 @@ pub mod transfer;
 
 pub use clues::Clue;
 pub use lss::{Lss, LssError};
-pub use request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
+pub use request::{Answer, NUMBER_LIMIT, Operation, Request, SdoError, SdoFailure, TEXT_LIMIT, Ticket};
 pub use second_answer::{OnTwoDevices, SecondAnswer};
 pub use transfer::{BlockMode, Blocks, LARGE, Moved, SMALL, TransferKind, read_object, write_object};
 
@@ -241,6 +241,12 @@ impl<'bus> Master<'bus> {
             }
         }
         Ok(())
+    }
+
+    /// From now on, all transfers together have this time. `None`: no limit.
+    pub fn limit_transfers(&mut self, time: Option<Duration>) {
+        let now = self.now();
+        self.sdo.limit(time.map(|time| (now + time, time)));
     }
 
     /// Whether an SDO transfer is in progress or waiting.

@@ -9,7 +9,7 @@ use crate::bus::time::format_duration;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{AbortCode, DownloadSize, FitError, Uploaded, Violation};
+use crate::canopen::sdo::{AbortCode, DownloadSize, FitError, LONGEST, Uploaded, Violation};
 use std::fmt;
 use std::time::Duration;
 
@@ -31,6 +31,8 @@ pub struct Request {
     pub(super) timeout: Option<Duration>,
     pub(super) repeatable: bool,
     pub(super) blocks: Blocks,
+    /// A read object cannot be longer, in bytes.
+    limit: usize,
     /// The device rejected block transfer during this request.
     pub(super) refused_blocks: bool,
     /// A length other than the announced one is always a failure.
@@ -56,7 +58,8 @@ impl Request {
 
     fn new(node: NodeId, object: ObjectId, kind: Kind) -> Request {
         let (blocks, refused_blocks) = (Blocks::Never, false);
-        Request { node, object, kind, timeout: None, repeatable: true, blocks, refused_blocks, is_exact: false }
+        let limit = longest(object);
+        Request { node, object, kind, timeout: None, repeatable: true, blocks, limit, refused_blocks, is_exact: false }
     }
 
     /// Sets whether blocks are used; [`super::BlockMode`] chooses.
@@ -68,6 +71,12 @@ impl Request {
     /// Never accepts a length other than the announced one: for content that a file keeps.
     pub fn exact(mut self, is_exact: bool) -> Request {
         self.is_exact = is_exact;
+        self
+    }
+
+    /// Sets how many bytes a read object has at most, if the caller knows more than its index says.
+    pub fn up_to(mut self, limit: usize) -> Request {
+        self.limit = limit;
         self
     }
 
@@ -90,6 +99,11 @@ impl Request {
         self
     }
 
+    /// Whether a failed transfer may start again: a read that is not repeated by its caller.
+    pub(super) fn may_restart(&self) -> bool {
+        self.repeatable && self.operation() == Operation::Read
+    }
+
     /// Whether the transfer continues without blocks if the device rejects them.
     pub(super) fn falls_back(&self) -> bool {
         matches!(self.blocks, Blocks::First { .. })
@@ -102,9 +116,14 @@ impl Request {
 
     pub(super) fn machine(&self, accept_60: bool) -> Machine {
         match &self.kind {
-            Kind::Read => Machine::read(self.node, self.object, accept_60, self.blocks),
+            Kind::Read => Machine::read((self.node, self.object), self.limit, accept_60, self.blocks),
             Kind::Write { data, size } => Machine::write(self.node, self.object, data.clone(), *size, self.blocks),
         }
+    }
+
+    /// The error of this request.
+    pub(super) fn error(&self, failure: SdoFailure) -> SdoError {
+        SdoError { node: self.node, object: self.object, operation: self.operation(), failure }
     }
 
     /// Upload or download.
@@ -113,6 +132,24 @@ impl Request {
             Kind::Read => Operation::Read,
             Kind::Write { .. } => Operation::Write,
         }
+    }
+}
+
+/// The limit for an object that is a number. The widest number has 8 bytes; some devices send more, filled with zeros.
+pub const NUMBER_LIMIT: usize = 16;
+
+/// The limit for an object that is read as text.
+pub const TEXT_LIMIT: usize = 64 * 1024;
+
+/// How many bytes an object can have, from its index (CiA 301 and the device profiles).
+fn longest(object: ObjectId) -> usize {
+    match object.index {
+        // Name and versions of the manufacturer.
+        0x1008..=0x100a => 255,
+        // EDS and commands of the operating system; programs and concise DCF (CiA 302).
+        0x1021..=0x1026 | 0x1f00..=0x1fff => LONGEST,
+        0x1000..=0x1fff | 0x6000..=0x9fff => NUMBER_LIMIT,
+        _ => 1024,
     }
 }
 
@@ -206,6 +243,9 @@ pub enum SdoFailure {
     /// Another master used the channel again and again.
     #[error("another master uses the node's SDO channel at the same time")]
     Disturbed,
+    /// The time for all transfers together is over.
+    #[error("not finished within {}", format_duration(*.0))]
+    Overtime(Duration),
     /// The caller cancelled the transfer, or the node was silent to an earlier one.
     #[error("not finished")]
     Cancelled,

@@ -50,6 +50,8 @@ pub(super) struct SdoClient {
     next_ticket: u64,
     /// Not later than the earliest deadline. It saves a search through all nodes for each frame.
     due: Option<Mono>,
+    /// When all transfers together must have ended, and the time that they had.
+    limit: Option<(Mono, Duration)>,
     /// Whether a node has a waiting transfer and none in progress.
     can_start: bool,
     on_two_devices: OnTwoDevices,
@@ -152,7 +154,31 @@ impl SdoClient {
 
     /// A moment not later than the next time-out of a transfer.
     pub(super) fn next_deadline(&self) -> Option<Mono> {
-        self.due
+        let limit = self.limit.filter(|_| self.is_busy()).map(|(until, _)| until);
+        earlier(self.due, limit)
+    }
+
+    /// Sets when all transfers together must have ended, and the time that they have.
+    pub(super) fn limit(&mut self, limit: Option<(Mono, Duration)>) {
+        self.limit = limit;
+    }
+
+    /// Ends all transfers whose common time is over.
+    fn end_overtime(&mut self, now: Mono, outgoing: &mut Outgoing) {
+        let Some((_, time)) = self.limit.filter(|&(until, _)| now >= until) else { return };
+        for node in self.nodes.values_mut() {
+            let mut out = Vec::new();
+            if let Some(mut active) = node.active.take() {
+                active.machine.abort(AbortCode::TIMEOUT, &mut out);
+                outgoing.drop_ticket(active.ticket);
+                node.waiting.push_front(active.deferred.unwrap_or((active.ticket, active.request)));
+            }
+            out.into_iter().for_each(|frame| outgoing.push(frame, None));
+            for (ticket, request) in node.waiting.drain(..) {
+                self.finished.push_back((ticket, Err(request.error(SdoFailure::Overtime(time)))));
+            }
+        }
+        (self.due, self.can_start) = (None, false);
     }
 
     /// Handles a received frame; `false` if it does not belong to one of our transfers.
@@ -276,6 +302,10 @@ impl SdoClient {
                     active.enqueue(out, outgoing);
                     return true;
                 }
+                if active.restart(error, node.accept_60, &mut out, outgoing) {
+                    node.answers.on_repeated(active.request.object);
+                    return true;
+                }
                 Err(active.error(match error {
                     TransferError::Aborted(code) => SdoFailure::Refused(code),
                     TransferError::Violation(..) if node.answers.finding().is_some() => active.disturbance(),
@@ -306,6 +336,7 @@ impl SdoClient {
 
     /// Handles the transfers whose deadline has passed.
     pub(super) fn on_time(&mut self, now: Mono, timing: &Timing, outgoing: &mut Outgoing) {
+        self.end_overtime(now, outgoing);
         if self.due.is_none_or(|due| now < due) {
             return;
         }
@@ -332,6 +363,10 @@ impl SdoClient {
             let mut out = Vec::new();
             if active.machine.on_timeout(&mut out).is_none() {
                 active.enqueue(out, outgoing);
+                continue;
+            }
+            if active.restart(TransferError::NoAnswer, node.accept_60, &mut out, outgoing) {
+                node.answers.on_repeated(active.request.object);
                 continue;
             }
             if !has_begun {

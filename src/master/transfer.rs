@@ -13,6 +13,7 @@
 //! four with a built-in description, do not support block transfer. So it is used only if it saves frames: see
 //! [`BlockMode::Auto`].
 
+use super::request::NUMBER_LIMIT;
 use super::{Answer, Error, Happening, Master, Operation, Request, SdoError, Ticket};
 use crate::bus::{BusError, Received};
 use crate::canopen::id::NodeId;
@@ -109,7 +110,7 @@ pub(super) fn is_about_object(code: AbortCode) -> bool {
 /// Bytes transferred so far, and in total if known.
 pub type Moved = (usize, Option<usize>);
 
-/// Reads an object. `progress` is called every 100 ms.
+/// Reads an object. An object of unknown length has at most `longest` bytes. `progress` is called every 100 ms.
 ///
 /// # Errors
 /// Outer: the bus failed or the user interrupted. Inner: the transfer failed.
@@ -117,10 +118,11 @@ pub fn read_object(
     master: &mut Master<'_>,
     (node, object): (NodeId, ObjectId),
     data_type: Option<DataType>,
-    mode: BlockMode,
+    (mode, longest): (BlockMode, usize),
     progress: &mut dyn FnMut(Moved),
 ) -> Result<Result<Answer, SdoError>, Error> {
-    let request = Request::read(node, object).blocks(mode.for_read(data_type));
+    let limit = data_type.and_then(DataType::width).map_or(longest, |_| NUMBER_LIMIT);
+    let request = Request::read(node, object).blocks(mode.for_read(data_type)).up_to(limit);
     master.carry_out(request, progress)
 }
 

@@ -33,7 +33,7 @@ pub const BOOT_TIMEOUT: Duration = Duration::from_secs(3);
 pub enum Proof {
     /// A heartbeat.
     Heartbeat,
-    /// A boot-up message: the node is in PRE-OPERATIONAL, unless it starts by itself.
+    /// A boot-up message proves a restart. It shows no state: a device that starts by itself is operational soon after.
     BootUp,
     /// The answer to node guarding.
     Guarding,
@@ -83,7 +83,7 @@ impl StateReport {
     fn of_life(node: NodeId, life: Life) -> StateReport {
         match life {
             Life::State(state) => StateReport::known(node, state, Proof::Heartbeat),
-            Life::BootUp => StateReport::known(node, NmtState::PreOperational, Proof::BootUp),
+            Life::BootUp => StateReport { node, state: None, by: Proof::BootUp, is_present: true },
         }
     }
 }
@@ -109,6 +109,7 @@ impl Means {
 pub struct LifeWatch {
     /// The last sign of life of each node.
     pub lives: BTreeMap<NodeId, Life>,
+    booted: BTreeSet<NodeId>,
     guarded_by_others: BTreeSet<NodeId>,
 }
 
@@ -117,6 +118,9 @@ impl LifeWatch {
     pub fn on_frame(&mut self, received: &Received) {
         if let Some((node, life)) = Life::parse(&received.frame) {
             self.lives.insert(node, life);
+            if life == Life::BootUp {
+                self.booted.insert(node);
+            }
         } else if let (Some(node), true) = (received.frame.id().heartbeat_node(), received.frame.is_remote()) {
             self.guarded_by_others.insert(node);
         }
@@ -273,6 +277,7 @@ pub fn command(
         nodes.iter().for_each(|&node| master.send(command.frame(Some(node))));
     }
     if command.is_reset() {
+        wait_for_boot_ups(master, nodes, &mut watch)?;
         after_reset(master, nodes, &before, &mut watch)
     } else {
         after_change(master, command, nodes, &before, &mut watch)
@@ -280,19 +285,29 @@ pub fn command(
 }
 
 /// Waits for the boot-up messages after a reset.
+fn wait_for_boot_ups(master: &mut Master<'_>, nodes: &[NodeId], watch: &mut LifeWatch) -> Result<(), MasterError> {
+    let until = master.now() + BOOT_TIMEOUT.max(master.timing().timeout);
+    watch.wait(master, until, &|watch| nodes.iter().all(|node| watch.booted.contains(node)))
+}
+
+/// Finds out the states after the boot-up messages, from the next heartbeats.
 fn after_reset(
     master: &mut Master<'_>,
     nodes: &[NodeId],
     before: &BTreeMap<NodeId, Means>,
     watch: &mut LifeWatch,
 ) -> Result<Vec<StateReport>, MasterError> {
-    let until = master.now() + BOOT_TIMEOUT.max(master.timing().timeout);
-    let has_booted = |watch: &LifeWatch, node| watch.lives.get(node) == Some(&Life::BootUp);
-    watch.wait(master, until, &|watch| nodes.iter().all(|node| has_booted(watch, node)))?;
+    let expected: Vec<NodeId> = nodes.iter().copied().filter(|node| watch.booted.contains(node)).collect();
+    if let Some(longest) = expected.iter().filter_map(|node| before[node].heartbeat).max() {
+        let has_state =
+            |watch: &LifeWatch, node: &NodeId| before[node].heartbeat.is_none() || watch.state(*node).is_some();
+        let until = master.now() + longest + master.timing().timeout;
+        watch.wait(master, until, &|watch| expected.iter().all(|node| has_state(watch, node)))?;
+    }
     let report = |&node: &NodeId| match watch.lives.get(&node) {
-        Some(Life::BootUp) => StateReport::of_life(node, Life::BootUp),
+        Some(&life) if watch.booted.contains(&node) => StateReport::of_life(node, life),
         // A heartbeat without a boot-up comes from a node that did not restart.
-        Some(Life::State(_)) => StateReport::unknown(node, true),
+        Some(_) => StateReport::unknown(node, true),
         None => StateReport::unknown(node, before[&node].answers_sdo),
     };
     Ok(nodes.iter().map(report).collect())
@@ -346,6 +361,8 @@ fn after_change(
 /// # Errors
 /// [`Error::NoBootUp`]; bus errors and Ctrl-C.
 pub fn reset(master: &mut Master<'_>, node: NodeId) -> Result<(), Error> {
-    let reports = command(master, NmtCommand::ResetNode, &[node], false)?;
-    if reports.iter().any(|report| report.by == Proof::BootUp) { Ok(()) } else { Err(Error::NoBootUp(node)) }
+    let mut watch = LifeWatch::default();
+    master.send(NmtCommand::ResetNode.frame(Some(node)));
+    wait_for_boot_ups(master, &[node], &mut watch)?;
+    if watch.booted.contains(&node) { Ok(()) } else { Err(Error::NoBootUp(node)) }
 }

@@ -58,6 +58,7 @@ impl Console {
 
     /// Prints an error with its hint; with `json`, as one line of JSON.
     pub fn fail(&self, failure: &ErrorMessage, exit: u8) {
+        let failure = &ErrorMessage { message: text::one_line(&failure.message), ..failure.clone() };
         if self.json {
             let mut out = Vec::new();
             // Writing to memory cannot fail.
@@ -67,9 +68,11 @@ impl Console {
         }
         self.line(AnsiColor::Red.on_default().bold(), "cangauge: ", &failure.message);
         if let Some(place) = &failure.place {
-            // An escaped character is longer than the character.
-            let before = text::safe(&place.before).chars().count();
-            self.line(Style::new(), "  ", &place.text);
+            let (shown, before) = text::around(&place.text, place.before.chars().count());
+            let start: String = shown.chars().take(before).collect();
+            // What is not shown as it is takes more room.
+            let before = text::safe(&start).chars().count();
+            self.line(Style::new(), "  ", &shown);
             self.line(AnsiColor::Red.on_default().bold(), &format!("  {}^", " ".repeat(before)), "");
         }
         if let Some(hint) = &failure.hint {

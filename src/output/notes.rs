@@ -8,6 +8,7 @@ use super::failure::{self, autozero, config, pdo, settings, store};
 use super::lss;
 use super::report::Cell;
 use crate::canopen::id::NodeId;
+use crate::tasks::journal::{TemporaryWrite, Undone};
 use crate::tasks::note::StateEffect;
 use crate::tasks::{Effect, Fact, Note};
 use serde::Serialize;
@@ -147,6 +148,24 @@ pub fn print(console: &Console, note: &Note) {
     let node = note.node.map_or_else(String::new, |node| format!("node {node}: "));
     let line = format!("{node}{}", self::note(note).line());
     if note.fact.is_warning() { console.warn(&line) } else { console.note(&line) }
+}
+
+/// The text for a temporary write that an earlier run left behind.
+pub fn undone_text(write: &TemporaryWrite, undone: Undone) -> String {
+    let TemporaryWrite { node, object, .. } = write;
+    let [before, written] = [&write.before, &write.written].map(|bytes| value_text(bytes));
+    let what = match undone {
+        Undone::Restored => format!("set back to {before}"),
+        Undone::ChangedSince => "it has another value now and was not changed".to_owned(),
+        Undone::OtherDevice => "another device has this node-ID now: nothing was changed".to_owned(),
+        Undone::NotRestored => format!("it could not be set back to {before}"),
+    };
+    format!("node {node}: an earlier run was killed and left {object} at {written}: {what}")
+}
+
+fn value_text(bytes: &[u8]) -> String {
+    let number = bytes.iter().rev().try_fold(0u64, |number, &byte| Some(number.checked_mul(256)? + u64::from(byte)));
+    number.map_or_else(|| format!("{} bytes", bytes.len()), |number| number.to_string())
 }
 
 /// Prints a note of a report on stderr.

@@ -1,6 +1,7 @@
 //! Notes about a recording that is replayed.
 
 use crate::bus::replay::ReplayNote;
+use crate::bus::time::format_duration;
 
 /// A note as text, and whether it is a warning.
 pub fn note(file: &str, note: &ReplayNote) -> (String, bool) {
@@ -13,6 +14,12 @@ pub fn note(file: &str, note: &ReplayNote) -> (String, bool) {
         }
         ReplayNote::CutOff(line) => {
             (format!("{file}: the file ends in the middle of line {line}, which was skipped"), true)
+        }
+        ReplayNote::ClockSet { count, line, by, is_backwards } => {
+            let direction = if *is_backwards { "back" } else { "forward" };
+            let more = if *count > 1 { format!(", and {} more times", count - 1) } else { String::new() };
+            let what = format!("the clock was set {direction} by {} at line {line}{more}", format_duration(*by));
+            (format!("{file}: {what}; these steps count as no time"), true)
         }
         ReplayNote::NoDate => (format!("{file}: the times have no date; they count from 1970-01-01"), false),
     }

@@ -255,10 +255,10 @@ fn csv_rows<R: Report>(report: &R) -> Vec<Vec<String>> {
         let mut row = Vec::new();
         for (column, cell) in &cells {
             match (column.nested, inner) {
-                ([], _) => row.push(cell.plain()),
+                ([], _) => row.push(cell.in_csv()),
                 (nested, Some(inner)) => {
                     let inner = nested.iter().zip(inner).filter(|(column, _)| column.in_csv);
-                    row.extend(inner.map(|(_, cell)| cell.plain()));
+                    row.extend(inner.map(|(_, cell)| cell.in_csv()));
                 }
                 (_, None) => {}
             }

@@ -29,6 +29,30 @@ pub(super) fn is_unsafe(character: char) -> bool {
     character.is_control() || hidden
 }
 
+/// The longest line of an error in characters.
+const LONGEST_LINE: usize = 200;
+
+/// A message as one line of at most 200 characters. Of a longer one, the middle is left out: the cause is at the end.
+pub fn one_line(text: &str) -> String {
+    let joined = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
+    let letters: Vec<char> = joined.chars().collect();
+    if letters.len() <= LONGEST_LINE {
+        return joined;
+    }
+    let half = (LONGEST_LINE - 3) / 2;
+    let part = |letters: &[char]| letters.iter().collect::<String>();
+    format!("{} … {}", part(&letters[..half]), part(&letters[letters.len() - half..]))
+}
+
+/// The part of a long input around a place, after `before` characters; and how many characters of it are before the place.
+pub fn around(text: &str, before: usize) -> (String, usize) {
+    let letters: Vec<char> = text.chars().collect();
+    let from = if letters.len() <= LONGEST_LINE { 0 } else { before.saturating_sub(LONGEST_LINE / 2) };
+    let to = letters.len().min(from + LONGEST_LINE);
+    let from = from.min(to);
+    (letters[from..to].iter().collect(), before.saturating_sub(from))
+}
+
 /// A moment as RFC 3339 in UTC with microseconds.
 pub fn utc(at: Stamp) -> String {
     humantime::format_rfc3339_micros(at.wall.system_time()).to_string()
@@ -79,6 +103,24 @@ mod tests {
         assert_eq!(safe("\u{9b}31m"), "\\x9B31m");
         assert_eq!(safe("a\u{202e}b"), "a\\u{202E}b");
         assert_eq!(safe("D\u{fc}se"), "D\u{fc}se");
+    }
+
+    #[test]
+    fn long_text_becomes_one_line() {
+        assert_eq!(one_line("TOML parse error\n  |\n1 | x\n"), "TOML parse error | 1 | x");
+        let long = one_line(&format!("\"{}\" is not a node-ID", "ä".repeat(10_000)));
+        assert_eq!(long.chars().count(), 199);
+        assert!(long.starts_with("\"ä") && long.ends_with("ä\" is not a node-ID"), "{long}");
+        assert_eq!(one_line(&"x".repeat(200)).len(), 200);
+    }
+
+    #[test]
+    fn long_input_is_shown_around_the_place() {
+        let input = format!("{}!{}", "a".repeat(5000), "b".repeat(5000));
+        let (part, before) = around(&input, 5000);
+        assert_eq!((part.chars().count(), part.chars().nth(before)), (200, Some('!')));
+        assert_eq!(around("a < b", 2), ("a < b".to_owned(), 2));
+        assert_eq!(around(&input, 10_001).0.chars().count(), 101 - 1);
     }
 
     #[test]

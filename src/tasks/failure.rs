@@ -106,7 +106,7 @@ impl Cause {
             },
             Cause::Sdo(error) => match error.failure {
                 SdoFailure::Refused(_) => Kind::Refused,
-                SdoFailure::NoAnswer { .. } => Kind::NoAnswer,
+                SdoFailure::NoAnswer { .. } | SdoFailure::Overtime(_) => Kind::NoAnswer,
                 SdoFailure::NotWritten(_) => Kind::CheckFailed,
                 SdoFailure::Violation(..)
                 | SdoFailure::WrongLength { .. }

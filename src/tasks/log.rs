@@ -226,7 +226,10 @@ pub fn log(
         return record_passively(master, options, observer);
     }
     master.listen_to(&options.nodes)?;
-    let (nodes, failed) = survey(master, options, observer)?;
+    master.limit_transfers(options.duration);
+    let surveyed = survey(master, options, observer);
+    master.limit_transfers(None);
+    let (nodes, failed) = surveyed?;
     observer.begin(&nodes)?;
     check_wanted(&nodes, options)?;
     let mut recording = Recording::new(nodes, options, master.bus());

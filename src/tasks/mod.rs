@@ -7,6 +7,7 @@ pub mod detect;
 pub mod diagnosis;
 pub mod failure;
 pub mod host;
+pub mod journal;
 pub mod log;
 pub mod lss;
 pub mod nmt;

@@ -2,13 +2,16 @@
 
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::Note;
+use crate::canopen::sdo::{LONGEST, Note};
 use crate::canopen::value::{DataType, Value};
 use crate::master::transfer::{BlockMode, Moved};
-use crate::master::{Error, Master, Request};
+use crate::master::{Error, Master, NUMBER_LIMIT, Request};
 use crate::node::write::write_with;
 use crate::node::{self, Node, WriteOptions, Written, names, survey};
 use crate::tasks::Failure;
+
+/// The longest object that is read into a file.
+pub const FILE_LIMIT: usize = LONGEST;
 
 /// A value of an object.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +36,8 @@ pub struct ReadValue {
 pub struct ReadOptions<'a> {
     /// When block transfer is used.
     pub blocks: BlockMode,
+    /// An object of unknown length has at most this many bytes.
+    pub longest: usize,
     /// A length other than the announced one is always a failure: the content goes to a file.
     pub is_exact: bool,
     /// Called every 100 ms with the bytes transferred.
@@ -51,7 +56,9 @@ pub fn read(
     options: &mut ReadOptions<'_>,
 ) -> Result<ReadValue, Failure> {
     let expected = data_type.or_else(|| node.known_type(object));
-    let request = Request::read(node.id, object).blocks(options.blocks.for_read(expected)).exact(options.is_exact);
+    let limit = expected.and_then(DataType::width).map_or(options.longest, |_| NUMBER_LIMIT);
+    let request = Request::read(node.id, object).blocks(options.blocks.for_read(expected));
+    let request = request.up_to(limit).exact(options.is_exact);
     let answer = master.carry_out(request, options.progress)??;
     let entry = match data_type {
         Some(_) => node.entry(object),
@@ -110,7 +117,8 @@ pub fn write(
 ) -> Result<Written, Failure> {
     let written = write_with(master, node, object, data, options)?;
     let Some(data_type) = verify else { return Ok(written) };
-    let mut options = ReadOptions { blocks: options.blocks, is_exact: false, progress: &mut *options.progress };
+    let (blocks, longest) = (options.blocks, FILE_LIMIT);
+    let mut options = ReadOptions { blocks, longest, is_exact: false, progress: &mut *options.progress };
     let found = read(master, &mut node.clone(), object, Some(data_type), &mut options)?.raw;
     if found == data {
         return Ok(written);

@@ -124,7 +124,7 @@ fn write(bus: &mut dyn Bus, object: ObjectId, data: &[u8], mode: BlockMode) -> O
 
 fn read(bus: &mut dyn Bus, object: ObjectId, data_type: Option<DataType>, mode: BlockMode) -> Outcome {
     let mut master = Master::new(bus, Timing::default());
-    let outcome = read_object(&mut master, (node(5), object), data_type, mode, &mut |_| {}).unwrap();
+    let outcome = read_object(&mut master, (node(5), object), data_type, (mode, usize::MAX), &mut |_| {}).unwrap();
     master.settle();
     outcome
 }
@@ -246,7 +246,8 @@ fn a_device_that_ignores_blocks_is_read_in_segments() {
     // A missing device: the same time-out as for any other read.
     let start = bus.now().mono;
     let mut master = Master::new(&mut bus, Timing::default());
-    let outcome = read_object(&mut master, (node(9), TEXT), Some(DataType::Domain), BlockMode::Auto, &mut |_| {});
+    let outcome =
+        read_object(&mut master, (node(9), TEXT), Some(DataType::Domain), (BlockMode::Auto, usize::MAX), &mut |_| {});
     assert!(matches!(outcome.unwrap().unwrap_err().failure, SdoFailure::NoAnswer { started: false, .. }));
     let waited = master.now().since(start);
     assert!(waited < Duration::from_millis(1_100), "{waited:?}");
@@ -358,7 +359,7 @@ fn ctrl_c_within_a_sub_block_aborts_the_transfer() {
         bus.interrupt_at(bus.now().mono + Duration::from_millis(200));
         let mut master = Master::new(&mut bus, Timing::default());
         let request = if reads {
-            Request::read(node(5), DOMAIN)
+            Request::read(node(5), DOMAIN).up_to(5_000)
         } else {
             Request::write(node(5), DOMAIN, vec![0; 5_000], DownloadSize::Indicated)
         };

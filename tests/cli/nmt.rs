@@ -20,9 +20,9 @@ fn heartbeat_confirms_a_command() {
 #[test]
 fn boot_up_confirms_a_reset() {
     let bench = Bench::of(ALL);
-    let done = bench.run("nmt reset 1").prints("1  pre-operational  boot-up\n");
+    let done = bench.run("nmt reset 1").prints("1  -  boot-up\n");
     assert_eq!((done.frames_of("000"), done.frames_of("701")), (vec!["8101"], vec!["00", "00"]));
-    let done = bench.run("nmt reset-comm 127").prints("127  pre-operational  boot-up\n");
+    let done = bench.run("nmt reset-comm 127").prints("127  -  boot-up\n");
     assert_eq!(done.frames_of("000"), ["827F"]);
 }
 

@@ -17,6 +17,7 @@ use cangauge::measure::expression::verdict::Verdict;
 use cangauge::measure::sample::{Sample, Source};
 use cangauge::node::Overrides;
 use cangauge::node::{Node, WriteOptions};
+use cangauge::tasks::journal::NoJournal;
 use cangauge::tasks::log::{LogEvent, LogOptions, Mode, Observer, log};
 use cangauge::tasks::lss::{self, Descriptions, Job, LssAddress, LssRange, RequestedRate};
 use cangauge::tasks::nmt::StateEvent;
@@ -158,7 +159,8 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
         Command::SdoRead { node: id, object, how } => {
             let mut node = Node::with_overrides(node(*id), &described(spec, *id, *how));
             let value = {
-                let mut options = sdo::ReadOptions { blocks: how.blocks, is_exact: false, progress: &mut |_| {} };
+                let (blocks, longest) = (how.blocks, sdo::FILE_LIMIT);
+                let mut options = sdo::ReadOptions { blocks, longest, is_exact: false, progress: &mut |_| {} };
                 sdo::read(master, &mut node, *object, None, &mut options)?
             };
             Claim::Values(vec![(*id, *object, value.raw)])
@@ -187,7 +189,7 @@ fn carry_out_with(master: &mut Master<'_>, spec: &Spec, observed: &mut Observati
             Claim::Nothing
         }
         Command::NmtProbe { node: id } => {
-            let probed = nmt::probe(master, &Node::new(node(*id)))?;
+            let probed = nmt::probe(master, &Node::new(node(*id)), &mut NoJournal)?;
             Claim::Probed(probed.failure.is_none())
         }
         Command::Startup { node: id, auto } => {

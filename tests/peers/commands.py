@@ -144,7 +144,7 @@ def nmt(cangauge, directory):
         assert record(10) and not record(11)
         for command in ("reset", "reset-comm"):
             assert state(True, "start", 10)[1] == "operational"
-            assert state(True, command, 10) == (10, "pre-operational", "boot-up"), command
+            assert state(True, command, 10) == (10, "pre-operational", "heartbeat"), command
             assert state(True, "state", 10)[1] == "pre-operational", command
         both = cangauge.run(*PATIENT, "nmt", "start", "10,11", "--confirm", "--format", "json").json()
         assert both == [{"node": node, "state": "operational", "by": "heartbeat"} for node in (10, 11)], both
@@ -157,7 +157,7 @@ def nmt(cangauge, directory):
         answers = cangauge.run("--timeout", "1s", "nmt", "start", 10, "--format", "json")
         assert answers.json() == [{"node": 10, "state": None, "by": "none"}], answers
         cangauge.run("--timeout", "1s", "nmt", "start", 10, "--confirm", exit=3)
-        assert state(False, "reset", 10) == (10, "pre-operational", "boot-up")
+        assert state(False, "reset", 10) == (10, None, "boot-up")
 
 
 def read(cangauge, directory):

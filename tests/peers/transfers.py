@@ -490,7 +490,7 @@ def types(cangauge, directory):
 
 
 def nmt_without_heartbeat(cangauge, directory):
-    """An unknown state is null; a boot-up, a probe or a missing SDO answer (stopped) determines it."""
+    """An unknown state is null; a probe or a missing SDO answer (stopped) determines it."""
     def nmt(*command, timeout="20s", **options):
         result = cangauge.run("--timeout", timeout, "nmt", *command, "--format", "json", **options)
         return [(line["state"], line["by"]) for line in result.json()]
@@ -519,7 +519,7 @@ def nmt_without_heartbeat(cangauge, directory):
     with Store(cangauge, directory, "durand"):
         assert silent("start", NODE) == [(None, "none")]
         for command in ("reset", "reset-comm"):
-            assert nmt(command, NODE, "--confirm") == [("pre-operational", "boot-up")], command
+            assert nmt(command, NODE, "--confirm") == [(None, "boot-up")], command
         assert silent("stop", NODE) == [("stopped", "sdo")]
         assert silent("preop", NODE)[0][0] != "stopped"
         assert cangauge.run(*ONCE, "sdo", "read", NODE, "1000").out == "0\n"

@@ -20,6 +20,7 @@ mod settings;
 mod signatures;
 mod silence;
 mod stalled;
+mod transfer_ends;
 
 use cangauge::bus::Stamp;
 use cangauge::measure::sample::{Sample, Source};

@@ -34,7 +34,9 @@ pub(super) fn parse(text: &str, local: fn([i32; 6]) -> Option<u64>) -> Line {
     let Some((time, rest)) = text.strip_prefix('(').and_then(|text| text.split_once(')')) else {
         return if screen_frame(&text).is_some() { Line::WithoutTime } else { Line::Unknown };
     };
-    let Some(wall) = seconds(time).or_else(|| date(time, local)) else { return Line::Unknown };
+    // RFC 3339 has no years beyond 9999.
+    let wall = seconds(time).or_else(|| date(time, local)).filter(|&wall| wall <= Wall::LAST);
+    let Some(wall) = wall else { return Line::Unknown };
     let mut words = rest.split_ascii_whitespace();
     let (Some(interface), Some(frame)) = (words.next(), words.next()) else { return Line::Unknown };
     let event = if frame.contains('#') { log_frame(frame) } else { screen_frame(rest) };
@@ -220,6 +222,9 @@ mod tests {
             "(1.5 can0 181#01",
             "(+1.5) can0 181#01",
             "(1.5) can0 181",
+            "(253402300800.000000) can0 181#01",
+            "(18446744073709551615.999999999) can0 181#01",
+            "(18446744073709551616.0) can0 181#01",
             "(1.5) can0 999#01",
             "(1.5) c",
             "(1.5)",

@@ -170,3 +170,23 @@ fn time_passes_up_to_the_deadline_and_the_end_is_reported_once() -> Result<(), B
     assert!(matches!(bus.send(&Frame::empty(crate::canopen::id::CanId::SYNC)), Err(BusError::ReceiveOnly(_))));
     Ok(())
 }
+
+#[test]
+fn step_of_the_clock_takes_no_time_and_is_reported() {
+    // The clock of a computer without a battery: 1970 until NTP answers.
+    let log = "(100.000000) can0 181#01\n(101.000000) can0 181#02\n(1735689600.000000) can0 181#03\n\
+               (1735689601.500000) can0 181#04\n";
+    assert_eq!(all(log), ["0 181#01", "1000000 181#02", "1000000 181#03", "2500000 181#04", "end"]);
+    let by = Duration::from_secs(1_735_689_600 - 101);
+    let noted = notes(log);
+    assert!(noted.contains(&ReplayNote::ClockSet { count: 1, line: 3, by, is_backwards: false }), "{noted:?}");
+    // Set back twice. A frame that is a little too early is none.
+    let log = "(1700000010.000000) can0 181#01\n(1700000009.995000) can0 181#02\n(1700000005.000000) can0 181#03\n\
+               (1700000006.000000) can0 181#04\n(1700000001.000000) can0 181#05\n(1700000001.250000) can0 181#06\n";
+    let times = ["0 181#01", "0 181#02", "0 181#03", "1000000 181#04", "1000000 181#05", "1250000 181#06", "end"];
+    assert_eq!(all(log), times);
+    let by = Duration::from_secs(5);
+    assert_eq!(notes(log), [ReplayNote::ClockSet { count: 2, line: 3, by, is_backwards: true }]);
+    // A quiet weekend is a pause, hour for hour; the wall time goes with it.
+    assert_eq!(notes("(1700000000.000000) can0 181#01\n(1700050000.000000) can0 181#02\n"), []);
+}

@@ -6,10 +6,9 @@
 //! the CRC or the announced size; without either, the transfer fails.
 
 use super::crc::crc16;
-use super::upload::LONGEST;
 use super::{
-    AbortCode, BlockSize, MAX_STALLED_BLOCKS, Progress, TransferError, Upload, Uploaded, Violation, abort_frame,
-    abort_of, multiplexer, number,
+    AbortCode, BlockSize, LONGEST, MAX_STALLED_BLOCKS, Progress, TransferError, Upload, Uploaded, Violation,
+    abort_frame, abort_of, multiplexer, number,
 };
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
@@ -33,6 +32,8 @@ pub struct BlockUpload {
     setbacks: u8,
     /// Whether segments were repeated.
     disturbed: bool,
+    /// The object cannot be longer, in bytes.
+    limit: usize,
     /// Used if the server answers as to a segmented upload.
     plain: Upload,
 }
@@ -75,6 +76,7 @@ impl BlockUpload {
             missing: 0,
             setbacks: 0,
             disturbed: false,
+            limit: LONGEST,
             plain: Upload::new(node, object, accept_60),
         }
     }
@@ -82,6 +84,13 @@ impl BlockUpload {
     /// The same upload with another block size.
     pub fn with_block_size(mut self, block_size: BlockSize) -> BlockUpload {
         self.block_size = block_size;
+        self
+    }
+
+    /// The same upload of an object that has at most this many bytes.
+    pub fn up_to(mut self, limit: usize) -> BlockUpload {
+        self.limit = limit.min(LONGEST);
+        self.plain = self.plain.up_to(limit);
         self
     }
 
@@ -126,8 +135,11 @@ impl BlockUpload {
         };
         match self.state {
             State::Initiated => self.initiated(head, frame, out),
+            State::SubBlock { taken: 0, highest: 0, acknowledged: 0, .. } if self.is_end_of_nothing(head, frame) => {
+                self.end(head, None, frame, out)
+            }
             State::SubBlock { .. } => self.segment(head, frame, out),
-            State::Acknowledged { closing } if head & 0xe1 == 0xc1 => self.end(head, closing, frame, out),
+            State::Acknowledged { closing } if head & 0xe1 == 0xc1 => self.end(head, Some(closing), frame, out),
             State::Plain | State::Acknowledged { .. } => Progress::NotOurs,
         }
     }
@@ -175,6 +187,9 @@ impl BlockUpload {
         if head & 0x02 != 0 && self.announced.is_none() {
             return self.fail(Violation::Short, frame, out);
         }
+        if self.announced.is_some_and(|size| usize::try_from(size).is_ok_and(|size| size > self.limit)) {
+            return self.fail(Violation::TooLong, frame, out);
+        }
         self.state = State::SubBlock { taken: 0, highest: 0, acknowledged: 0, closing: None };
         self.send(0xa3, 0, 0, out);
         Progress::Continue
@@ -197,7 +212,8 @@ impl BlockUpload {
             self.missing = 7 - part.len();
             self.bytes.extend_from_slice(part);
             self.bytes.extend(std::iter::repeat_n(0, self.missing));
-            if self.bytes.len() > LONGEST {
+            // The end frame tells how many bytes of the last segment are valid.
+            if self.bytes.len() > self.limit.saturating_add(6) {
                 return self.fail(Violation::TooLong, frame, out);
             }
             sequence
@@ -228,7 +244,13 @@ impl BlockUpload {
         self.send(0xa2, taken, self.block_size.get(), out);
     }
 
-    fn end(&mut self, head: u8, closing: Frame, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
+    /// Whether this is the end frame of an object of 0 bytes, from a server that sends no empty segment before it.
+    fn is_end_of_nothing(&self, head: u8, frame: &Frame) -> bool {
+        let is_empty = self.announced == Some(0) || self.announced.is_none() && self.crc;
+        is_empty && head & 0xe1 == 0xc1 && frame.data()[1..].iter().all(|&byte| byte == 0)
+    }
+
+    fn end(&mut self, head: u8, closing: Option<Frame>, frame: &Frame, out: &mut Vec<Frame>) -> Progress<Uploaded> {
         let data = frame.data();
         let unused = usize::from(head >> 2 & 7);
         let misnamed = self.is_full_by_proof(unused, data);
@@ -237,7 +259,7 @@ impl BlockUpload {
         let [low, high] = expected.to_le_bytes();
         // Segment 65, if it is the last, starts like an end frame. A repeated one is not an end frame, unless it
         // has the expected contents.
-        if *frame == closing && data != [head, low, high, 0, 0, 0, 0, 0] {
+        if closing == Some(*frame) && data != [head, low, high, 0, 0, 0, 0, 0] {
             return Progress::NotOurs;
         }
         if !misnamed && unused < self.missing {

@@ -19,7 +19,7 @@ pub use block_upload::BlockUpload;
 pub use crc::crc16;
 pub use download::{Download, DownloadSize};
 pub use fit::{FitError, Fitted, Note, fit};
-pub use upload::{Upload, Uploaded};
+pub use upload::{LONGEST, Upload, Uploaded};
 
 use super::frame::Frame;
 use super::id::{CanId, NodeId};
@@ -74,7 +74,7 @@ pub enum Violation {
     #[error("toggle bit not alternated")]
     Toggle,
     /// The transfer exceeds the limit of its size.
-    #[error("the transfer does not end")]
+    #[error("longer than the object can be, or without an end")]
     TooLong,
     /// The frame has too few bytes.
     #[error("frame too short")]

@@ -5,8 +5,8 @@ use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 
-/// The limit for the size of an object in bytes. It limits the memory for a server that never ends the transfer.
-pub(super) const LONGEST: usize = 64 << 20;
+/// The limit for the size of an object in bytes: no file is longer.
+pub const LONGEST: usize = 64 << 20;
 
 /// The answer to an upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,6 +54,9 @@ pub struct Upload {
     announced: Option<u32>,
     has_short_segment: bool,
     accept_60: bool,
+    /// The object cannot be longer, in bytes.
+    limit: usize,
+    segments: usize,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +70,14 @@ impl Upload {
     /// ([`crate::device::quirk::Quirk::UploadAnswered60`]).
     pub fn new(node: NodeId, object: ObjectId, accept_60: bool) -> Upload {
         let (state, bytes) = (State::Initiated, Vec::new());
-        Upload { node, object, state, bytes, announced: None, has_short_segment: false, accept_60 }
+        let (limit, segments) = (LONGEST, 0);
+        Upload { node, object, state, bytes, announced: None, has_short_segment: false, accept_60, limit, segments }
+    }
+
+    /// The same upload of an object that has at most this many bytes.
+    pub fn up_to(mut self, limit: usize) -> Upload {
+        self.limit = limit.min(LONGEST);
+        self
     }
 
     /// The request that starts the transfer.
@@ -138,6 +148,9 @@ impl Upload {
         if indicated && self.announced.is_none() {
             return self.fail(Violation::Short, frame, out);
         }
+        if self.announced.is_some_and(|size| usize::try_from(size).is_ok_and(|size| size > self.limit)) {
+            return self.fail(Violation::TooLong, frame, out);
+        }
         out.push(self.segment_request(false));
         Progress::Continue
     }
@@ -150,7 +163,9 @@ impl Upload {
         let unused = usize::from(command >> 1 & 7);
         let Some(part) = data.get(1..8 - unused) else { return self.fail(Violation::Short, frame, out) };
         self.bytes.extend_from_slice(part);
-        if self.bytes.len() > LONGEST {
+        // Each segment but the last one has at least one byte.
+        self.segments += 1;
+        if self.bytes.len() > self.limit || self.segments > self.limit + 1 {
             return self.fail(Violation::TooLong, frame, out);
         }
         if command & 0x01 != 0 {

@@ -102,6 +102,7 @@ pub(super) fn sdo(error: &SdoError) -> Words {
         | SdoFailure::WrongLength { .. }
         | SdoFailure::NotANumber
         | SdoFailure::Ambiguous
+        | SdoFailure::Overtime(_)
         | SdoFailure::Cancelled => words,
     }
 }

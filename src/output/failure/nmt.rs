@@ -16,6 +16,10 @@ pub(super) fn words(failure: &Failure, cause: &NmtFailure) -> Words {
         NmtFailure::NotConfirmed => Words::new("command sent, not confirmed: the node sends no heartbeat (1017h is 0)")
             .hint(format!("set a heartbeat: cangauge sdo write {node} producer-heartbeat-time 1000")),
         NmtFailure::Absent => Words::new("no heartbeat and no SDO answer").hint("list the nodes: cangauge scan"),
+        NmtFailure::NotRecorded(error) => {
+            Words::new(format!("write the journal {}: {}; nothing was changed", error.file, error.reason))
+                .hint("name a folder that can be written: XDG_STATE_HOME=/tmp/state cangauge …")
+        }
         NmtFailure::NoStartupObject => Words::new("the object that decides how this device starts is unknown")
             .hint(format!("many devices have 1F80h; read it: cangauge sdo read {node} 0x1F80")),
     }

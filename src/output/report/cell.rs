@@ -57,7 +57,24 @@ impl Cell {
         Cell::List(items.into_iter().map(Into::into).collect())
     }
 
-    /// The text of the cell in CSV. Empty if there is no value.
+    /// The text of the cell in CSV. Text from a device cannot start a formula in a spreadsheet: it gets an apostrophe.
+    pub(super) fn in_csv(&self) -> String {
+        let text = self.plain();
+        let is_number = || text.parse::<f64>().is_ok();
+        let may_be_formula = self.is_text() && text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+        if may_be_formula && text.len() > 1 && !is_number() { format!("'{text}") } else { text }
+    }
+
+    fn is_text(&self) -> bool {
+        match self {
+            Cell::Text(_) => true,
+            Cell::Shown(cell, _) => cell.is_text(),
+            Cell::List(cells) => cells.first().is_some_and(Cell::is_text),
+            _ => false,
+        }
+    }
+
+    /// The text of the cell. Empty if there is no value.
     pub fn plain(&self) -> String {
         match self {
             Cell::Null | Cell::Object(_) | Cell::Rows(_) => String::new(),

@@ -78,3 +78,17 @@ fn a_stream_prints_the_same_data_row_by_row() {
     all().iter().try_for_each(|report| stream.push(report)).expect("memory");
     assert_eq!(String::from_utf8(out).expect("text"), "127  50.000  0x00000047\n5  -  0x00000047\n");
 }
+
+#[test]
+fn text_from_a_device_starts_no_formula() {
+    for formula in ["=HYPERLINK(1)", "+1+cmd", "-2+3", "@SUM(A1)", "\t=1"] {
+        assert_eq!(Cell::from(formula).in_csv(), format!("'{formula}"));
+        assert_eq!(Cell::List(vec![formula.into()]).in_csv(), format!("'{formula}"));
+        assert_eq!(Cell::from(formula).plain(), formula, "only in CSV");
+    }
+    assert_eq!(Cell::from("MH-4-CAN").in_csv(), "MH-4-CAN");
+    assert_eq!(
+        [Cell::from("-5").in_csv(), Cell::from("-1.5e3").in_csv(), Cell::Integer(-5).in_csv()],
+        ["-5", "-1.5e3", "-5"]
+    );
+}

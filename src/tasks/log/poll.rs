@@ -131,26 +131,41 @@ impl Poll {
         self.open.get(&ticket).map(|&(at, _)| self.answers[at].cycle)
     }
 
+    /// The number of cycles that start until `now`.
+    fn cycles_until(&self, start: Mono, now: Mono) -> u64 {
+        if now < start {
+            return 0;
+        }
+        let cycles = now.since(start).as_nanos() / self.period.as_nanos().max(1) + 1;
+        u64::try_from(cycles).unwrap_or(u64::MAX)
+    }
+
     /// Starts the cycles that are due. Returns how many polls were skipped because the previous one was not finished.
     pub(super) fn start_due(&mut self, start: Mono, now: Mono, master: &mut Master<'_>) -> u64 {
-        let mut skipped = 0;
-        while self.due(start) <= now {
-            self.cycles += 1;
-            for (at, target) in self.targets.iter().enumerate() {
-                if !self.live[at] {
-                    continue;
-                }
-                let parts = &mut self.answers[at];
-                if parts.under_way > 0 {
-                    skipped += 1;
-                    continue;
-                }
-                parts.cycle = self.cycles - 1;
-                // The value last: its answer completes the sample, so rows are in order of time.
-                for (request, part) in requests(target).into_iter().zip([Part::Value, Part::Status]).rev() {
-                    self.open.insert(master.start(request), (at, part));
-                    parts.under_way += 1;
-                }
+        let cycles = self.cycles_until(start, now);
+        let cycle = self.cycles;
+        if cycles <= cycle {
+            return 0;
+        }
+        self.cycles = cycles;
+        // Of several cycles only the first one is started.
+        let late = cycles - cycle - 1;
+        let mut skipped = 0u64;
+        for (at, target) in self.targets.iter().enumerate() {
+            if !self.live[at] {
+                continue;
+            }
+            skipped = skipped.saturating_add(late);
+            let parts = &mut self.answers[at];
+            if parts.under_way > 0 {
+                skipped = skipped.saturating_add(1);
+                continue;
+            }
+            parts.cycle = cycle;
+            // The value last: its answer completes the sample, so rows are in order of time.
+            for (request, part) in requests(target).into_iter().zip([Part::Value, Part::Status]).rev() {
+                self.open.insert(master.start(request), (at, part));
+                parts.under_way += 1;
             }
         }
         skipped

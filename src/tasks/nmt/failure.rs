@@ -2,6 +2,7 @@
 
 use crate::canopen::nmt::NmtState;
 use crate::tasks::Kind;
+use crate::tasks::journal::JournalError;
 
 /// An NMT state was not reached or not confirmed.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +22,8 @@ pub enum NmtFailure {
     NotConfirmed,
     /// The node sends no heartbeat and does not answer SDO requests.
     Absent,
+    /// A temporary write could not be recorded in the journal. It was not sent.
+    NotRecorded(JournalError),
     /// The description does not say which object decides how the device starts.
     NoStartupObject,
 }
@@ -30,6 +33,7 @@ impl NmtFailure {
     pub fn kind(&self) -> Kind {
         match self {
             NmtFailure::OtherState { .. } | NmtFailure::NoStartupObject => Kind::Unexpected,
+            NmtFailure::NotRecorded(_) => Kind::Io,
             NmtFailure::NoSign | NmtFailure::NoBootUp | NmtFailure::NotConfirmed | NmtFailure::Absent => Kind::NoAnswer,
         }
     }

@@ -7,6 +7,8 @@ use crate::node::state::{HEARTBEAT_TIME, LifeWatch, Proof, StateReport};
 use crate::node::write::write;
 use crate::node::{Error, Node, Written};
 use crate::tasks::Failure;
+use crate::tasks::journal::{Journal, TemporaryWrite};
+use crate::tasks::nmt::NmtFailure;
 use std::time::Duration;
 
 /// The heartbeat time during the probe.
@@ -41,18 +43,23 @@ pub struct LeftHeartbeat {
 ///
 /// # Errors
 /// Bus errors and Ctrl-C. What the node rejects or does not answer is in the result.
-pub fn probe(master: &mut Master<'_>, node: &Node) -> Result<Probe, MasterError> {
+pub fn probe(master: &mut Master<'_>, node: &Node, journal: &mut dyn Journal) -> Result<Probe, MasterError> {
     let unknown = StateReport::unknown(node.id, true);
-    let failed = |error: SdoError| Probe { report: unknown, failure: Some(error.into()), left: None };
+    let failed = |failure: Failure| Probe { report: unknown, failure: Some(failure), left: None };
     let before = match read_values(master, &[(node.id, HEARTBEAT_TIME, DataType::Unsigned(2))])?.pop() {
-        Some(Err(error)) => return Ok(failed(error)),
+        Some(Err(error)) => return Ok(failed(error.into())),
         Some(Ok(value)) => value.as_u64().and_then(|time| u16::try_from(time).ok()).unwrap_or(0),
         None => 0,
     };
     let milliseconds = u16::try_from(PROBE_PERIOD.as_millis()).unwrap_or(u16::MAX);
-    let set = write(master, node, HEARTBEAT_TIME, &milliseconds.to_le_bytes());
+    let temporary = TemporaryWrite::to(node, HEARTBEAT_TIME, &before.to_le_bytes(), &milliseconds.to_le_bytes());
+    if let Err(error) = journal.record(&temporary) {
+        return Ok(failed(Failure::at(node.id, NmtFailure::NotRecorded(error))));
+    }
+    let set = write(master, node, HEARTBEAT_TIME, &temporary.written);
     if let Err(Error::Sdo(error @ SdoError { failure: SdoFailure::Refused(_), .. })) = set {
-        return Ok(failed(error));
+        journal.remove(&temporary);
+        return Ok(failed(error.into()));
     }
     let mut watch = LifeWatch::default();
     let waited = match &set {
@@ -63,6 +70,9 @@ pub fn probe(master: &mut Master<'_>, node: &Node) -> Result<Probe, MasterError>
         Err(_) => Ok(()),
     };
     let restored = restore(master, node, before);
+    if restored.is_ok() {
+        journal.remove(&temporary);
+    }
     let is_certain = set.is_ok();
     let failure = split(set)?;
     waited?;

@@ -66,7 +66,7 @@ def sdo_write(scenario, _, foreign):
 
 
 def nmt(scenario, run, _):
-    """Checks confirmed states. A boot-up confirms PRE-OPERATIONAL, also for a device that starts on its own."""
+    """Checks confirmed states. A boot-up confirms a restart and no state."""
     if "--no-wait" in scenario.arguments or scenario.is_commanded_by_others() or scenario.is_disordered():
         return []
     problems = []

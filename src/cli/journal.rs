@@ -1,0 +1,185 @@
+//! The journal of temporary writes: one small file per bus and device in `$XDG_STATE_HOME/cangauge/`.
+//!
+//! The file is written and synced before the write, locked while its program runs, and removed when the write is undone.
+//! A file without a lock was left behind by a program that was killed.
+
+use super::args::BusSpec;
+use crate::bus::file::lock;
+use crate::canopen::id::NodeId;
+use crate::tasks::journal::{Journal, JournalError, TemporaryWrite};
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// The first line of each file. Another version is ignored.
+const HEAD: &str = "cangauge journal 1";
+
+/// The files of one bus.
+#[derive(Debug)]
+pub(super) struct FileJournal {
+    folder: Option<PathBuf>,
+    bus: String,
+    /// The files of this run, locked.
+    own: BTreeMap<PathBuf, File>,
+}
+
+impl FileJournal {
+    /// The journal of a bus. The devices of a simulated bus end with the program, and a recording is never written to.
+    pub(super) fn of(bus: &BusSpec) -> FileJournal {
+        match bus {
+            BusSpec::SocketCan(name) => FileJournal::in_folder(folder(), name),
+            BusSpec::Sim(_) | BusSpec::Replay(_) => FileJournal::in_folder(None, ""),
+        }
+    }
+
+    fn in_folder(folder: Option<PathBuf>, bus: &str) -> FileJournal {
+        FileJournal { folder, bus: bus.to_owned(), own: BTreeMap::new() }
+    }
+
+    fn path(&self, write: &TemporaryWrite) -> Option<PathBuf> {
+        let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_.".contains(letter);
+        let bus: String = self.bus.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect();
+        let [vendor, product, _, serial] =
+            write.identity.map(|number| number.map_or("x".to_owned(), |n| n.to_string()));
+        let name = format!("{bus}-{vendor}-{product}-{serial}-{}-{:04x}.undo", write.node, write.object.index);
+        Some(self.folder.as_ref()?.join(name))
+    }
+
+    /// The writes that killed programs left behind on this bus, for these nodes.
+    pub(super) fn left_behind(&mut self, is_ours: &dyn Fn(NodeId) -> bool) -> Vec<TemporaryWrite> {
+        let entries = self.folder.as_ref().and_then(|folder| fs::read_dir(folder).ok());
+        let paths: Vec<PathBuf> = entries.into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+        let mut found = Vec::new();
+        for path in paths.into_iter().filter(|path| path.extension().is_some_and(|extension| extension == "undo")) {
+            let Ok(text) = fs::read_to_string(&path) else { continue };
+            let Some(write) = parse(&text, &self.bus).filter(|write| is_ours(write.node)) else { continue };
+            let Ok(file) = File::options().append(true).open(&path) else { continue };
+            if self.path(&write).as_ref() == Some(&path) && lock(&file).is_ok() {
+                self.own.insert(path, file);
+                found.push(write);
+            }
+        }
+        found
+    }
+
+    fn create(&mut self, path: &Path, write: &TemporaryWrite) -> io::Result<()> {
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        let mut file = File::options().append(true).create(true).open(path)?;
+        lock(&file).map_err(|_| io::Error::from(io::ErrorKind::ResourceBusy))?;
+        file.set_len(0)?;
+        file.write_all(text(write, &self.bus).as_bytes())?;
+        file.sync_all()?;
+        if let Some(folder) = path.parent().and_then(|folder| File::open(folder).ok()) {
+            // Some file systems cannot sync a folder.
+            let _ = folder.sync_all();
+        }
+        self.own.insert(path.to_owned(), file);
+        Ok(())
+    }
+}
+
+impl Journal for FileJournal {
+    fn record(&mut self, write: &TemporaryWrite) -> Result<(), JournalError> {
+        let Some(path) = self.path(write) else { return Ok(()) };
+        let error = |error: io::Error| JournalError { file: path.display().to_string(), reason: error.to_string() };
+        self.create(&path, write).map_err(error)
+    }
+
+    fn remove(&mut self, write: &TemporaryWrite) {
+        if let Some(path) = self.path(write) {
+            // A file that stays is found by the next run, which sees that the object was changed since.
+            let _ = fs::remove_file(&path);
+            self.own.remove(&path);
+        }
+    }
+}
+
+/// The folder for the state of programs (XDG base directories). `None` if the environment names none.
+fn folder() -> Option<PathBuf> {
+    let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let state = absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")))?;
+    Some(state.join("cangauge"))
+}
+
+fn text(write: &TemporaryWrite, bus: &str) -> String {
+    let identity = write.identity.map(|number| number.map_or("-".to_owned(), |number| number.to_string()));
+    let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    format!(
+        "{HEAD}\nbus {bus}\nnode {}\nidentity {}\nobject {}\nbefore {}\nwritten {}\nend\n",
+        write.node,
+        identity.join(" "),
+        write.object,
+        hex(&write.before),
+        hex(&write.written)
+    )
+}
+
+/// Reads a file of this bus. `None` also for a file that was cut off: its write was not sent.
+fn parse(text: &str, bus: &str) -> Option<TemporaryWrite> {
+    let mut lines = text.lines();
+    let mut line = |name: &str| lines.next()?.strip_prefix(name)?.strip_prefix(' ').map(str::to_owned);
+    let is_ours = line("cangauge")? == HEAD.strip_prefix("cangauge ")? && line("bus")? == bus;
+    let node = NodeId::new(line("node")?.parse().ok()?).ok()?;
+    let numbers = line("identity")?;
+    let numbers: Vec<Option<u32>> = numbers.split(' ').map(|number| number.parse().ok()).collect();
+    let object = line("object")?.parse().ok()?;
+    let before = bytes(&line("before")?)?;
+    let written = bytes(&line("written")?)?;
+    let is_complete = lines.next() == Some("end");
+    let identity = numbers.try_into().ok()?;
+    (is_ours && is_complete).then_some(TemporaryWrite { node, identity, object, before, written })
+}
+
+fn bytes(hex: &str) -> Option<Vec<u8>> {
+    let pair = |at: usize| u8::from_str_radix(hex.get(at..at + 2)?, 16).ok();
+    (0..hex.len()).step_by(2).map(pair).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::canopen::object::ObjectId;
+
+    fn example() -> TemporaryWrite {
+        TemporaryWrite {
+            node: NodeId::new(5).expect("a node-ID"),
+            identity: [Some(71), Some(1), None, Some(10001)],
+            object: ObjectId::new(0x1017, 0),
+            before: vec![0, 0],
+            written: vec![100, 0],
+        }
+    }
+
+    #[test]
+    fn file_is_read_back_unless_it_is_cut_off() {
+        let text = text(&example(), "can0");
+        assert_eq!(parse(&text, "can0"), Some(example()));
+        assert_eq!(parse(&text, "can1"), None);
+        for length in 0..text.len() - 1 {
+            assert_eq!(parse(&text[..length], "can0"), None, "{length} bytes");
+        }
+        assert_eq!(parse(&text.replace("journal 1", "journal 2"), "can0"), None);
+    }
+
+    #[test]
+    fn write_is_left_behind_by_a_program_that_ends_before_it_is_undone() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let journal = |bus: &str| FileJournal::in_folder(Some(folder.path().join("cangauge")), bus);
+        let all = |_: NodeId| true;
+        let mut first = journal("can0");
+        first.record(&example()).expect("recorded");
+        assert_eq!(journal("can0").left_behind(&all), [], "its program runs");
+        assert!(journal("can0").record(&example()).is_err(), "its program runs");
+        drop(first);
+        assert_eq!(journal("can1").left_behind(&all), []);
+        assert_eq!(journal("can0").left_behind(&|node| node.get() == 6), []);
+        let mut next = journal("can0");
+        assert_eq!(next.left_behind(&all), [example()]);
+        next.remove(&example());
+        drop(next);
+        assert_eq!(journal("can0").left_behind(&all), []);
+    }
+}

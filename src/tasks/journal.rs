@@ -1,0 +1,118 @@
+//! What must be undone if the program is killed. A temporary write is recorded before it is sent.
+//!
+//! The file is in the layer above: [`Journal`] is what the tasks need of it.
+
+use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
+use crate::master::{Error as MasterError, Master, Request};
+use crate::node::read::read_values;
+use crate::node::write::write;
+use crate::node::{Error, Identity, Node};
+
+/// A temporary write of an object.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TemporaryWrite {
+    /// The node.
+    pub node: NodeId,
+    /// Vendor, product, revision and serial number of the device (1018h:1 to 4), as far as they are known.
+    pub identity: [Option<u32>; 4],
+    /// The object.
+    pub object: ObjectId,
+    /// Its bytes before.
+    pub before: Vec<u8>,
+    /// The bytes written.
+    pub written: Vec<u8>,
+}
+
+/// Why a temporary write could not be recorded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JournalError {
+    /// The file of the journal.
+    pub file: String,
+    /// The error of the operating system.
+    pub reason: String,
+}
+
+/// Keeps temporary writes until they are undone.
+pub trait Journal {
+    /// Records a write. When this returns, the record is on the disk.
+    ///
+    /// # Errors
+    /// The record cannot be written.
+    fn record(&mut self, write: &TemporaryWrite) -> Result<(), JournalError>;
+
+    /// The write is undone.
+    fn remove(&mut self, write: &TemporaryWrite);
+}
+
+/// For a bus whose devices end together with the program.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoJournal;
+
+impl Journal for NoJournal {
+    fn record(&mut self, _: &TemporaryWrite) -> Result<(), JournalError> {
+        Ok(())
+    }
+
+    fn remove(&mut self, _: &TemporaryWrite) {}
+}
+
+/// What became of a temporary write that an earlier run left behind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Undone {
+    /// The object has its value of before again.
+    Restored,
+    /// The object holds another value than the one written: somebody changed it, or the device restarted.
+    ChangedSince,
+    /// Another device has the node-ID now.
+    OtherDevice,
+    /// The device did not answer, or rejected the write. It is tried again by the next run.
+    NotRestored,
+}
+
+impl Undone {
+    /// Whether the record is still needed.
+    pub fn is_open(self) -> bool {
+        matches!(self, Undone::OtherDevice | Undone::NotRestored)
+    }
+}
+
+impl TemporaryWrite {
+    /// A write to this node.
+    pub fn to(node: &Node, object: ObjectId, before: &[u8], written: &[u8]) -> TemporaryWrite {
+        let Identity { vendor, product, revision, serial, .. } = node.identity;
+        let identity = [vendor, product, revision, serial];
+        TemporaryWrite { node: node.id, identity, object, before: before.to_vec(), written: written.to_vec() }
+    }
+
+    /// Undoes the write of an earlier run: only on the same device, and only if the object still holds what was written.
+    ///
+    /// # Errors
+    /// Bus errors and Ctrl-C.
+    pub fn undo(&self, master: &mut Master<'_>) -> Result<Undone, MasterError> {
+        let subs = [1, 2, 3, 4].map(|sub| (self.node, ObjectId::new(0x1018, sub), DataType::Unsigned(4)));
+        for (value, recorded) in read_values(master, &subs)?.into_iter().zip(self.identity) {
+            let found = value.ok().and_then(|value| value.as_u64());
+            if let (Some(found), Some(recorded)) = (found, recorded)
+                && found != u64::from(recorded)
+            {
+                return Ok(Undone::OtherDevice);
+            }
+        }
+        let Ok(answer) = master.transfer_one(Request::read(self.node, self.object))? else {
+            return Ok(Undone::NotRestored);
+        };
+        let found = answer.uploaded.map(|uploaded| uploaded.bytes).unwrap_or_default();
+        // A device that indicates no size sends four bytes for every type.
+        if !found.starts_with(&self.written) {
+            return Ok(Undone::ChangedSince);
+        }
+        match write(master, &Node::new(self.node), self.object, &self.before) {
+            Ok(_) => Ok(Undone::Restored),
+            Err(Error::Bus(error)) => Err(MasterError::Bus(error)),
+            Err(Error::Interrupted) => Err(MasterError::Interrupted),
+            Err(_) => Ok(Undone::NotRestored),
+        }
+    }
+}
