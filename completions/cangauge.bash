@@ -488,7 +488,7 @@ _cangauge() {
 
     case "${cmd}" in
         cangauge)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version scan ls read nmt sdo log check lss info status unit filter limits minmax errors bus pdo config autozero zero store restore sim objects devices completions help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version scan ls read nmt sdo log check lss info status unit filter limits minmax errors bus pdo config autozero zero store restore sim objects devices completions help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 1 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -522,6 +522,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -550,7 +554,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__autozero)
-            opts="-b -t -f -q -v -h -V --channel --limit --samples --force --store --dry-run --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --channel --limit --samples --force --store --dry-run --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -596,6 +600,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -624,7 +632,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__bus)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version list up down detect help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version list up down detect help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -658,6 +666,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -686,7 +698,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__bus__subcmd__detect)
-            opts="-b -t -f -q -v -h -V --active --for --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --active --for --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -724,6 +736,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -752,7 +768,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__bus__subcmd__down)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -783,6 +799,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -898,7 +918,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__bus__subcmd__list)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -929,6 +949,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -960,7 +984,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__bus__subcmd__up)
-            opts="-b -t -f -q -v -h -V --listen-only --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --listen-only --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -994,6 +1018,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -1022,7 +1050,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__check)
-            opts="-b -t -f -q -v -h -V --for --sync --poll --junit --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --for --sync --poll --junit --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1072,6 +1100,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -1100,7 +1132,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__completions)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version bash elvish fish powershell zsh"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version bash elvish fish powershell zsh"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1131,6 +1163,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1162,7 +1198,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__config)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version dump diff apply help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version dump diff apply help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1196,6 +1232,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -1224,7 +1264,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__config__subcmd__apply)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --store --reset --dry-run --exact --address --with-calibration --rollback --state-home --home --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --store --reset --dry-run --exact --address --with-calibration --rollback --state-home --home --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1255,6 +1295,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1294,7 +1338,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__config__subcmd__diff)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --address --with-calibration --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --address --with-calibration --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1325,6 +1369,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1356,7 +1404,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__config__subcmd__dump)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --changed --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --changed --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1387,6 +1435,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1488,7 +1540,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__devices)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version show check help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version show check help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1522,6 +1574,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -1550,7 +1606,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__devices__subcmd__check)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1581,6 +1637,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -1668,7 +1728,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__devices__subcmd__show)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1702,6 +1762,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -1730,7 +1794,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__errors)
-            opts="-b -t -f -q -v -h -V --clear --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --clear --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1764,6 +1828,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -1792,7 +1860,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__filter)
-            opts="-b -t -f -q -v -h -V --type --constant --damping --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --type --constant --damping --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1835,6 +1903,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -2636,7 +2708,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__info)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2670,6 +2742,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -2698,7 +2774,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__limits)
-            opts="-b -t -f -q -v -h -V --delta --lower --upper --hysteresis --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --delta --lower --upper --hysteresis --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2748,6 +2824,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -2776,7 +2856,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__log)
-            opts="-d -n -o -b -t -f -q -v -h -V --duration --count --sync --poll --passive --no-nmt --max-gap --expect --output --force --append --layout --rotate --events --summary --delimiter --decimal --bom --time --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-d -n -o -b -t -f -q -v -h -V --duration --count --sync --poll --passive --no-nmt --max-gap --expect --output --force --append --layout --rotate --events --summary --delimiter --decimal --bom --time --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2878,6 +2958,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -2906,7 +2990,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version scan inquire set-id set-bitrate set activate store identify help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version scan inquire set-id set-bitrate set activate store identify help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2940,6 +3024,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -2968,7 +3056,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__activate)
-            opts="-b -t -f -q -v -h -V --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --force --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2999,6 +3087,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -3170,7 +3262,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__identify)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3201,6 +3293,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -3232,7 +3328,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__inquire)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3263,6 +3359,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -3294,7 +3394,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__scan)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3328,6 +3428,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -3356,7 +3460,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__set)
-            opts="-b -t -f -q -v -h -V --id --bitrate --table-index --retime --no-store --via --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --id --bitrate --table-index --retime --no-store --via --force --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3406,6 +3510,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -3434,7 +3542,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__set__subcmd__bitrate)
-            opts="-b -t -f -q -v -h -V --table-index --retime --no-store --via --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --table-index --retime --no-store --via --force --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3476,6 +3584,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -3504,7 +3616,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__set__subcmd__id)
-            opts="-b -t -f -q -v -h -V --no-store --via --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --no-store --via --force --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3542,6 +3654,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -3570,7 +3686,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__lss__subcmd__store)
-            opts="-b -t -f -q -v -h -V --force --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --force --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3604,6 +3720,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -3632,7 +3752,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__minmax)
-            opts="-b -t -f -q -v -h -V --reset --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --reset --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3663,6 +3783,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -3694,7 +3818,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version start stop preop reset reset-comm state watch startup help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version start stop preop reset reset-comm state watch startup help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3725,6 +3849,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -3896,7 +4024,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__preop)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3927,6 +4055,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -3958,7 +4090,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__reset)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -3989,6 +4121,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4020,7 +4156,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__reset__subcmd__comm)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4051,6 +4187,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4082,7 +4222,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__start)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4113,6 +4253,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4144,7 +4288,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__startup)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version wait auto"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version wait auto"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4175,6 +4319,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4206,7 +4354,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__state)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --probe --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --probe --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4237,6 +4385,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4268,7 +4420,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__stop)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --confirm --no-wait --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4299,6 +4451,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4330,7 +4486,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__nmt__subcmd__watch)
-            opts="-b -t -f -q -v -d -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --duration --help --version"
+            opts="-b -t -f -q -v -d -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --duration --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4361,6 +4517,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4400,7 +4560,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__objects)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4431,6 +4591,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4462,7 +4626,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__pdo)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version show map watch help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version show map watch help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4493,6 +4657,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4594,7 +4762,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__pdo__subcmd__map)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --transmission --event-timer --inhibit --cob-id --store --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --transmission --event-timer --inhibit --cob-id --store --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4625,6 +4793,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4672,7 +4844,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__pdo__subcmd__show)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4703,6 +4875,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4734,7 +4910,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__pdo__subcmd__watch)
-            opts="-b -t -f -q -v -d -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --duration --help --version"
+            opts="-b -t -f -q -v -d -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --duration --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4765,6 +4941,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4804,7 +4984,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__read)
-            opts="-b -t -f -q -v -h -V --in --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --in --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4842,6 +5022,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -4870,7 +5054,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__restore)
-            opts="-b -t -f -q -v -h -V --group --reset --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --group --reset --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4908,6 +5092,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -4936,7 +5124,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__scan)
-            opts="-b -t -f -q -v -h -V --passive --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --passive --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -4967,6 +5155,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -4998,7 +5190,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version read write help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version read write help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -5029,6 +5221,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -5116,7 +5312,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo__subcmd__read)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --type --hex --bytes --output --force --block --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --type --hex --bytes --output --force --block --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -5147,6 +5343,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -5190,7 +5390,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sdo__subcmd__write)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --type --sdo-size --verify --input --block --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --type --sdo-size --verify --input --block --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -5221,6 +5421,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -5268,7 +5472,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__sim)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -5302,6 +5506,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -5330,7 +5538,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__store)
-            opts="-b -t -f -q -v -h -V --group --verify --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --group --verify --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -5368,6 +5576,10 @@ _cangauge() {
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 --format)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
                     return 0
@@ -5396,7 +5608,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__unit)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -5427,6 +5639,10 @@ _cangauge() {
                     return 0
                     ;;
                 --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;

@@ -1163,6 +1163,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1188,6 +1189,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1210,6 +1212,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
@@ -1233,6 +1236,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
