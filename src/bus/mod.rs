@@ -10,6 +10,7 @@ pub mod faults;
 pub mod file;
 pub mod interrupt;
 pub mod memory;
+pub mod owner;
 #[cfg(unix)]
 mod poll;
 pub mod replay;

@@ -198,7 +198,7 @@ pub(super) fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result
 
 /// No description has this name.
 pub(super) fn unknown(name: &str) -> ErrorMessage {
-    let names: Vec<&str> = catalog::names().collect();
+    let names: Vec<&str> = catalog::all().map(|model| model.description.name.as_str()).collect();
     let hint = format!("built-in devices: {}; or name a file", names.join(", "));
     ErrorMessage::usage(format!("no built-in device \"{name}\"")).hint(hint)
 }

@@ -1,20 +1,24 @@
 //! `cangauge devices`.
 
 use super::descriptions::read_file;
-use super::{Global, descriptions};
+use super::{Global, descriptions, own};
 use crate::bus::claim::Claim;
-use crate::device::catalog;
+use crate::canopen::id::NodeId;
+use crate::device::catalog::{self, Model};
 use crate::device::description::read_with_notes;
 use crate::output::devices::{DescriptionText, Finding, Listed};
+use crate::output::draft::toml;
 use crate::output::failure::ErrorMessage;
+use crate::tasks::describe::draft;
 use clap::{Args, Subcommand};
+use std::sync::Arc;
 
-/// List the device descriptions, show one as TOML, or check a file
+/// List device descriptions; show one as TOML, check a file, or describe a new device
 ///
 /// A description is a TOML file with the objects, signals and behaviour of one kind of device. Start your own with a copy.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  cangauge devices\n  cangauge devices show mh4 > mine.toml\n  cangauge devices check mine.toml"
+    after_help = "Examples:\n  cangauge devices\n  cangauge devices show mh4 > mine.toml\n  cangauge devices check mine.toml\n  cangauge -b sim devices new 1 > mine.toml"
 )]
 pub(crate) struct Devices {
     #[command(subcommand)]
@@ -28,6 +32,11 @@ enum Action {
         /// Its name: mh4
         name: String,
     },
+    /// Print a first description of a device, from the device and its EDS (--eds), with comments for what to fill in
+    New {
+        /// Which node: 5, 0x7f
+        node: NodeId,
+    },
     /// Report each mistake in a description file with its line
     Check {
         /// A TOML file
@@ -36,27 +45,41 @@ enum Action {
 }
 
 impl Devices {
+    /// The node that is read.
     pub(super) fn claim(&self) -> Claim {
-        Claim::Nothing
+        match &self.action {
+            Some(Action::New { node }) => Claim::Nodes(vec![*node]),
+            _ => Claim::Nothing,
+        }
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         match &self.action {
             None => list(global),
             Some(Action::Show { name }) => show(name, global),
+            Some(Action::New { node }) => {
+                let overrides = descriptions::overrides(global, &[*node])?;
+                let draft = global.with_master(|master| Ok(draft(master, *node, &overrides)?))?;
+                global.print(&[DescriptionText { name: "new".to_owned(), toml: toml(&draft) }])
+            }
             Some(Action::Check { file }) => check(file, global),
         }
     }
 }
 
 fn list(global: &Global) -> anyhow::Result<()> {
-    let built_in = catalog::built_in().iter().map(|model| Listed { model: model.clone(), file: None });
-    global.print(&built_in.collect::<Vec<_>>())
+    let file = |model: &Arc<Model>| own::file_of(model).to_owned();
+    let is_own = |model: &Arc<Model>| catalog::own().iter().any(|own| Arc::ptr_eq(own, model));
+    let all = catalog::all().map(|model| Listed { model: model.clone(), file: is_own(model).then(|| file(model)) });
+    global.print(&all.collect::<Vec<_>>())
 }
 
 fn show(name: &str, global: &Global) -> anyhow::Result<()> {
-    match catalog::text(name) {
-        Some(toml) => global.print(&[DescriptionText { name: name.to_owned(), toml: toml.to_owned() }]),
+    let own = catalog::own().iter().find(|model| model.description.name == name);
+    let own = own.map(|model| read_file(own::file_of(model))).transpose()?;
+    let own = own.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    match own.or_else(|| catalog::text(name).map(str::to_owned)) {
+        Some(toml) => global.print(&[DescriptionText { name: name.to_owned(), toml }]),
         None => Err(descriptions::unknown(name).into()),
     }
 }

@@ -22,6 +22,7 @@ mod minmax;
 mod nmt;
 mod objects;
 mod open;
+mod own;
 pub mod parse;
 mod pdo;
 mod read;
@@ -411,6 +412,10 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         on_two_devices: cli.command.on_two_devices(),
         ..cli.global.clone()
     };
+    let broken = own::load()?;
+    if !matches!(cli.command, Command::Completions(_)) {
+        own::report(&broken, &global);
+    }
     cli.command.run(&global)
 }
 

@@ -156,11 +156,40 @@ impl Model {
         })
     }
 
+    /// Whether the same devices are recognised by both.
+    pub fn is_for_the_same_device(&self, other: &Model) -> bool {
+        let key = |model: &Model| {
+            let identify = model.description.identify.clone();
+            (identify.device_type, identify.vendor_id, identify.product_code, identify.device_name, identify.confirm)
+        };
+        !self.description.identify.is_empty() && key(self) == key(other)
+    }
+
     /// How specific the description is: it has priority over one that asks for less. The identity counts first.
     fn rank(&self) -> (usize, usize) {
         let identify = &self.description.identify;
         (identify.identity_count(), identify.confirm.len())
     }
+}
+
+/// The descriptions of the user, in the order of their folders and names.
+static OWN: OnceLock<Vec<Arc<Model>>> = OnceLock::new();
+
+/// Adds the descriptions of the user. They have priority over the built-in ones. Only the first call has an effect, and
+/// only before a description is looked for.
+pub fn add_own(models: Vec<Arc<Model>>) {
+    let _ = OWN.set(models);
+}
+
+/// The descriptions of the user.
+pub fn own() -> &'static [Arc<Model>] {
+    OWN.get().map_or(&[], Vec::as_slice)
+}
+
+/// Every description: the user's, then the built-in ones with other names.
+pub fn all() -> impl Iterator<Item = &'static Arc<Model>> {
+    let is_replaced = |model: &&Arc<Model>| own().iter().any(|own| own.description.name == model.description.name);
+    own().iter().chain(built_in().iter().filter(move |model| !is_replaced(model)))
 }
 
 /// The built-in descriptions, in the order of their names.
@@ -186,16 +215,19 @@ pub fn text(name: &str) -> Option<&'static str> {
     FILES.iter().find(|(other, _)| *other == name).map(|(_, text)| *text)
 }
 
-/// The built-in description with this name.
+/// The description with this name: the user's, else the built-in one.
 pub fn by_name(name: &str) -> Option<Arc<Model>> {
+    if let Some(own) = own().iter().find(|model| model.description.name == name) {
+        return Some(Arc::clone(own));
+    }
     file(names().position(|other| other == name)?)
 }
 
-/// The built-in description that asks for this vendor-ID and product code, if there is exactly one. It serves for
+/// The description that asks for this vendor-ID and product code, if there is exactly one. It serves for
 /// devices of which nothing else is known.
 pub fn by_identity(vendor: u32, product: u32) -> Option<Arc<Model>> {
     let wanted = (Some(vendor), Some(product));
-    let mut fitting = built_in().iter().filter(|model| {
+    let mut fitting = all().filter(|model| {
         let identify = &model.description.identify;
         (identify.vendor_id, identify.product_code) == wanted
     });
@@ -213,8 +245,7 @@ pub fn to_ask(traits: &Traits) -> Vec<ObjectId> {
     // Further answers cannot change a decision by identity: only a description with a longer identity would win.
     let decided = recognise(traits).map_or(0, |model| model.rank().0);
     let open = |model: &&Arc<Model>| model.has_identity(traits) && model.rank().0 > decided;
-    let mut objects: Vec<ObjectId> = built_in()
-        .iter()
+    let mut objects: Vec<ObjectId> = all()
         .filter(open)
         .flat_map(|model| model.description.identify.confirm.keys().copied())
         .filter(|object| !traits.answers.contains_key(object))
@@ -224,17 +255,20 @@ pub fn to_ask(traits: &Traits) -> Vec<ObjectId> {
     objects
 }
 
-/// The built-in description that fits a device's answers. If several fit, the most specific one is used; if two are
-/// equally specific, none.
+/// The description that fits a device's answers: one of the user's, else a built-in one. If several fit, the most
+/// specific one is used; if two are equally specific, none.
 pub fn recognise(traits: &Traits) -> Option<Arc<Model>> {
-    let fitting = built_in().iter().filter(|model| model.has_identity(traits) && model.is_confirmed(traits));
-    let mut fitting: Vec<&Arc<Model>> = fitting.collect();
-    fitting.sort_by_key(|model| std::cmp::Reverse(model.rank()));
-    match fitting[..] {
-        [first, second, ..] if first.rank() == second.rank() => None,
-        [first, ..] => Some(Arc::clone(first)),
-        [] => None,
-    }
+    let fits = |model: &&Arc<Model>| model.has_identity(traits) && model.is_confirmed(traits);
+    let best = |mut fitting: Vec<&Arc<Model>>| {
+        fitting.sort_by_key(|model| std::cmp::Reverse(model.rank()));
+        match fitting[..] {
+            [first, second, ..] if first.rank() == second.rank() => None,
+            [first, ..] => Some(Arc::clone(first)),
+            [] => None,
+        }
+    };
+    let of_user: Vec<&Arc<Model>> = own().iter().filter(fits).collect();
+    if of_user.is_empty() { best(all().filter(fits).collect()) } else { best(of_user) }
 }
 
 #[cfg(test)]

@@ -76,6 +76,12 @@ impl Dictionary {
         self.entries.values()
     }
 
+    /// Every name, in lower case, with its object. Full names come last, so that they have priority over aliases.
+    pub fn names(&self) -> impl Iterator<Item = (String, ObjectId)> + '_ {
+        let aliases = self.aliases.iter().map(|(name, object)| (name.clone(), *object));
+        aliases.chain(self.iter().map(|entry| (entry.full_name(), entry.object)))
+    }
+
     /// Whether the dictionary has no entry.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()

@@ -10,6 +10,7 @@ pub mod nearest;
 pub mod profiles;
 pub mod quirk;
 pub mod scalar;
+pub mod scale;
 pub mod search;
 pub mod sensor;
 pub mod standard;

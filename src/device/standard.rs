@@ -139,6 +139,12 @@ pub fn find(name: &str) -> Option<Entry> {
     ROWS.iter().filter(|row| row.name == bare).find_map(|row| found(row, row.index))
 }
 
+/// The objects of 1000h to 1FFFh that are not part of a run. PDOs are missing.
+pub fn single_objects() -> impl Iterator<Item = ObjectId> {
+    let single = ROWS.iter().filter(|row| row.first == row.last && row.index < 0x2000);
+    single.map(|row| ObjectId::new(row.index, row.first))
+}
+
 /// Every name, a run once with its first sub-index, for suggestions of the nearest name.
 pub fn names() -> impl Iterator<Item = String> {
     let plain = ROWS.iter().filter_map(|row| entry(ObjectId::new(row.index, row.first)));

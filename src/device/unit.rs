@@ -109,6 +109,12 @@ const PREFIXES: &[(i8, &str)] = &[
     (-18, "a"),
 ];
 
+/// Units of descriptions that CiA 303-2 has no code for. Their codes have a denominator that no device can send.
+const EXTRA: [&str; 12] = ["%", "rpm", "1/min", "1/s", "ppm", "dB", "pH", "step", "kWh", "%RH", "m3/h", "l/min"];
+
+/// The first code of [`EXTRA`].
+const EXTRA_CODES: u32 = 0xffff_ff00;
+
 impl Unit {
     /// No dimension.
     pub const NONE: Unit = Unit(0);
@@ -133,6 +139,9 @@ impl Unit {
         if self == Unit::NONE {
             return Some(String::new());
         }
+        if self.0 >= EXTRA_CODES {
+            return EXTRA.get(usize::from(reserved)).map(|symbol| (*symbol).to_owned());
+        }
         let (_, prefix) = PREFIXES.iter().find(|(power, _)| *power == prefix)?;
         let numerator = Unit::base(numerator)?.symbol;
         match (denominator, reserved) {
@@ -146,6 +155,10 @@ impl Unit {
     pub fn from_symbol(text: &str) -> Option<Unit> {
         if text.starts_with("0x") || text.starts_with("0X") {
             return crate::canopen::id::parse_u32(text).map(Unit);
+        }
+        if let Some(code) = EXTRA.iter().zip(EXTRA_CODES..).find_map(|(symbol, code)| (*symbol == text).then_some(code))
+        {
+            return Some(Unit(code));
         }
         let text = text.replace('\u{b0}', "deg").replace(['\u{b5}', '\u{3bc}'], "u");
         let (numerator, denominator) = match text.split_once('/') {

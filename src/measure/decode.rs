@@ -8,6 +8,7 @@ use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{Field, lay_out};
 use crate::canopen::value::DataType;
+use crate::device::unit::Unit;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
@@ -20,16 +21,34 @@ pub enum Wanted {
     Status(String),
     /// An object by its address, with the type that the user states: `0x6130:1`, `0x6010:0/i16`.
     Object(ObjectId, Option<DataType>),
+    /// An object by its name: see [`Layout::resolve`].
+    Named(String, ObjectId),
 }
 
 impl Wanted {
     /// The name as in [`Source`]: `pressure`, `pressure.status`, `0x6010:0/i16`.
     pub fn name(&self) -> String {
         match self {
-            Wanted::Signal(name) => name.clone(),
+            Wanted::Signal(name) | Wanted::Named(name, _) => name.clone(),
             Wanted::Status(name) => format!("{name}.status"),
             Wanted::Object(object, None) => object.to_string(),
             Wanted::Object(object, Some(data_type)) => format!("{object}/{data_type}"),
+        }
+    }
+}
+
+impl Layout<'_> {
+    /// A requested value as this node has it: a name that no signal has, and that an object has, means the object.
+    pub fn resolve(&self, item: &Wanted) -> Wanted {
+        let Wanted::Signal(name) = item else { return item.clone() };
+        if self.signals.iter().any(|signal| signal.name == *name) {
+            return item.clone();
+        }
+        let Some(object) = self.object(name) else { return item.clone() };
+        let named = |signal: &&Signal| !signal.has_channel() && signal.value.0 == object;
+        match self.signals.iter().find(named) {
+            Some(signal) => Wanted::Signal(signal.name.clone()),
+            None => Wanted::Named(self.name_of(object), object),
         }
     }
 }
@@ -174,7 +193,7 @@ impl Decoder {
                     let status = fields.iter().find(|other| Some(other.entry.object) == signal.status).copied();
                     add(
                         &signal.name,
-                        unit_of(Some(signal)),
+                        words(signal.unit),
                         &|source| Reading::of_signal(signal, data_type, source),
                         status,
                     );
@@ -186,20 +205,21 @@ impl Decoder {
                 }
             } else if wanted.is_empty() && !is_dummy(object) {
                 let reading = |source| Reading::of_object(layout, object, data_type, source);
-                add(&object.to_string(), unit_of(layout.signal_of(object)), &reading, None);
+                add(&layout.name_of(object), words(layout.unit_of(object)), &reading, None);
             }
             for item in wanted {
-                if let Wanted::Object(wanted, stated) = item
+                if let Wanted::Object(wanted, _) | Wanted::Named(_, wanted) = item
                     && *wanted == object
                 {
-                    let reading = |source| match *stated {
+                    let stated = if let Wanted::Object(_, stated) = item { *stated } else { None };
+                    let reading = |source| match stated {
                         Some(stated) => {
                             Reading::plain(Some(stated).filter(|stated| fits(*stated, field.entry.bits)), source)
                         }
                         None => Reading::of_object(layout, object, data_type, source),
                     };
-                    let signal = layout.signal_of(object).filter(|signal| stated.is_none() && !signal.is_value(object));
-                    add(&item.name(), unit_of(signal), &reading, None);
+                    let unit = if stated.is_none() { layout.unit_of(object) } else { None };
+                    add(&item.name(), words(unit), &reading, None);
                 }
             }
         }
@@ -286,14 +306,14 @@ fn is_dummy(object: ObjectId) -> bool {
     object.index < 0x20
 }
 
-/// The source of a value of a node; `signal` gives the unit.
-pub fn source(node: NodeId, name: &str, signal: Option<&Signal>) -> Source {
-    Source { node, signal: Arc::from(name), unit: Arc::from(unit_of(signal)) }
+/// The source of a value of a node.
+pub fn source(node: NodeId, name: &str, unit: Option<Unit>) -> Source {
+    Source { node, signal: Arc::from(name), unit: Arc::from(words(unit)) }
 }
 
-/// The unit of a signal in words; empty if it is unknown.
-fn unit_of(signal: Option<&Signal>) -> String {
-    signal.and_then(|signal| signal.unit).map(|unit| unit.to_string()).unwrap_or_default()
+/// A unit in words; empty if it is unknown.
+fn words(unit: Option<Unit>) -> String {
+    unit.map(|unit| unit.to_string()).unwrap_or_default()
 }
 
 #[cfg(test)]

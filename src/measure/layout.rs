@@ -5,6 +5,8 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
 use crate::canopen::value::DataType;
 use crate::device::catalog::Model;
+use crate::device::dictionary::spellings;
+use crate::device::scale::{Markers, Scale, StatusBits};
 use crate::device::unit::Unit;
 use crate::device::{profiles, standard};
 
@@ -13,7 +15,7 @@ use crate::device::{profiles, standard};
 pub struct Signal {
     /// `pressure`, `temperature`, `ch1` …
     pub name: String,
-    /// The CiA 404 channel.
+    /// The CiA 404 channel, 1 to 199; any other number means none.
     pub channel: u8,
     /// The object that holds the process value, and its type; `None` if no source states the type.
     pub value: (ObjectId, Option<DataType>),
@@ -27,8 +29,46 @@ pub struct Signal {
     pub unit: Option<Unit>,
     /// The decimal digits (6132h); `None` if they are unknown.
     pub digits: Option<u8>,
+    /// Scaling and status of a signal that does not follow CiA 404.
+    pub rules: Rules,
     /// The measuring range of the device.
     pub range: MeasuringRange,
+}
+
+/// How the number in an object becomes the value of a signal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Scaling {
+    /// An integer has the decimal digits of its channel (CiA 404).
+    #[default]
+    Digits,
+    /// The number is the value.
+    Plain,
+    /// By factor and offset.
+    Fixed(Scale),
+}
+
+/// Scaling and status of a signal, if they are not those of CiA 404.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rules {
+    /// From the number to the value.
+    pub scaling: Scaling,
+    /// The bits of the status object.
+    pub status_bits: StatusBits,
+    /// Numbers that take the place of the value.
+    pub markers: Markers,
+}
+
+impl Default for Rules {
+    fn default() -> Rules {
+        Rules { scaling: Scaling::Digits, status_bits: StatusBits::CIA_404, markers: Markers::default() }
+    }
+}
+
+impl Rules {
+    /// For a number that is the value.
+    pub fn plain() -> Rules {
+        Rules { scaling: Scaling::Plain, ..Rules::default() }
+    }
 }
 
 /// What is known of the measuring range of a signal.
@@ -51,7 +91,14 @@ impl Signal {
     pub fn is_value(&self, object: ObjectId) -> bool {
         object == self.value.0
             || self.also.contains(&object)
-            || object.sub == self.channel && PROCESS_VALUES.iter().any(|&(index, _)| index == object.index)
+            || self.has_channel()
+                && object.sub == self.channel
+                && PROCESS_VALUES.iter().any(|&(index, _)| index == object.index)
+    }
+
+    /// Whether the signal is a channel of CiA 404, with the objects of one.
+    pub fn has_channel(&self) -> bool {
+        (1..=199).contains(&self.channel)
     }
 }
 
@@ -102,7 +149,39 @@ impl Layout<'_> {
             model.dictionary.get(object).filter(|_| !is_open).map(|entry| entry.data_type)
         });
         let of_profile = || self.profile.and_then(|profile| profiles::data_type(profile, object));
-        described.or_else(of_profile).or_else(|| standard::entry(object).map(|entry| entry.data_type))
+        let described = described.or_else(|| self.type_of_signal(object));
+        let standard = || standard::entry(object).map(|entry| entry.data_type);
+        described.or_else(of_profile).or_else(standard)
+    }
+
+    /// The type that the description states for the value of a signal outside of CiA 404.
+    fn type_of_signal(&self, object: ObjectId) -> Option<DataType> {
+        let mut own = self.signals.iter().filter(|signal| !signal.has_channel());
+        own.find(|signal| signal.value.0 == object)?.value.1
+    }
+
+    /// The name of an object in the description, the EDS, the profile or the standard; else its address.
+    pub fn name_of(&self, object: ObjectId) -> String {
+        let described = self.model.and_then(|model| model.dictionary.get(object)).map(|entry| entry.full_name());
+        let of_profile = || self.profile.and_then(|profile| profiles::name(profile, object));
+        let standard = || standard::entry(object).map(|entry| entry.full_name());
+        described.or_else(of_profile).or_else(standard).unwrap_or_else(|| object.to_string())
+    }
+
+    /// The object with this name, as [`Layout::name_of`] or as an EDS spells it. Letter case is ignored.
+    pub fn object(&self, name: &str) -> Option<ObjectId> {
+        let described = self.model.and_then(|model| model.dictionary.find(name)).map(|entry| entry.object);
+        let of_profile = |name: &str| profiles::find(self.profile?, name);
+        let standard = |name: &str| standard::find(name).map(|entry| entry.object);
+        let known = |name: &str| of_profile(name).or_else(|| standard(name));
+        described.or_else(|| known(name)).or_else(|| spellings(name).iter().find_map(|name| known(name)))
+    }
+
+    /// The unit of an object: that of its channel, else the fixed one of the description.
+    pub fn unit_of(&self, object: ObjectId) -> Option<Unit> {
+        let signal = self.signal_of(object).filter(|signal| !signal.is_value(object)).and_then(|signal| signal.unit);
+        let fixed = || self.model?.description.object(object)?.unit.as_deref().and_then(Unit::from_symbol);
+        signal.or_else(fixed)
     }
 
     /// The type of a mapped object of `bits` bits. `None` if no source states it, or if the type has another width.
@@ -153,6 +232,7 @@ impl Signal {
         let digits = self.digits.unwrap_or(0).min(9);
         let largest = ((1i64 << (8 * u32::from(width) - 1)) - 1) as f64 / 10f64.powi(i32::from(digits));
         let range_end = match self.range {
+            _ if self.rules.scaling != Scaling::Digits => return None,
             MeasuringRange::Unknown => return None,
             MeasuringRange::MayClip => None,
             MeasuringRange::Known(start, end) => Some(if start.abs() > end.abs() { start } else { end }),

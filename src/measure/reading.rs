@@ -1,10 +1,11 @@
 //! From the bytes of one value to a sample: type, decimal digits, status, and the cases in which there is no value.
 
-use super::layout::{Layout, MeasuringRange, Signal};
+use super::layout::{Layout, MeasuringRange, Rules, Scaling as Rule, Signal};
 use super::sample::{Doubt, Number, Raw, Sample, Status};
 use crate::bus::Stamp;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};
+use crate::device::scale::Scale;
 
 /// How the bytes of one value become a sample.
 #[derive(Clone, Debug)]
@@ -16,6 +17,7 @@ pub struct Reading {
     marker: bool,
     has_status: bool,
     range: MeasuringRange,
+    rules: Rules,
 }
 
 /// Whether a number has decimal digits.
@@ -25,6 +27,8 @@ enum Scaling {
     Plain,
     /// It is a measured value; its decimal digits (6132h) are known or not.
     Digits(Option<u8>),
+    /// It has a factor and an offset.
+    Fixed(Scale),
 }
 
 /// More decimal digits are impossible: CiA 404 has 0 to 9.
@@ -42,7 +46,12 @@ impl Reading {
         Reading {
             source,
             data_type,
-            scaling: Scaling::Digits(signal.digits),
+            scaling: match signal.rules.scaling {
+                Rule::Digits => Scaling::Digits(signal.digits),
+                Rule::Plain => Scaling::Plain,
+                Rule::Fixed(scale) => Scaling::Fixed(scale),
+            },
+            rules: signal.rules.clone(),
             marker: signal.marker,
             has_status: signal.status.is_some(),
             range: signal.range,
@@ -60,7 +69,8 @@ impl Reading {
     /// For a number without unit and decimal digits.
     pub fn plain(data_type: Option<DataType>, source: usize) -> Reading {
         let range = MeasuringRange::Unknown;
-        Reading { source, data_type, scaling: Scaling::Plain, marker: false, has_status: true, range }
+        let rules = Rules::default();
+        Reading { source, data_type, scaling: Scaling::Plain, marker: false, has_status: true, range, rules }
     }
 
     /// The data type of the value; `None` if no source states it.
@@ -81,16 +91,19 @@ impl Reading {
             }
             Scaling::Digits(None) if is_integer => (0, Some(Doubt::UnknownDigits)),
             Scaling::Digits(digits) => (digits.unwrap_or(0), None),
-            Scaling::Plain => (0, None),
+            Scaling::Plain | Scaling::Fixed(_) => (0, None),
         };
-        let number = Number::from_value(&value, digits)?;
+        let unscaled = Number::from_value(&value, digits)?;
+        let number = if let Scaling::Fixed(scale) = self.scaling { unscaled.scaled(scale)? } else { unscaled };
         if let (Number::Real32(real), Scaling::Digits(_)) = (number, self.scaling)
             && real != 0.0
             && real.abs() < SMALLEST_REAL
         {
             return Some(without_value(Some(Status::Invalid), Some(Doubt::LooksLikeInteger)));
         }
-        let reported = status_bits.map(Status::from_bits);
+        let status_bits = status_bits.map(|bits| self.rules.status_bits.to_cia_404(bits));
+        let marker = if let Value::Integer(_) | Value::Unsigned(_) = value { self.marker_bits(&value) } else { None };
+        let reported = marker.or(status_bits).map(Status::from_bits);
         let marked = !number.is_finite() || self.marker && is_smallest(&value, data_type);
         let mut status = match reported {
             Some((Status::Ok, _)) if marked => Some(Status::Invalid),
@@ -100,7 +113,7 @@ impl Reading {
             None => None,
         };
         let mut valid = !marked && reported.is_none_or(|(_, valid)| valid);
-        if valid && self.scaling != Scaling::Plain && is_at_end(&value, data_type) {
+        if valid && matches!(self.scaling, Scaling::Digits(_)) && is_at_end(&value, data_type) {
             if self.range == MeasuringRange::Unknown {
                 doubt = doubt.or(Some(Doubt::EndOfType));
             }
@@ -116,6 +129,15 @@ impl Reading {
             status = self.range.overload(number.as_f64());
         }
         Some(Sample { value: valid.then_some(number), ..without_value(status, doubt) })
+    }
+
+    /// The status that an integer marks by itself, as bits of 6150h.
+    fn marker_bits(&self, value: &Value) -> Option<u64> {
+        let number = match value {
+            Value::Integer(number) => *number,
+            value => i64::try_from(value.as_u64()?).ok()?,
+        };
+        self.rules.markers.status_bits(number)
     }
 
     /// Whether the measuring range goes beyond a value at the end of its type.
@@ -169,6 +191,7 @@ pub fn is_smallest(value: &Value, data_type: DataType) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::scale::Bad;
 
     fn signal(digits: Option<u8>, range: MeasuringRange) -> Signal {
         Signal {
@@ -180,6 +203,7 @@ mod tests {
             marker: false,
             unit: None,
             digits,
+            rules: Rules::default(),
             range,
         }
     }
@@ -211,6 +235,29 @@ mod tests {
         assert_eq!(sample(&fits, I16, &[0xff, 0x7f], Some(0)), ("32.767".into(), "ok"));
         let warned = signal(Some(3), MeasuringRange::MayClip);
         assert_eq!(sample(&warned, I16, &[0xff, 0x7f], Some(0)), (String::new(), "clipped"));
+    }
+
+    #[test]
+    fn fixed_scale_own_status_bits_and_markers() {
+        let scaling = |factor: &str, offset: &str| {
+            let [factor, offset] = [factor, offset].map(|text| text.parse().expect("a decimal"));
+            Rule::Fixed(Scale { factor, offset })
+        };
+        let mut signal = signal(None, UNKNOWN);
+        signal.rules.scaling = scaling("0.01", "0");
+        assert_eq!(sample(&signal, I16, &(-1234i16).to_le_bytes(), None), ("-12.34".into(), ""));
+        assert_eq!(sample(&signal, I16, &[0xff, 0x7f], Some(0)), ("327.67".into(), "ok"));
+        signal.rules.scaling = scaling("0.25", "-40");
+        assert_eq!(sample(&signal, DataType::Unsigned(1), &[255], None), ("23.75".into(), ""));
+        assert_eq!(sample(&signal, DataType::Real32, &1.5f32.to_le_bytes(), None), ("-39.625".into(), ""));
+        signal.rules.status_bits = Bad { invalid: 0x100, high: 0x10, low: 0x20 };
+        assert_eq!(sample(&signal, I16, &[0, 0], Some(0x10)), ("-40.00".into(), "overload-high"));
+        assert_eq!(sample(&signal, I16, &[0, 0], Some(0x0f)), ("-40.00".into(), "ok"));
+        assert_eq!(sample(&signal, I16, &[0, 0], Some(0x120)), (String::new(), "overload-low"));
+        signal.rules.markers = Bad { invalid: vec![0x7ffe], high: vec![0x7fff], low: vec![-0x8000] };
+        for (number, status) in [(0x7ffe, "invalid"), (0x7fff, "overload-high"), (-0x8000i16, "overload-low")] {
+            assert_eq!(sample(&signal, I16, &number.to_le_bytes(), None), (String::new(), status));
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
 use crate::canopen::value::Value;
+use crate::device::scale::Scale;
 use std::fmt;
 use std::sync::Arc;
 
@@ -33,6 +34,22 @@ impl Number {
             Value::Real32(number) => Some(Number::Real32(*number)),
             Value::Real64(number) => Some(Number::Real64(*number)),
             Value::Text(_) | Value::Bytes(_) | Value::TimeOfDay(_) | Value::TimeDifference(_) => None,
+        }
+    }
+
+    /// The number times a factor, plus an offset. Integers stay exact. `None` if the result is too large.
+    pub fn scaled(self, scale: Scale) -> Option<Number> {
+        let Scale { factor, offset } = scale;
+        match self {
+            Number::Decimal { mantissa, digits } => {
+                let product_digits = digits.checked_add(factor.digits)?;
+                let digits = product_digits.max(offset.digits);
+                let power = |from: u8| 10i128.checked_pow(u32::from(digits - from));
+                let product = mantissa.checked_mul(factor.mantissa.into())?.checked_mul(power(product_digits)?)?;
+                let offset = i128::from(offset.mantissa).checked_mul(power(offset.digits)?)?;
+                Some(Number::Decimal { mantissa: product.checked_add(offset)?, digits })
+            }
+            number => Some(Number::Real64(number.as_f64() * factor.as_f64() + offset.as_f64())),
         }
     }
 

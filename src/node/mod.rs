@@ -19,6 +19,7 @@ pub mod offline;
 pub mod overheard;
 pub mod read;
 pub mod scan;
+pub(crate) mod signals;
 pub mod state;
 pub mod survey;
 pub mod targets;

@@ -11,6 +11,7 @@ use crate::device::standard;
 use crate::master::{Master, Request, SdoError, SdoFailure};
 use crate::measure::decode::Wanted;
 use crate::measure::layout::{PROCESS_VALUES, Signal};
+use std::collections::BTreeSet;
 
 impl Node {
     /// The entry of an object, from the description or the standard. Asks the node nothing.
@@ -83,17 +84,27 @@ impl Node {
 
     /// A requested value as this node has it: a name that no signal has, and that an object has, means the object.
     pub fn wanted(&self, item: &Wanted) -> Wanted {
-        match item {
-            Wanted::Signal(name) if self.signal(name).is_none() => {
-                self.entry_by_name(name).map_or_else(|| item.clone(), |entry| Wanted::Object(entry.object, None))
-            }
-            item => item.clone(),
-        }
+        self.layout().resolve(item)
+    }
+
+    /// The names of the signals, and before them the objects with names like this one.
+    pub fn names_like(&self, name: &str) -> Vec<String> {
+        let objects = self.model.iter().flat_map(|model| model.dictionary.iter()).map(Entry::full_name);
+        let mut names = nearest(name, objects);
+        names.extend(self.signals.iter().map(|signal| signal.name.clone()));
+        let mut seen = BTreeSet::new();
+        names.retain(|name| seen.insert(name.clone()));
+        names
     }
 
     /// Every requested value as this node has it: see [`Node::wanted`].
     pub fn all_wanted(&self, items: &[Wanted]) -> Vec<Wanted> {
         items.iter().map(|item| self.wanted(item)).collect()
+    }
+
+    /// The signals that are channels of CiA 404: unit, filter, limits and autozero are objects of a channel.
+    pub fn channels(&self) -> Vec<&Signal> {
+        self.signals.iter().filter(|signal| signal.has_channel()).collect()
     }
 
     /// The signal with this name.

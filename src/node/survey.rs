@@ -6,20 +6,19 @@
 mod background;
 
 use super::read::{Item, ask_optional, read_known, read_optional, read_values};
-use super::{Identity, Node};
+use super::{Identity, Node, signals};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{CobId, MappingEntry, TpdoNumber, Transmission};
 use crate::canopen::value::{DataType, Value};
 use crate::device::catalog::{Model, Traits, recognise, to_ask};
-use crate::device::description::SignalEntry;
 use crate::device::quirk::Quirk;
 use crate::device::unit::Unit;
 use crate::master::{Answer, Error, Master, Request, SdoError};
-use crate::measure::layout::{MeasuringRange, PROCESS_VALUES, Signal, Tpdo};
+use crate::measure::layout::{MeasuringRange, PROCESS_VALUES, Scaling, Signal, Tpdo};
 use crate::measure::sample::Number;
 pub use background::BackgroundSurvey;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 const U8: DataType = DataType::Unsigned(1);
@@ -274,16 +273,18 @@ fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
     Ok(())
 }
 
-/// Finds the signals: those of the description, else those of the CiA 404 objects.
+/// The signals of a description, the channels of CiA 404, or the values of a profile and the contents of the TPDOs.
 fn find_signals<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
     let mut unknown = Vec::new();
+    let mut others = Vec::new();
     for (at, node) in nodes.iter_mut().enumerate() {
         match node.model.clone().filter(|model| !model.description.signals.is_empty()) {
             Some(model) => {
-                let signals = model.description.signals.iter();
-                node.signals = signals.map(|entry| described(node, entry)).collect();
+                let entries = model.description.signals.iter();
+                node.signals = entries.map(|entry| signals::described(node, entry)).collect();
             }
-            None => unknown.push(at),
+            None if signals::can_have_channels(node) => unknown.push(at),
+            None => others.push(at),
         }
     }
     let items: Vec<Item> = unknown
@@ -292,84 +293,85 @@ fn find_signals<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Sto
         .collect();
     let counts = read_known(master, &items)?;
     for (&at, counts) in unknown.iter().zip(counts.chunks(PROCESS_VALUES.len())) {
-        let channels = |value: &Option<Value>| small::<u8>(value.as_ref()).unwrap_or(0).min(199);
-        let family = PROCESS_VALUES.iter().zip(counts).find(|(_, count)| channels(count) > 0);
         let node = &mut nodes[at];
-        let mut known: Vec<u8> = match family {
-            Some((_, count)) => (1..=channels(count)).collect(),
-            // Sub-index 0 may be missing; an object that is mapped exists.
-            None => node
-                .tpdos
-                .iter()
-                .flat_map(|tpdo| &tpdo.mapping)
-                .filter(|entry| PROCESS_VALUES.iter().any(|&(index, _)| index == entry.object.index))
-                .map(|entry| entry.object.sub)
-                .collect(),
-        };
-        known.sort_unstable();
-        known.dedup();
-        let (index, _) = family.map_or(PROCESS_VALUES[0], |(&family, _)| family);
-        node.signals = known
-            .into_iter()
-            .map(|channel| Signal {
-                name: format!("ch{channel}"),
-                channel,
-                value: (ObjectId::new(index, channel), node.layout().data_type(ObjectId::new(index, channel))),
-                also: Vec::new(),
-                status: Some(ObjectId::new(0x6150, channel)),
-                marker: false,
-                unit: None,
-                digits: None,
-                range: MeasuringRange::Unknown,
-            })
-            .collect();
+        let values = channel_values(node, counts);
+        node.signals = values.into_iter().map(|value| signals::channel(node, value)).collect();
+        if node.signals.is_empty() {
+            others.push(at);
+        }
+    }
+    find_objects(master, nodes, &others)
+}
+
+/// The process value of each channel. `counts` are the answers of sub-index 0 of [`PROCESS_VALUES`].
+fn channel_values(node: &Node, counts: &[Option<Value>]) -> Vec<ObjectId> {
+    let channels = |value: &Option<Value>| small::<u8>(value.as_ref()).unwrap_or(0).min(199);
+    if let Some((&(index, _), count)) = PROCESS_VALUES.iter().zip(counts).find(|(_, count)| channels(count) > 0) {
+        return (1..=channels(count)).map(|channel| ObjectId::new(index, channel)).collect();
+    }
+    // Sub-index 0 may be missing; what is mapped is there.
+    let mapped = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
+    let mapped = mapped.filter(|entry| PROCESS_VALUES.iter().any(|&(index, _)| index == entry.object.index));
+    let known: BTreeSet<u8> = mapped.map(|entry| entry.object.sub).collect();
+    known.into_iter().map(|channel| ObjectId::new(PROCESS_VALUES[0].0, channel)).collect()
+}
+
+/// The signals of devices without channels of CiA 404.
+fn find_objects<A: Ask>(master: &mut A, nodes: &mut [Node], others: &[usize]) -> Result<(), A::Stop> {
+    let rows: Vec<_> = others
+        .iter()
+        .flat_map(|&at| signals::profile_values(&nodes[at]).map(move |(row, object)| (at, row, object)))
+        .collect();
+    let data_type = |node: &Node, object: ObjectId| node.layout().data_type(object).unwrap_or(U8);
+    let items: Vec<Item> =
+        rows.iter().map(|&(at, _, object)| (nodes[at].id, object, data_type(&nodes[at], object))).collect();
+    let values = read_known(master, &items)?;
+    for &at in others {
+        let own = rows.iter().zip(&values).filter(|((of, ..), _)| *of == at);
+        let found = own.flat_map(|((_, row, _), value)| {
+            // A negative value is no count, and shows that the device has the object.
+            let number = value.as_ref().map(|value| value.as_u64().unwrap_or(0));
+            signals::values_of(*row, number)
+        });
+        nodes[at].signals = signals::objects(&nodes[at], found.collect::<Vec<_>>());
     }
     Ok(())
 }
 
-pub(super) fn described(node: &Node, entry: &SignalEntry) -> Signal {
-    Signal {
-        name: entry.name.clone(),
-        channel: entry.channel,
-        value: (entry.value, node.layout().data_type(entry.value)),
-        also: entry.also.clone(),
-        status: entry.status,
-        marker: entry.marker,
-        unit: None,
-        digits: None,
-        range: if entry.may_clip { MeasuringRange::MayClip } else { MeasuringRange::Unknown },
-    }
-}
-
 fn read_units<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
-    let items: Vec<Item> = nodes
+    // Node, signal, and the objects with its unit, its digits and its step.
+    let mut wanted: Vec<(usize, usize, [Option<ObjectId>; 3])> = Vec::new();
+    for (at, node) in nodes.iter().enumerate() {
+        for (number, signal) in node.signals.iter().enumerate() {
+            let [unit, digits] = signals::unit_and_digits(node, signal);
+            wanted.push((at, number, [unit, digits, signals::step(node, signal).map(|step| step.object)]));
+        }
+    }
+    let objects: BTreeSet<(usize, ObjectId)> = wanted
         .iter()
-        .flat_map(|node| {
-            node.signals.iter().flat_map(|signal| {
-                [
-                    (node.id, ObjectId::new(0x6131, signal.channel), U32),
-                    (node.id, ObjectId::new(0x6132, signal.channel), U8),
-                ]
-            })
+        .flat_map(|&(at, _, objects)| objects.into_iter().flatten().map(move |object| (at, object)))
+        .collect();
+    let items: Vec<Item> = objects
+        .iter()
+        .map(|&(at, object)| {
+            let node = &nodes[at];
+            (node.id, object, node.layout().data_type(object).unwrap_or(if object.index == 0x6131 { U32 } else { U8 }))
         })
         .collect();
-    let mut values = read_known(master, &items)?.into_iter();
-    for signal in nodes.iter_mut().flat_map(|node| &mut node.signals) {
-        signal.unit = values
-            .next()
-            .flatten()
-            .as_ref()
-            .and_then(Value::as_u64)
-            .and_then(|code| u32::try_from(code).ok())
-            .map(Unit);
-        signal.digits =
-            values.next().flatten().as_ref().and_then(Value::as_u64).and_then(|digits| u8::try_from(digits).ok());
-    }
-    for node in nodes {
-        for at in 0..node.signals.len() {
-            if node.signals[at].unit.is_none() {
-                node.signals[at].unit = node.fixed_unit(node.signals[at].value.0);
-            }
+    let values: BTreeMap<(usize, ObjectId), Option<Value>> =
+        objects.into_iter().zip(read_known(master, &items)?).collect();
+    for (at, number, objects) in wanted {
+        let [unit, digits, step] =
+            objects.map(|object| object.and_then(|object| self::number(values.get(&(at, object))?.as_ref())));
+        let node = &mut nodes[at];
+        let step = signals::step(node, &node.signals[number]).zip(Some(step));
+        let fixed = node.fixed_unit(node.signals[number].value.0);
+        let signal = &mut node.signals[number];
+        let read = unit.and_then(|code| u32::try_from(code).ok()).map(Unit);
+        signal.unit = read.or(signal.unit).or(fixed);
+        signal.digits = digits.and_then(|digits| u8::try_from(digits).ok());
+        if let Some((step, number)) = step {
+            signals::set_step(signal, step, number);
         }
     }
     Ok(())
@@ -383,13 +385,14 @@ fn read_ranges<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop
     let mut wanted: Vec<Range> = Vec::new();
     for (at, node) in nodes.iter().enumerate() {
         for (number, signal) in node.signals.iter().enumerate() {
-            if !needs_range(node, signal) {
+            if signal.rules.scaling != Scaling::Digits || !needs_range(node, signal) {
                 continue;
             }
             let entries = node.model.iter().flat_map(|model| &model.description.signals);
             let entry = entries.into_iter().find(|entry| entry.name == signal.name);
             let object = |described: Option<ObjectId>, low: u16| {
-                let object = described.unwrap_or(ObjectId::new(low, signal.channel));
+                let of_channel = || signal.has_channel().then(|| ObjectId::new(low, signal.channel));
+                let object = described.or_else(of_channel)?;
                 Some((object, node.layout().data_type(object)?))
             };
             let start = object(entry.and_then(|entry| entry.span_start), 0x6148);

@@ -34,7 +34,7 @@ pub fn vendor_name(vendor: u32, model: Option<&Model>) -> Option<String> {
     let named = model.filter(is_own).map(|model| &model.description.vendor).filter(|name| !name.is_empty());
     let states_vendor = model.is_some_and(|model| model.made_for.iter().any(|device| device.vendor == Some(vendor)));
     let built_in = || {
-        let mut all = catalog::built_in().iter().map(|model| &model.description);
+        let mut all = catalog::all().map(|model| &model.description);
         all.find(|description| description.identify.vendor_id == Some(vendor)).map(|description| &description.vendor)
     };
     let name = if states_vendor { named.or_else(built_in) } else { built_in().or(named) };

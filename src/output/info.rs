@@ -219,7 +219,7 @@ fn mapped(info: &Info, object: String, bits: u8) -> String {
 
 /// The name of the signal whose value or status an object is.
 pub(super) fn name_of(info: &Info, object: &str) -> Option<String> {
-    info.node.signals.iter().find_map(|signal| {
+    let of_signal = info.node.signals.iter().find_map(|signal| {
         let mut values = info.node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object);
         let is_value = values.any(|entry| entry.to_string() == object && signal.is_value(entry));
         let is_status = signal.status.is_some_and(|status| status.to_string() == object);
@@ -228,7 +228,9 @@ pub(super) fn name_of(info: &Info, object: &str) -> Option<String> {
             (false, true) => Some(format!("{}.status", signal.name)),
             (false, false) => None,
         }
-    })
+    });
+    let of_object = || Some(info.node.layout().name_of(object.parse().ok()?)).filter(|name| name != object);
+    of_signal.or_else(of_object)
 }
 
 fn store(info: &Info) -> Rows {

@@ -8,6 +8,7 @@ pub mod csv;
 pub mod devices;
 pub mod diagnosis;
 pub mod doubt;
+pub mod draft;
 mod elapsed;
 pub mod events;
 pub mod failure;

@@ -5,7 +5,7 @@ use super::{table, text};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::device::catalog::Model;
-use crate::device::description::{Access, ObjectEntry};
+use crate::device::description::ObjectEntry;
 use crate::device::dictionary::Entry;
 use crate::device::scalar::Scalar;
 use crate::output::sdo::is_usually_hexadecimal;
@@ -93,7 +93,7 @@ impl<'a> ObjectFacts<'a> {
         let mut lines = Vec::new();
         let data_type = self.data_type().map_or_else(|| "type unknown".to_owned(), |data_type| data_type.to_string());
         let mapped = if entry.pdo { ", can be mapped" } else { "" };
-        lines.push(format!("{data_type}, {}{mapped}", access(entry.access)));
+        lines.push(format!("{data_type}, {}{mapped}", entry.access.as_str()));
         let unit = self.unit();
         let facts = [("range", Cell::from(self.range())), ("default", self.scalar(&entry.default)), ("unit", unit)];
         let facts: Vec<String> = facts
@@ -132,7 +132,7 @@ impl<'a> ObjectFacts<'a> {
         let shown = [Cell::from(first.range()), first.scalar(&entry.default), first.unit()].map(|cell| cell.shown());
         let page = Cell::from(first.of(|described| &described.page)).shown();
         let pdo = if entry.pdo { "pdo" } else { "-" };
-        let head = [object, name, data_type, access(entry.access).to_owned(), pdo.to_owned()];
+        let head = [object, name, data_type, entry.access.as_str().to_owned(), pdo.to_owned()];
         head.into_iter().chain(shown).chain([page]).collect()
     }
 
@@ -140,15 +140,6 @@ impl<'a> ObjectFacts<'a> {
     fn is_alike(&self, other: &ObjectFacts<'_>) -> bool {
         let run = |facts: &ObjectFacts<'_>| facts.described().map(|described| described.at);
         run(self).is_some_and(|at| at.is_run && run(other) == Some(at))
-    }
-}
-
-fn access(access: Access) -> &'static str {
-    match access {
-        Access::Ro => "ro",
-        Access::Wo => "wo",
-        Access::Rw => "rw",
-        Access::Const => "const",
     }
 }
 
@@ -183,7 +174,7 @@ impl Report for ObjectFacts<'_> {
             entry.object.into(),
             entry.full_name().into(),
             self.data_type().map(|data_type| data_type.to_string()).into(),
-            access(entry.access).into(),
+            entry.access.as_str().into(),
             entry.pdo.into(),
             self.scalar(&entry.low),
             self.scalar(&entry.high),

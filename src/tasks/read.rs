@@ -28,6 +28,8 @@ pub struct Target {
     pub object: ObjectId,
     /// The status object (6150h), which is read as well.
     pub status: Option<ObjectId>,
+    /// The type of the status.
+    pub status_type: DataType,
     /// How the bytes become a sample.
     pub reading: Reading,
 }
@@ -70,10 +72,11 @@ pub fn targets(node: &Node, wanted: &[Wanted], number: &mut usize) -> Result<Vec
                     let signal = find(node, name)?;
                     let (object, data_type) = signal.value;
                     Target {
-                        source: source(node.id, name, Some(signal)),
+                        source: source(node.id, name, signal.unit),
                         unit: signal.unit,
                         object,
                         status: signal.status,
+                        status_type: status_type(node, signal.status),
                         reading: Reading::of_signal(signal, data_type, next_number()),
                     }
                 }
@@ -85,7 +88,9 @@ pub fn targets(node: &Node, wanted: &[Wanted], number: &mut usize) -> Result<Vec
                 Wanted::Object(object, Some(stated)) => {
                     typed(node, *object, &item.name(), Reading::plain(Some(*stated), next_number()))
                 }
-                Wanted::Object(object, None) => plain(node, *object, &item.name(), next_number()),
+                Wanted::Object(object, None) | Wanted::Named(_, object) => {
+                    plain(node, *object, &item.name(), next_number())
+                }
             })
         })
         .collect()
@@ -95,21 +100,25 @@ pub fn targets(node: &Node, wanted: &[Wanted], number: &mut usize) -> Result<Vec
 fn plain(node: &Node, object: ObjectId, name: &str, number: usize) -> Target {
     let layout = node.layout();
     let reading = Reading::of_object(layout, object, layout.data_type(object), number);
-    let signal = layout.signal_of(object).filter(|signal| !signal.is_value(object));
-    Target {
-        source: source(node.id, name, signal),
-        unit: signal.and_then(|signal| signal.unit),
-        ..typed(node, object, name, reading)
-    }
+    let unit = layout.unit_of(object);
+    Target { source: source(node.id, name, unit), unit, ..typed(node, object, name, reading) }
 }
 
 fn typed(node: &Node, object: ObjectId, name: &str, reading: Reading) -> Target {
-    Target { source: source(node.id, name, None), unit: None, object, status: None, reading }
+    Target { source: source(node.id, name, None), unit: None, object, status: None, status_type: U8, reading }
+}
+
+const U8: DataType = DataType::Unsigned(1);
+
+/// The type of a status object: UNSIGNED8 as 6150h, unless a description or an EDS states another one.
+fn status_type(node: &Node, status: Option<ObjectId>) -> DataType {
+    let stated = status.and_then(|object| node.layout().data_type(object));
+    stated.filter(|data_type| matches!(data_type, DataType::Unsigned(_) | DataType::Integer(_))).unwrap_or(U8)
 }
 
 pub(super) fn find<'a>(node: &'a Node, name: &str) -> Result<&'a Signal, Failure> {
     node.signals.iter().find(|signal| signal.name == name).ok_or_else(|| {
-        let available = node.signals.iter().map(|signal| signal.name.clone()).collect();
+        let available = node.names_like(name);
         Failure::at(node.id, ReadFailure::NoSignal { name: name.to_owned(), available })
     })
 }
@@ -143,7 +152,7 @@ pub fn sample(
         Some(Err(error)) => return Err(error),
         Some(Ok(answer)) => {
             let object = target.status.unwrap_or(target.object);
-            answer.value(node, object, Some(DataType::Unsigned(1)))?.0.as_u64()
+            answer.value(node, object, Some(target.status_type))?.0.as_u64()
         }
     };
     let bytes = wire_bytes(&number, data_type);

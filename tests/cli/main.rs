@@ -24,6 +24,7 @@ mod lss;
 mod nmt;
 mod output;
 mod pdo;
+mod profiles;
 mod read;
 mod readme;
 mod replay;

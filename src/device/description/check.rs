@@ -22,6 +22,12 @@ pub(super) struct Tables<'a, 't> {
 /// Highest CiA 404 channel: 6130h has sub-indices 1 to 199.
 const LAST_CHANNEL: u8 = 199;
 
+/// The number of the first signal without a channel.
+pub(super) const FIRST_WITHOUT_CHANNEL: u8 = 200;
+
+/// Stands for a channel that the file does not give, until the signals are numbered.
+pub(super) const NO_CHANNEL: u8 = u8::MAX;
+
 /// Reports every contradiction.
 pub(super) fn check(description: &Description, tables: &Tables<'_, '_>) {
     let known = Known::of(description);
@@ -103,7 +109,7 @@ fn objects(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>
     }
 }
 
-/// Every TPDO has its parameters, and its default mapping contains described objects with their width.
+/// Every mapping belongs to a TPDO with parameters, and its default contains described objects with their width.
 fn pdos(description: &Description, tables: &Tables<'_, '_>) {
     let has = |index: u16| description.objects.iter().any(|object| object.at.first.index == index);
     let numbers: BTreeSet<u16> = description.objects.iter().filter_map(|object| tpdo(object.at.first.index)).collect();
@@ -114,7 +120,7 @@ fn pdos(description: &Description, tables: &Tables<'_, '_>) {
     for (entry, table) in description.objects.iter().zip(&tables.objects) {
         let index = entry.at.first.index;
         let Some(number) = tpdo(index) else { continue };
-        let missing = [0x1800, 0x1a00].map(|start: u16| start + number).into_iter().find(|index| !has(*index));
+        let missing = Some(0x1800 + number).filter(|missing| !has(*missing));
         if let Some(missing) = missing.filter(|missing| reported.insert(*missing)) {
             table.mistake("at", format!("at: there is no [[object]] 0x{missing:04X} of the same TPDO"));
         }
@@ -184,12 +190,30 @@ fn signals(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>
             table.mistake("name", format!("name: two signals have the name \"{}\"", signal.name));
         }
         let number = signal.name.strip_prefix("ch").and_then(|number| number.parse::<u8>().ok());
-        if let Some(number) = number.filter(|number| *number != signal.channel) {
+        if let Some(number) = number.filter(|number| *number != signal.channel && table.has("channel")) {
             let message =
                 format!("name: \"{}\" is channel {number}, and this is channel {}", signal.name, signal.channel);
             table.mistake("name", message);
         }
-        if !(1..=LAST_CHANNEL).contains(&signal.channel) {
+        let has_channel = table.has("channel");
+        if signal.channel == NO_CHANNEL && !has_channel {
+            table.mistake("name", "name: more than 55 signals have no channel");
+        }
+        if signal.scale.is_some_and(|scale| scale.factor.mantissa == 0) {
+            table.mistake("factor", "factor: it is 0");
+        }
+        if signal.scale.is_some() && signal.digits.is_some() {
+            table.mistake("digits", "digits: not together with factor or offset");
+        }
+        if signal.status_bits.is_some() && signal.status.is_none() {
+            table.mistake("status_bits", "status_bits: there is no status object");
+        }
+        if let Some((stated, object)) = signal.data_type.zip(description.object(signal.value))
+            && stated != object.data_type
+        {
+            table.mistake("type", format!("type: [[object]] {} has the type {}", object.at, object.data_type));
+        }
+        if has_channel && !(1..=LAST_CHANNEL).contains(&signal.channel) {
             table.mistake("channel", format!("channel: {} is not in the range 1 to {LAST_CHANNEL}", signal.channel));
         } else if !channels.insert(signal.channel) {
             table.mistake("channel", format!("channel: two signals have the channel {}", signal.channel));

@@ -1,8 +1,10 @@
 //! Reads the TOML file of a description.
 
-use super::table::{Source, Table};
+use super::check::{FIRST_WITHOUT_CHANNEL, NO_CHANNEL};
+use super::table::{Source, Table, UnitEntry};
 use super::*;
 use crate::device::assign::AssignObject;
+use crate::device::scale::{Bad, Decimal};
 use toml::de::DeTable;
 
 /// Reads a description.
@@ -44,10 +46,11 @@ fn description<'t>(file: &mut Table<'t>) -> Option<Description> {
     let mut startup = file.table("startup");
     let (assign, assign_tables) = entries(file, "assign", assign_entry);
     let (autozero, autozero_tables) = entries(file, "autozero", autozero_entry);
-    let (signals, signal_tables) = entries(file, "signal", signal);
+    let (mut signals, signal_tables) = entries(file, "signal", signal);
     let (objects, object_tables) = entries(file, "object", object);
     let (emergencies, emergency_tables) = entries(file, "emcy", emergency);
     file.finish();
+    number_signals(&mut signals);
     let description = Description {
         identify: identify.as_mut().map(identify_entry).unwrap_or_default(),
         bit_rates: bit_rates.as_mut().map(|rates| rates.entries("bit_rates")).unwrap_or_default(),
@@ -181,15 +184,54 @@ fn autozero_entry(table: &mut Table<'_>) -> Option<Autozero> {
 }
 
 fn signal(table: &mut Table<'_>) -> Option<SignalEntry> {
-    let (name, channel, value) = (table.required("name"), table.required("channel"), table.required("value"));
-    let also = table.list("also");
-    let (unit, digits, status) = (table.optional("unit"), table.optional("digits"), table.optional("status"));
-    let marker = table.or_default("marker");
+    let (name, channel, value) = (table.required("name"), table.optional("channel"), table.required("value"));
+    let (data_type, also) = (table.optional("type"), table.list("also"));
+    let (unit, digits): (Option<UnitEntry>, _) = (table.optional("unit"), table.optional("digits"));
+    let (factor, offset) = (table.optional("factor"), table.optional("offset"));
+    let (status, status_bits) = (table.optional("status"), table.table("status_bits"));
+    let (marker, markers) = (table.or_default("marker"), table.table("markers"));
     let may_clip = table.or_default("may_clip");
     let (span_start, span_end) = (table.optional("span_start"), table.optional("span_end"));
+    let status_bits = status_bits.map(|mut bits| {
+        let found =
+            Bad { invalid: bits.or_default("invalid"), high: bits.or_default("high"), low: bits.or_default("low") };
+        bits.finish();
+        found
+    });
+    let markers = markers.map(|mut numbers| {
+        let found = Bad { invalid: numbers.list("invalid"), high: numbers.list("high"), low: numbers.list("low") };
+        numbers.finish();
+        found
+    });
     table.finish();
-    let (name, channel, value) = (name?, channel?, value?);
-    Some(SignalEntry { name, channel, value, also, unit, digits, status, marker, may_clip, span_start, span_end })
+    let scale = Scale { factor: factor.unwrap_or(Decimal::ONE), offset: offset.unwrap_or(Decimal::ZERO) };
+    Some(SignalEntry {
+        name: name?,
+        channel: channel.unwrap_or(NO_CHANNEL),
+        value: value?,
+        data_type,
+        also,
+        unit: unit.and_then(UnitEntry::object),
+        fixed_unit: unit.and_then(UnitEntry::fixed),
+        scale: (factor.is_some() || offset.is_some()).then_some(scale),
+        digits,
+        status,
+        status_bits,
+        marker,
+        markers: markers.unwrap_or_default(),
+        may_clip,
+        span_start,
+        span_end,
+    })
+}
+
+/// Numbers the signals without a channel.
+fn number_signals(signals: &mut [SignalEntry]) {
+    for (signal, number) in
+        signals.iter_mut().filter(|signal| signal.channel == NO_CHANNEL).zip(FIRST_WITHOUT_CHANNEL..)
+    {
+        signal.channel = number;
+    }
 }
 
 fn object(table: &mut Table<'_>) -> Option<ObjectEntry> {

@@ -16,8 +16,11 @@ pub use object::{Access, ObjectEntry, ObjectRun, Signature, StoreGroup};
 use super::assign::AssignEntry;
 use super::quirk::Quirk;
 use super::scalar::Scalar;
+use super::scale::{Markers, Scale, StatusBits};
+use super::unit::Unit;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
 use std::collections::BTreeMap;
 
 /// A mistake in a description.
@@ -237,20 +240,30 @@ pub enum Remap {
 pub struct SignalEntry {
     /// `pressure`, `temperature`, `ch1` …
     pub name: String,
-    /// CiA 404 channel (the sub-index), 1 to 199.
+    /// CiA 404 channel (the sub-index), 1 to 199. Signals without one have the numbers from 200.
     pub channel: u8,
     /// The object that is read by SDO if no PDO contains the signal.
     pub value: ObjectId,
+    /// The type of the value, if no [[object]] states it.
+    pub data_type: Option<DataType>,
     /// The same quantity at other indices than x130h: D-20-9's 2090h.
     pub also: Vec<ObjectId>,
     /// The object with the physical unit (6131h).
     pub unit: Option<ObjectId>,
+    /// The unit, if it is fixed.
+    pub fixed_unit: Option<Unit>,
+    /// Factor and offset, if the description states them.
+    pub scale: Option<Scale>,
     /// The object with the decimal digits of integer values (6132h).
     pub digits: Option<ObjectId>,
     /// The object with the status (6150h), if the device has one.
     pub status: Option<ObjectId>,
+    /// The bits of the status object, if they are not those of 6150h.
+    pub status_bits: Option<StatusBits>,
     /// Whether an overload replaces the value itself (REAL32 NaN, smallest integer).
     pub marker: bool,
+    /// Other numbers that take the place of the value.
+    pub markers: Markers,
     /// Whether the manual warns that narrow integers may be clipped: their largest number is then no value.
     pub may_clip: bool,
     /// The object with the start of the measuring range (6148h), if the device has it.

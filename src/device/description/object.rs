@@ -130,6 +130,16 @@ pub enum Access {
 }
 
 impl Access {
+    /// The word of the description.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Access::Ro => "ro",
+            Access::Wo => "wo",
+            Access::Rw => "rw",
+            Access::Const => "const",
+        }
+    }
+
     /// Whether an SDO upload is allowed.
     pub fn is_readable(self) -> bool {
         self != Access::Wo

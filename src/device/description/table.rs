@@ -6,6 +6,8 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::device::nearest::distance;
 use crate::device::scalar::{NumberRange, Scalar};
+use crate::device::scale::Decimal;
+use crate::device::unit::Unit;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -64,6 +66,11 @@ impl<'t> Table<'t> {
     /// `offset`: the place of the table in the text.
     pub(super) fn new(table: &'t DeTable<'t>, offset: usize, source: &'t Source<'t>) -> Table<'t> {
         Table { table, offset, source, known: Vec::new(), missing: Vec::new() }
+    }
+
+    /// Whether the table has a key.
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.table.get(key).is_some()
     }
 
     fn value(&mut self, key: &'static str) -> Option<&'t Spanned<DeValue<'t>>> {
@@ -273,6 +280,49 @@ impl FromToml for ObjectId {
 impl FromToml for DataType {
     fn from_toml(value: &DeValue<'_>) -> Result<DataType, String> {
         parsed(value)
+    }
+}
+
+impl FromToml for i64 {
+    fn from_toml(value: &DeValue<'_>) -> Result<i64, String> {
+        integer(value)
+    }
+}
+
+impl FromToml for Decimal {
+    fn from_toml(value: &DeValue<'_>) -> Result<Decimal, String> {
+        match value {
+            DeValue::Float(number) => number.as_str().parse(),
+            DeValue::Integer(_) => integer(value).map(|number| Decimal::new(number, 0)),
+            other => Err(format!("{} instead of a number", kind(other))),
+        }
+    }
+}
+
+/// The unit of a signal: the object that contains its code, or a fixed unit.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum UnitEntry {
+    At(ObjectId),
+    Fixed(Unit),
+}
+
+impl UnitEntry {
+    pub(super) fn object(self) -> Option<ObjectId> {
+        if let UnitEntry::At(object) = self { Some(object) } else { None }
+    }
+
+    pub(super) fn fixed(self) -> Option<Unit> {
+        if let UnitEntry::Fixed(unit) = self { Some(unit) } else { None }
+    }
+}
+
+impl FromToml for UnitEntry {
+    fn from_toml(value: &DeValue<'_>) -> Result<UnitEntry, String> {
+        let text = text(value)?;
+        let fixed = Unit::from_symbol(text).map(UnitEntry::Fixed);
+        let object = || text.parse().ok().filter(|_| text.starts_with(|first: char| first.is_ascii_digit()));
+        let unknown = || format!("\"{text}\" is neither a known unit (bar, degC, l/h, %) nor an object (0x6131:1)");
+        fixed.or_else(|| object().map(UnitEntry::At)).ok_or_else(unknown)
     }
 }
 

@@ -27,7 +27,7 @@ fn unknown_keys_are_listed_with_their_line() {
         "[sdo]\nsize = \"omitted\"\nsizes = 1\n[[signal]]\nname = \"p\"\nchannel = 1\nvalue = \"0x6130:1\"\nx = 1",
     );
     assert_eq!(below[0], "x.toml:6: unknown key \"sizes\" (known: size, expedited_only, block, aborts)");
-    assert!(below[1].starts_with("x.toml:11: unknown key \"x\" (known: name, channel, value, also, "), "{below:?}");
+    assert!(below[1].starts_with("x.toml:11: unknown key \"x\" (known: name, channel, value, type, "), "{below:?}");
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn every_mistake_is_reported() {
 
 #[test]
 fn a_missing_key_has_the_line_of_its_table() {
-    assert_eq!(mistakes("[[signal]]\nname = \"p\"\nvalue = \"0x6130:1\""), ["x.toml:4: missing key \"channel\""]);
+    assert_eq!(mistakes("[[signal]]\nname = \"p\"\nchannel = 1"), ["x.toml:4: missing key \"value\""]);
     let misspelt = mistakes("[[signal]]\nname = \"p\"\nchanel = 1\nvalue = \"0x6130:1\"");
     assert!(
         matches!(misspelt.as_slice(), [only] if only.starts_with("x.toml:6: unknown key \"chanel\"")),
@@ -145,4 +145,26 @@ fn notes_name_what_may_be_a_mistake() {
     };
     assert_eq!(notes(signal), [1, 5], "no [identify], no TPDO");
     assert_eq!(notes(&format!("[identify]\nvendor_id = 1\n{signal}")), [7]);
+}
+
+#[test]
+fn signals_outside_of_cia_404_have_unit_scale_and_status_of_their_own() {
+    let text = "[[signal]]\nname = \"flow\"\nvalue = \"0x2000:1\"\ntype = \"i16\"\nunit = \"l/h\"\nfactor = 0.01\noffset = -5\n\
+                status = \"0x2001\"\nstatus_bits = { invalid = 0x80, high = 1 }\nmarkers = { invalid = [-32768] }\n\
+                [[signal]]\nname = \"load\"\nvalue = \"0x2000:2\"\nunit = \"%\"\n";
+    let description = read(&format!("{HEAD}{text}")).expect("a description");
+    let [flow, load] = &description.signals[..] else { panic!("two signals") };
+    assert_eq!((flow.channel, load.channel), (200, 201), "no channel of CiA 404");
+    let scale = flow.scale.expect("a scale");
+    assert_eq!((scale.factor.as_f64(), scale.offset.as_f64()), (0.01, -5.0));
+    assert_eq!(flow.fixed_unit.map(|unit| unit.to_string()).as_deref(), Some("l/h"));
+    assert_eq!(load.fixed_unit.map(|unit| unit.to_string()).as_deref(), Some("%"));
+    let bits = flow.status_bits.as_ref().expect("bits");
+    assert_eq!((bits.invalid, bits.high, bits.low, flow.markers.invalid.as_slice()), (0x80, 1, 0, &[-32768][..]));
+    let wrong = |line: &str| mistakes(&format!("[[signal]]\nname = \"p\"\nvalue = \"0x2000\"\n{line}"));
+    assert_eq!(wrong("factor = 0"), ["x.toml:7: factor: it is 0"]);
+    assert_eq!(wrong("factor = 2\ndigits = \"0x2001\""), ["x.toml:8: digits: not together with factor or offset"]);
+    assert_eq!(wrong("unit = \"furlong\"").len(), 1);
+    assert_eq!(wrong("status_bits = { high = 1 }"), ["x.toml:7: status_bits: there is no status object"]);
+    assert!(wrong("markers = { odd = [1] }")[0].starts_with("x.toml:7: unknown key \"odd\""));
 }

@@ -38,6 +38,7 @@ fn node((object, data_type): (ObjectId, DataType), words: &[u32], signal: impl F
         marker: false,
         unit: Some(Unit(0x004e_0000)),
         digits: Some(3),
+        rules: crate::measure::layout::Rules::default(),
         range: MeasuringRange::Unknown,
     };
     signal(&mut pressure);
@@ -98,8 +99,8 @@ fn each_channel_has_its_own_status() {
     let second = node((ObjectId::new(0x6130, 2), DataType::Real32), &words, |signal| {
         signal.status = Some(ObjectId::new(0x6150, 2));
     });
-    assert_eq!(rows(&second, &[], "181#030000803F00"), [row("0x6150:1", "3", ""), row("pressure", "1", "ok")]);
-    assert_eq!(rows(&second, &[], "181#000000803F01"), [row("0x6150:1", "0", ""), row("pressure", "", "invalid")]);
+    assert_eq!(rows(&second, &[], "181#030000803F00"), [row("ai-status:1", "3", ""), row("pressure", "1", "ok")]);
+    assert_eq!(rows(&second, &[], "181#000000803F01"), [row("ai-status:1", "0", ""), row("pressure", "", "invalid")]);
 }
 
 /// Decodes the frames; after the first `before` ones the mapping is read again. Returns the values of the later ones.

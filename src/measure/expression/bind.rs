@@ -6,14 +6,19 @@ use super::tree::{Condition, Function, Quantity, SignalName};
 use super::{Expression, ExpressionError, LocatedError};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
+use crate::device::dictionary::{Dictionary, spellings};
 use crate::device::nearest::distance;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
 use crate::measure::layout::Layout;
 use crate::measure::sample::Source;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How many signals an error lists.
 const MAX_LISTED: usize = 8;
+
+/// How many objects with similar names an error lists.
+const MAX_OBJECTS: usize = 3;
 
 /// A signal that a node has.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +38,9 @@ pub struct AvailableSignals {
     /// Nodes whose objects can all be read by address.
     readable: Vec<NodeId>,
     /// Objects that an expression names, of nodes that have no signal of this name.
-    objects: Vec<(NodeId, String, ObjectId)>,
+    named: Vec<(NodeId, String, ObjectId)>,
+    /// The names of objects, in lower case, with the name as in [`Source`].
+    objects: BTreeMap<(NodeId, String), AvailableSignal>,
 }
 
 impl AvailableSignals {
@@ -42,6 +49,7 @@ impl AvailableSignals {
         let mut available = AvailableSignals::default();
         for layout in layouts {
             available.readable.push(layout.node);
+            available.add_objects(layout);
             for signal in layout.signals {
                 let node = layout.node;
                 let entry = |name: String, unit| AvailableSignal { node, name, unit };
@@ -56,14 +64,26 @@ impl AvailableSignals {
 
     /// Adds an object that has a name.
     pub fn name_object(&mut self, node: NodeId, name: &str, object: ObjectId) {
-        self.objects.push((node, name.to_owned(), object));
+        self.named.push((node, name.to_owned(), object));
     }
 
     /// What to measure for a name: a signal, or the object with this name.
     fn what(&self, node: NodeId, signal: &SignalName) -> Wanted {
         let Wanted::Signal(name) = &signal.what else { return signal.what.clone() };
-        let object = self.objects.iter().find(|(id, named, _)| *id == node && named == name);
+        let object = self.named.iter().find(|(id, named, _)| *id == node && named == name);
         object.map_or_else(|| signal.what.clone(), |(.., object)| Wanted::Object(*object, None))
+    }
+
+    /// Adds every named object of the description or EDS, and the names in the spelling of the EDS.
+    fn add_objects(&mut self, layout: Layout<'_>) {
+        let dictionary = layout.model.map(|model| &model.dictionary);
+        for (name, object) in dictionary.into_iter().flat_map(Dictionary::names) {
+            let resolved = layout.resolve(&Wanted::Signal(name.to_owned())).name();
+            let signal = layout.signals.iter().find(|signal| signal.name == resolved);
+            let unit = signal.map_or_else(|| layout.unit_of(object), |signal| signal.unit);
+            let signal = AvailableSignal { node: layout.node, name: resolved, unit };
+            self.objects.insert((layout.node, name), signal);
+        }
     }
 
     /// The signals of a recording.
@@ -85,12 +105,18 @@ impl AvailableSignals {
         nodes
     }
 
-    /// The unit of a signal. The outer `None` means that the node has no such signal.
-    fn find(&self, node: NodeId, signal: &SignalName) -> Option<Option<Unit>> {
+    /// A signal of a node with its name as in [`Source`]; `None` if the node has no such signal.
+    fn find(&self, node: NodeId, signal: &SignalName) -> Option<AvailableSignal> {
         let name = signal.name();
-        let known = self.signals.iter().find(|known| known.node == node && known.name == name);
-        let is_readable = || matches!(self.what(node, signal), Wanted::Object(..)) && self.readable.contains(&node);
-        known.map(|known| known.unit).or_else(|| is_readable().then_some(None))
+        let known = self.signals.iter().find(|known| known.node == node && known.name == name).cloned();
+        let what = self.what(node, signal);
+        let is_readable = matches!(what, Wanted::Object(..)) && self.readable.contains(&node);
+        let object = || {
+            let names = [name.to_lowercase()].into_iter().chain(spellings(&name));
+            names.into_iter().find_map(|name| self.objects.get(&(node, name)).cloned())
+        };
+        let address = || is_readable.then(|| AvailableSignal { node, name: what.name(), unit: None });
+        known.or_else(object).or_else(address)
     }
 
     /// Whether all signals of an expression exist. Those without a node are searched at `node`.
@@ -103,7 +129,12 @@ impl AvailableSignals {
         let mut names: Vec<&str> =
             self.signals.iter().filter(|signal| signal.node == node).map(|signal| signal.name.as_str()).collect();
         names.sort_by_key(|known| distance(name, known));
-        names
+        let objects = self.objects.iter().filter(|((of, _), _)| *of == node).map(|(_, known)| known.name.as_str());
+        let mut near: Vec<&str> = objects.filter(|known| distance(name, known) <= name.len() / 2).collect();
+        near.sort_by_key(|known| distance(name, known));
+        near.truncate(MAX_OBJECTS);
+        let mut seen = BTreeSet::new();
+        near.into_iter().chain(names).filter(|name| seen.insert(*name)).collect()
     }
 }
 
@@ -316,11 +347,12 @@ impl Binder<'_> {
     fn input(&mut self, signal: &SignalName) -> Result<usize, LocatedError> {
         let no_node = || LocatedError::new(signal.at, format!("no node given for {signal} (example: 5.{signal})"));
         let node = signal.node.or(self.node).ok_or_else(no_node)?;
-        let Some(unit) = self.available.find(node, signal) else {
+        let Some(AvailableSignal { name, unit, .. }) = self.available.find(node, signal) else {
             return Err(self.unknown_signal(node, signal));
         };
-        let what = self.available.what(node, signal);
-        let input = Input { node, name: what.name(), what, unit };
+        // An object that only the caller knows by name is measured by its address.
+        let what = Some(self.available.what(node, signal)).filter(|what| what.name() == name);
+        let input = Input { node, name, what: what.unwrap_or_else(|| signal.what.clone()), unit };
         if let Some(known) = self.bound.inputs.iter().position(|known| *known == input) {
             return Ok(known);
         }

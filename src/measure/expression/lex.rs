@@ -51,8 +51,21 @@ fn token(text: &str, at: Position) -> Result<(Token, usize), LocatedError> {
     if first.is_ascii_digit() {
         return number_or_signal(text, at);
     }
+    if matches!(first, '"' | '\'') {
+        let inner = text[1..].split(first).next().unwrap_or_default();
+        let length = inner.len() + 2;
+        if inner.trim().is_empty() || length > text.len() {
+            return Err(LocatedError::new(at, "the quotes contain no name, or are not closed"));
+        }
+        let what = Wanted::Signal(inner.trim().to_owned());
+        return Ok((Token::Signal(SignalName { node: None, what, at }), length));
+    }
     if is_letter(first) {
         let word = name(text);
+        if let Some(length) = numbered(text, word) {
+            let what = Wanted::Signal(text[..length].to_owned());
+            return Ok((Token::Signal(SignalName { node: None, what, at }), length));
+        }
         let status = text[word.len()..].starts_with(".status") && name(&text[word.len() + 1..]) == "status";
         return Ok(if status {
             let what = Wanted::Status(word.to_owned());
@@ -96,6 +109,13 @@ fn name(text: &str) -> &str {
         end = at + letter.len_utf8();
     }
     &text[..end]
+}
+
+/// The length of a name with a sub-index: `ai-input-pv:1`.
+fn numbered(text: &str, word: &str) -> Option<usize> {
+    let digits = text[word.len()..].strip_prefix(':')?;
+    let length = digits.bytes().take_while(u8::is_ascii_digit).count();
+    (length > 0).then_some(word.len() + 1 + length)
 }
 
 /// Reads a token that starts with a digit: a number, an object, or a node with a signal.
@@ -155,7 +175,7 @@ fn is_signal(text: &str) -> bool {
     match word.chars().next() {
         Some(first) if first.is_ascii_digit() => text[word.len()..].starts_with(':'),
         Some(first) => first.is_ascii_alphabetic() && !is_exponent(word),
-        None => false,
+        None => text.starts_with(['"', '\'']),
     }
 }
 

@@ -40,8 +40,22 @@ impl Display for SignalName {
         if let Some(node) = self.node {
             write!(f, "{node}.")?;
         }
-        f.write_str(&self.name())
+        match self.name() {
+            name if matches!(self.what, Wanted::Signal(_)) && !is_bare(&name) => write!(f, "\"{name}\""),
+            name => f.write_str(&name),
+        }
     }
+}
+
+/// Whether a name needs no quotes in an expression: letters, digits and `_`, with hyphens before letters, and an
+/// optional sub-index.
+fn is_bare(name: &str) -> bool {
+    let (word, sub) = name.split_once(':').unwrap_or((name, "0"));
+    let is_word = |part: &str| part.starts_with(|first: char| first.is_ascii_alphabetic());
+    let is_plain = |part: &str| part.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+    !sub.is_empty()
+        && sub.bytes().all(|byte| byte.is_ascii_digit())
+        && word.split('-').all(|part| is_word(part) && is_plain(part))
 }
 
 /// A function of all samples.

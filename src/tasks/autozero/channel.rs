@@ -77,9 +77,9 @@ pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
 /// 6125h:n, if the device has it.
 fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -> Result<Channel, Failure> {
     let node = device.id;
-    let signal = match (number, device.signals.as_slice()) {
+    let signal = match (number, device.channels().as_slice()) {
         (Some(number), _) => signal(device, number)?,
-        (None, [only]) => only,
+        (None, [only]) => *only,
         (None, []) => return Err(Failure::at(node, ReadFailure::NoMeasuredValue)),
         (None, _) => {
             return Err(Failure::at(node, AutozeroFailure::WhichChannel { available: Vec::new() }));

@@ -33,7 +33,7 @@ pub(super) fn check_wanted(nodes: &[Node], options: &LogOptions) -> Result<(), F
                 Wanted::Status(name) if !has(name, true) => {
                     return Err(Failure::general(LogFailure::NoStatus { signal: name.clone() }));
                 }
-                Wanted::Signal(name) => name.clone(),
+                Wanted::Signal(name) | Wanted::Named(name, _) => name.clone(),
                 Wanted::Status(name) => format!("{name}.status"),
                 Wanted::Object(..) => item.name(),
             };
@@ -57,7 +57,7 @@ fn carries(node: &Node, tpdo: &Tpdo, item: &Wanted) -> bool {
         Wanted::Signal(name) => {
             entries.any(|object| node.signals.iter().any(|signal| signal.name == *name && signal.is_value(object)))
         }
-        Wanted::Object(object, _) => entries.any(|mapped| mapped == *object),
+        Wanted::Object(object, _) | Wanted::Named(_, object) => entries.any(|mapped| mapped == *object),
         Wanted::Status(name) => {
             signals.any(|signal| signal.name == *name && entries.any(|object| Some(object) == signal.status))
         }
@@ -66,9 +66,9 @@ fn carries(node: &Node, tpdo: &Tpdo, item: &Wanted) -> bool {
 
 fn unknown_signal(name: &str, nodes: &[Node]) -> LogFailure {
     let mut known: Vec<String> = Vec::new();
-    for signal in nodes.iter().flat_map(|node| &node.signals) {
-        if !known.contains(&signal.name) {
-            known.push(signal.name.clone());
+    for like in nodes.iter().flat_map(|node| node.names_like(name)) {
+        if !known.contains(&like) {
+            known.push(like);
         }
     }
     LogFailure::UnknownSignal { name: name.to_owned(), known }

@@ -13,6 +13,7 @@ use crate::measure::decode::{Decoder, Wanted};
 use crate::measure::layout::{MeasuringRange, PROCESS_VALUES, Signal, Tpdo};
 use crate::measure::sample::Number;
 use crate::node::overheard::{Overheard, first_four};
+use crate::node::signals;
 use crate::node::{Node, Overrides};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -96,9 +97,11 @@ impl SetupListener {
             tpdo.mapping.iter().all(|entry| {
                 let signal = node.signals.iter().find(|signal| signal.is_value(entry.object));
                 signal.is_none_or(|signal| {
-                    let digits = ObjectId::new(0x6132, signal.channel);
+                    let [_, digits] = signals::unit_and_digits(node, signal);
+                    let step = signals::step(node, signal).map(|step| step.object);
                     let is_integer = matches!(node.mapped_type(entry.object, entry.bits), Some(DataType::Integer(_)));
-                    !is_integer || signal.digits.is_some() || self.overheard.is_refused(id, digits)
+                    let mut needed = digits.into_iter().filter(|_| signal.digits.is_none()).chain(step);
+                    !is_integer || needed.all(|object| self.overheard.is_refused(id, object))
                 })
             })
         };
@@ -146,51 +149,43 @@ impl SetupListener {
     }
 
     fn signals(&self, node: &Node) -> Vec<Signal> {
-        let id = node.id;
-        let unit_and_digits = |channel| {
-            let unit = self.number(id, ObjectId::new(0x6131, channel)).map(Unit);
-            (unit, self.byte(id, ObjectId::new(0x6132, channel)))
-        };
         let described = node.model.as_ref().map_or(&[][..], |model| &model.description.signals);
-        if !described.is_empty() {
-            let signal = |entry: &crate::device::description::SignalEntry| {
-                let (unit, digits) = unit_and_digits(entry.channel);
-                let unit = unit.or_else(|| node.fixed_unit(entry.value));
-                Signal {
-                    name: entry.name.clone(),
-                    channel: entry.channel,
-                    value: (entry.value, node.layout().data_type(entry.value)),
-                    also: entry.also.clone(),
-                    status: entry.status,
-                    marker: entry.marker,
-                    unit,
-                    digits,
-                    range: self.range(node, entry.channel, digits),
-                }
-            };
-            return described.iter().map(signal).collect();
+        let mut found: Vec<Signal> = described.iter().map(|entry| signals::described(node, entry)).collect();
+        if found.is_empty() && signals::can_have_channels(node) {
+            let entries = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
+            let values = entries.filter(|entry| PROCESS_VALUES.iter().any(|&(index, _)| index == entry.object.index));
+            found = values.map(|entry| signals::channel(node, entry.object)).collect();
+            found.dedup_by_key(|signal| signal.channel);
         }
-        let entries = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
-        let values = entries.filter(|entry| PROCESS_VALUES.iter().any(|&(index, _)| index == entry.object.index));
-        let mut signals: Vec<Signal> = values
-            .map(|entry| {
-                let channel = entry.object.sub;
-                let (unit, digits) = unit_and_digits(channel);
-                Signal {
-                    name: format!("ch{channel}"),
-                    channel,
-                    value: (entry.object, node.mapped_type(entry.object, entry.bits)),
-                    also: Vec::new(),
-                    status: Some(ObjectId::new(0x6150, channel)),
-                    marker: false,
-                    unit,
-                    digits,
-                    range: self.range(node, channel, digits),
-                }
-            })
-            .collect();
-        signals.dedup_by_key(|signal| signal.channel);
-        signals
+        if found.is_empty() {
+            found = signals::objects(node, []);
+        }
+        found.into_iter().map(|signal| self.with_unit(node, signal)).collect()
+    }
+
+    /// The signal with its unit, its digits and its range, as far as they are known.
+    fn with_unit(&self, node: &Node, mut signal: Signal) -> Signal {
+        let [unit, digits] = signals::unit_and_digits(node, &signal);
+        let unit = unit.and_then(|object| self.number(node.id, object)).map(Unit);
+        signal.unit = unit.or(signal.unit).or_else(|| node.fixed_unit(signal.value.0));
+        signal.digits = digits.and_then(|object| self.byte(node.id, object));
+        if let Some(step) = signals::step(node, &signal) {
+            let data_type = node.layout().data_type(step.object);
+            let mask =
+                data_type.and_then(DataType::width).map_or(u32::MAX, |width| u32::MAX >> (32 - 8 * width.clamp(1, 4)));
+            signals::set_step(
+                &mut signal,
+                step,
+                self.number(node.id, step.object).map(|number| u64::from(number & mask)),
+            );
+        }
+        if signal.has_channel() {
+            signal.range = match self.range(node, signal.channel, signal.digits) {
+                MeasuringRange::Unknown => signal.range,
+                known => known,
+            };
+        }
+        signal
     }
 }
 

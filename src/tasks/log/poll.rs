@@ -71,7 +71,7 @@ impl Poll {
         // Of several nodes each is polled for the signals it has. At least one has them: that was checked before.
         let has = |item: &Wanted| match item {
             Wanted::Signal(name) | Wanted::Status(name) => node.signals.iter().any(|signal| signal.name == *name),
-            Wanted::Object(..) => true,
+            Wanted::Object(..) | Wanted::Named(..) => true,
         };
         let own: Vec<Wanted> = wanted.iter().map(|item| node.wanted(item)).filter(has).collect();
         if own.is_empty() && !wanted.is_empty() {

@@ -7,9 +7,11 @@
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
 use crate::master::{Answer, Error, Master, SdoError, Ticket};
 use crate::node::Node;
 use crate::node::Overrides;
+use crate::node::signals;
 use crate::node::survey::BackgroundSurvey;
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -177,15 +179,18 @@ impl Pending {
 
 /// The node whose setup this frame of another master changes: PDO parameters and mapping, unit, digits, and the COB-IDs
 /// and times of SYNC, emergency and heartbeat.
-pub(super) fn writes_setup(frame: &Frame) -> Option<NodeId> {
+pub(super) fn writes_setup(frame: &Frame, nodes: &[Node]) -> Option<NodeId> {
     let node = frame.id().sdo_request_node()?;
-    let [command, low, high, ..] = frame.data() else { return None };
+    let [command, low, high, sub, ..] = frame.data() else { return None };
     // The start of a download: expedited or segmented (1), or block (6).
     if !matches!(command >> 5, 1 | 6) {
         return None;
     }
     let index = u16::from_le_bytes([*low, *high]);
-    matches!(index, 0x1005 | 0x1014 | 0x1017 | 0x1800..=0x1bff | 0x6131 | 0x6132).then_some(node)
+    let object = ObjectId::new(index, *sub);
+    let scales = |known: &Node| known.id == node && signals::scaling_objects(known).contains(&object);
+    let is_setup = matches!(index, 0x1005 | 0x1014 | 0x1017 | 0x1800..=0x1bff | 0x6131 | 0x6132);
+    (is_setup || nodes.iter().any(scales)).then_some(node)
 }
 
 #[cfg(test)]
@@ -194,7 +199,7 @@ mod tests {
 
     #[test]
     fn writes_that_change_the_setup() {
-        let node = |text: &str| writes_setup(&text.parse().expect("a frame")).map(NodeId::get);
+        let node = |text: &str| writes_setup(&text.parse().expect("a frame"), &[]).map(NodeId::get);
         for text in ["605#2F001A0000000000", "605#2300180181010080", "605#2331610100004E00", "605#2131610104000000"] {
             assert_eq!(node(text), Some(5), "{text}");
         }

@@ -162,8 +162,8 @@ fn named(node: &Node, name: &str) -> Result<ObjectId, Failure> {
         let no_status = || Failure::at(node.id, ReadFailure::NoStatus { signal: signal.name.clone() });
         return signal.status.ok_or_else(no_status);
     }
-    match node.entry_by_name(name) {
-        Some(entry) => Ok(entry.object),
+    match node.layout().object(name) {
+        Some(object) => Ok(object),
         None => Err(Failure::at(node.id, unknown_name(node, name))),
     }
 }
@@ -230,6 +230,7 @@ fn width(node: &Node, object: ObjectId) -> Option<u8> {
         (!model.untyped.contains(&object)).then_some(entry.data_type)
     });
     let family = PROCESS_VALUES.iter().find(|&&(index, _)| index == object.index).map(|&(_, data_type)| data_type);
+    let family = family.or_else(|| node.layout().data_type(object));
     let standard = || standard::entry(object).map(|entry| entry.data_type);
     // Indices below 20h are the types themselves: they are mapped as dummies.
     let dummy = || DataType::from_code(object.index).filter(|_| object.sub == 0 && object.index < 0x20);

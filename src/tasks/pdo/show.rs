@@ -17,7 +17,7 @@ use std::time::Duration;
 pub struct MappedItem {
     /// The entry.
     pub entry: MappingEntry,
-    /// `pressure`, `pressure.status`; `None` if the object is not a signal.
+    /// `pressure`, `pressure.status`, else the name of the object; `None` if it has none.
     pub signal: Option<String>,
     /// The unit of a process value, if the device reports it.
     pub unit: Option<Unit>,
@@ -51,8 +51,12 @@ fn mapped_item(node: &Node, entry: MappingEntry) -> MappedItem {
     if let Some(signal) = node.signals.iter().find(|signal| signal.is_value(entry.object)) {
         return MappedItem { entry, signal: Some(signal.name.clone()), unit: signal.unit };
     }
-    let signal = node.signals.iter().find(|signal| signal.status == Some(entry.object));
-    MappedItem { entry, signal: signal.map(|signal| format!("{}.status", signal.name)), unit: None }
+    if let Some(signal) = node.signals.iter().find(|signal| signal.status == Some(entry.object)) {
+        return MappedItem { entry, signal: Some(format!("{}.status", signal.name)), unit: None };
+    }
+    let layout = node.layout();
+    let name = Some(layout.name_of(entry.object)).filter(|name| *name != entry.object.to_string());
+    MappedItem { entry, signal: name, unit: layout.unit_of(entry.object) }
 }
 
 /// Whether the TPDO may have an inhibit time (180xh:3): a description that lists objects lists all of them.

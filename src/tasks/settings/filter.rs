@@ -141,7 +141,7 @@ fn has_filter(node: &Node, signal: &Signal) -> bool {
 pub fn show(master: &mut Master<'_>, node: &Node, signal: Option<&str>) -> Result<Vec<FilterOf>, Failure> {
     let signals: Vec<&Signal> = match signal {
         Some(name) => vec![find_signal(node, Some(name))?],
-        None => node.signals.iter().collect(),
+        None => node.channels(),
     };
     let mut filters = Vec::new();
     for signal in signals.into_iter().filter(|signal| has_filter(node, signal)) {
@@ -172,7 +172,7 @@ pub fn set(
     signal: Option<&str>,
     wanted: FilterRequest,
 ) -> Result<FilterChange, Failure> {
-    let mut with_filter = node.signals.iter().filter(|signal| has_filter(node, signal));
+    let mut with_filter = node.channels().into_iter().filter(|signal| has_filter(node, signal));
     let signal = match (signal, with_filter.next(), with_filter.next()) {
         (None, Some(only), None) => only,
         (name, ..) => find_signal(node, name)?,

@@ -6,6 +6,7 @@ use super::{Quantity, SettingsFailure, page, read_each};
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
+use crate::device::profiles;
 use crate::device::unit::Unit;
 use crate::master::Master;
 use crate::measure::layout::Signal;
@@ -202,7 +203,7 @@ pub fn read(master: &mut Master<'_>, node: &Node) -> Result<Info, Failure> {
     let text = |object: ObjectId| values.get(&object).map(Value::to_string);
     let setting = |signal: Option<&Signal>, object: ObjectId| {
         let value = values.get(&object)?.clone();
-        let name = node.entry(object).map_or_else(|| object.to_string(), |entry| entry.name);
+        let name = node.entry(object).map_or_else(|| node.layout().name_of(object), |entry| entry.name);
         let meaning = page::meaning(node, &values, signal, object, &value);
         Some(Setting { object, name, value, meaning })
     };
@@ -243,6 +244,9 @@ fn communication(node: &Node) -> Vec<ObjectId> {
 
 /// The objects of a channel in the order in which they are shown.
 fn of_channel(node: &Node, signal: &Signal) -> Vec<ObjectId> {
+    if !signal.has_channel() {
+        return Vec::new();
+    }
     let at = |index: u16| ObjectId::new(index, signal.channel);
     let described = node.model.as_ref().is_some_and(|model| !model.dictionary.is_empty());
     let own = signal.value.0.index & 0xf000;
@@ -265,7 +269,8 @@ fn of_channel(node: &Node, signal: &Signal) -> Vec<ObjectId> {
     objects
 }
 
-/// The manufacturer-specific objects that belong to no channel.
+/// The manufacturer-specific objects that belong to no channel. On a device without described signals also the objects
+/// of its profile, from the EDS or the profile.
 fn own(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId> {
     let taken: BTreeSet<ObjectId> = channels.iter().flatten().copied().collect();
     let values = node.signals.iter().flat_map(|signal| signal.also.iter().copied());
@@ -273,15 +278,32 @@ fn own(node: &Node, channels: &[Vec<ObjectId>]) -> Vec<ObjectId> {
     let dates = [page::CALIBRATED, page::PRODUCED].into_iter().filter_map(|parts| page::date_objects(node, parts));
     let taken: BTreeSet<ObjectId> = taken.into_iter().chain(values).chain(startup).chain(dates.flatten()).collect();
     let entries = node.model.as_ref().into_iter().flat_map(|model| model.dictionary.iter());
-    let entries = entries.filter(|entry| page::is_own(entry.object) && entry.access.is_readable());
+    let is_described = node.model.as_ref().is_some_and(|model| !model.description.signals.is_empty());
+    let of_profile = |object: ObjectId| !is_described && (0x6000..0xa000).contains(&object.index);
+    let entries = entries.filter(|entry| {
+        let object = entry.object;
+        // Sub-index 0 of a run is the number of its entries.
+        let is_count = entry.name.ends_with("-entries") || entry.numbered && object.sub == 0;
+        (page::is_own(object) || of_profile(object) && !is_count) && entry.access.is_readable()
+    });
     let entries = entries.filter(|entry| !entry.name.ends_with("-entries") && !taken.contains(&entry.object));
-    entries.map(|entry| entry.object).collect()
+    let mut own: Vec<ObjectId> = entries.map(|entry| entry.object).collect();
+    if node.model.is_none() {
+        let objects = node.identity.profile().into_iter().flat_map(profiles::settings_of);
+        own.extend(objects);
+    }
+    let signals: BTreeSet<ObjectId> = node.signals.iter().map(|signal| signal.value.0).collect();
+    own.retain(|object| !signals.contains(object));
+    own
 }
 
 /// The objects with the start and the end of the measuring range.
 fn span(node: &Node, signal: &Signal) -> [ObjectId; 2] {
     let described = node.model.as_ref().map_or(&[][..], |model| &model.description.signals);
     let entry = described.iter().find(|entry| entry.name == signal.name);
+    if !signal.has_channel() && entry.is_none() {
+        return [signal.value.0; 2];
+    }
     let start = entry.and_then(|entry| entry.span_start).unwrap_or_else(|| node.in_family(signal, 0x148));
     let end = entry.and_then(|entry| entry.span_end).unwrap_or_else(|| node.in_family(signal, 0x149));
     [start, end]

@@ -49,8 +49,11 @@ pub fn open(master: &mut Master<'_>, node: NodeId, overrides: &Overrides) -> Res
 /// # Errors
 /// The node has no such signal, or several signals and no name was given.
 pub fn find_signal<'a>(node: &'a Node, name: Option<&str>) -> Result<&'a Signal, Failure> {
-    match (name, node.signals.as_slice()) {
-        (Some(name), _) => super::read::find(node, name),
+    match (name, node.channels().as_slice()) {
+        (Some(name), _) => match super::read::find(node, name)? {
+            signal if signal.has_channel() => Ok(signal),
+            _ => Err(Failure::at(node.id, SettingsFailure::NoMeasuredValue)),
+        },
         (None, [only]) => Ok(only),
         (None, []) => Err(Failure::at(node.id, ReadFailure::NoMeasuredValue)),
         (None, several) => {

@@ -86,7 +86,7 @@ const IN_UNIT: [(u16, Scale); 10] = [
 pub fn show(node: &Node, signal: Option<&str>) -> Result<Vec<UnitOf>, Failure> {
     let signals: Vec<&Signal> = match signal {
         Some(name) => vec![find_signal(node, Some(name))?],
-        None => node.signals.iter().collect(),
+        None => node.channels(),
     };
     let units: Vec<UnitOf> = signals.iter().filter_map(|signal| unit_of(node, signal)).collect();
     if units.is_empty() {

@@ -30,6 +30,7 @@ fuzz_target!(|data: &[u8]| {
         marker: head & 2 != 0,
         unit: Some(Unit(bytes.long())),
         digits: Some(bytes.byte()),
+        rules: cangauge::measure::layout::Rules::default(),
         range: cangauge::measure::layout::MeasuringRange::Unknown,
     });
     let mapping: Vec<MappingEntry> = (0..head >> 4).map(|_| MappingEntry::from_word(bytes.long())).collect();

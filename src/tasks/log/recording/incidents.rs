@@ -48,7 +48,7 @@ impl Recording<'_> {
             self.life(node, life, at, master, observer);
         } else if let Some((node, length)) = Life::odd_length(frame) {
             self.odd_heartbeat(node, length, at, observer);
-        } else if let Some(node) = writes_setup(frame) {
+        } else if let Some(node) = writes_setup(frame, &self.nodes) {
             self.request_reread(node, RereadReason::Written, at.mono, master);
         } else if !frame.is_remote() && self.nodes.iter().any(|node| node.sync == frame.id()) {
             let (count, length) = self.syncs_received.entry(frame.id()).or_default();

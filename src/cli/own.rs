@@ -1,0 +1,91 @@
+//! The descriptions of the user: `$XDG_CONFIG_HOME/cangauge/devices/` and `/usr/share/cangauge/devices/`.
+
+use super::Global;
+use crate::bus::owner::is_trusted;
+use crate::device::catalog::{self, Model};
+use crate::output::failure::ErrorMessage;
+use std::env;
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The longest description that is read.
+const MAX_FILE: u64 = 16 << 20;
+
+/// The folders, the user's own first.
+fn folders() -> Vec<PathBuf> {
+    let path = |name: &str| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let config = path("XDG_CONFIG_HOME").or_else(|| Some(path("HOME")?.join(".config")));
+    let own = config.map(|config| config.join("cangauge/devices"));
+    own.into_iter().chain([PathBuf::from("/usr/share/cangauge/devices")]).collect()
+}
+
+/// Reads the descriptions. Returns why the other files cannot be used.
+///
+/// # Errors
+/// Two files for the same device.
+pub(super) fn load() -> Result<Vec<String>, ErrorMessage> {
+    let mut models: Vec<Arc<Model>> = Vec::new();
+    let mut broken = Vec::new();
+    for file in folders().iter().flat_map(|folder| files(folder)) {
+        match read(&file) {
+            // A description in the first folder replaces one of the same name in the second.
+            Ok(model) if models.iter().any(|other| other.description.name == model.description.name) => {}
+            Ok(model) => models.push(Arc::new(model)),
+            Err(reason) => broken.push(reason),
+        }
+    }
+    for (at, model) in models.iter().enumerate() {
+        if let Some(other) = models[..at].iter().find(|other| other.is_for_the_same_device(model)) {
+            let message = format!("two descriptions for the same device: {} and {}", file_of(other), file_of(model));
+            return Err(ErrorMessage::usage(message).hint("remove one of them, or its [identify]"));
+        }
+    }
+    catalog::add_own(models);
+    Ok(broken)
+}
+
+/// The file of a description of the user.
+pub(super) fn file_of(model: &Model) -> &str {
+    model.made_for.first().map_or("", |device| device.file.as_str())
+}
+
+/// The TOML files of a folder by name.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
+    let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
+    files.sort();
+    files
+}
+
+fn read(path: &Path) -> Result<Model, String> {
+    let text = || -> io::Result<Option<String>> {
+        let file = File::open(path)?;
+        let mut text = String::new();
+        let is_trusted = is_trusted(&file)?;
+        Ok(if is_trusted { file.take(MAX_FILE).read_to_string(&mut text).map(|_| Some(text))? } else { None })
+    };
+    let name = path.display().to_string();
+    let Some(text) = text().map_err(|error| format!("{name}: {error}"))? else {
+        return Err(format!("{name}: as root, only files that belong to root are read"));
+    };
+    let mut model = Model::from_toml(&text).map_err(|error| error.in_file(&name))?;
+    model.made_for.iter_mut().for_each(|device| device.file.clone_from(&name));
+    Ok(model)
+}
+
+/// Prints what a user must know: files that are not used, and built-in descriptions that are replaced.
+pub(super) fn report(broken: &[String], global: &Global) {
+    let console = global.console();
+    match broken {
+        [] => {}
+        [one] => console.note(&format!("not used: {}", one)),
+        [one, ..] => console.note(&format!("{} descriptions are not used, the first: {}", broken.len(), one)),
+    }
+    for model in catalog::own().iter().filter(|model| catalog::text(&model.description.name).is_some()) {
+        let name = &model.description.name;
+        console.note(&format!("{} replaces the built-in description \"{name}\"", file_of(model)));
+    }
+}

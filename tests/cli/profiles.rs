@@ -1,0 +1,184 @@
+//! Devices of other profiles than CiA 404, with and without an EDS: the signals that `read`, `log`, `check`, `pdo` and
+//! `info` show.
+
+use super::Bench;
+use std::fs;
+
+/// An object: address, type, access, default.
+type Object<'a> = (&'a str, &'a str, &'a str, &'a str);
+
+/// A simulated device of this type, with these objects, and one TPDO of these mapping entries sent at every SYNC.
+fn device(device_type: &str, objects: &[Object<'_>], mapping: &[&str]) -> String {
+    let mut text = "name = \"own\"\ntitle = \"Own\"\nvendor = \"Maker\"\n".to_owned();
+    let mut add = |(at, data_type, access, default): Object<'_>| {
+        let pdo = at.starts_with("0x6") || at.starts_with("0x2");
+        let name = format!("o-{}", at.replace(':', "-")).to_lowercase();
+        text += &format!(
+            "[[object]]\nat = \"{at}\"\nname = \"{name}\"\ntype = \"{data_type}\"\naccess = \"{access}\"\npdo = {pdo}\n\
+             default = {default}\n"
+        );
+    };
+    add(("0x1000", "u32", "ro", device_type));
+    add(("0x1800:1", "u32", "rw", "\"$NODEID+0x40000180\""));
+    add(("0x1800:2", "u8", "rw", "1"));
+    add(("0x1A00:0", "u8", "rw", &mapping.len().to_string()));
+    for (sub, word) in (1..).zip(mapping) {
+        add((&format!("0x1A00:{sub}"), "u32", "rw", word));
+    }
+    objects.iter().copied().for_each(&mut add);
+    text
+}
+
+fn bench(text: &str) -> Bench {
+    let bench = Bench::described("[[device]]\nkind = \"own.toml\"\nnode = 5\n");
+    fs::write(bench.path("own.toml"), text).expect("written");
+    bench
+}
+
+fn check(bench: &Bench, nodes: &str, expression: &str) -> super::Done {
+    let mut words: Vec<&str> = nodes.split(' ').collect();
+    let node = words.pop().expect("a node");
+    words.extend(["check", node, expression]);
+    bench.run_words(&words)
+}
+
+/// The lines of `read` with one blank between the words, and without the remark about the missing status.
+fn values(done: super::Done) -> Vec<String> {
+    let done = done.exit(0);
+    let words = |line: &str| line.replace("(tells no status)", "").split_whitespace().collect::<Vec<_>>().join(" ");
+    done.stdout.lines().map(words).collect()
+}
+
+/// The columns signal, value, unit and status of the first rows.
+fn rows(csv: &str, count: usize) -> Vec<String> {
+    let cells = |line: &str| line.split(',').skip(3).take(4).collect::<Vec<_>>().join(",");
+    csv.lines().skip(1).take(count).map(cells).collect()
+}
+
+/// An inclinometer with a resolution of 0.01 deg.
+fn inclinometer() -> String {
+    let objects = [("0x6000", "u16", "rw", "10"), ("0x6010", "i16", "ro", "-1234"), ("0x6020", "i16", "ro", "500")];
+    device("0x0002019A", &objects, &["0x60100010", "0x60200010"])
+}
+
+#[test]
+fn inclinometers_show_degrees() {
+    let bench = bench(&inclinometer());
+    assert_eq!(values(bench.run("read 5")), ["5 slope-long16 -12.34 deg", "5 slope-lateral16 5.00 deg"]);
+    bench.run("read 5 slope-long16").prints("-12.34\n");
+    bench.run("read 5 0x6010").prints("-1234\n");
+    let log = bench.run("log 5 --sync 100ms --count 2").exit(0);
+    assert_eq!(rows(&log.stdout, 2), ["slope-long16,-12.34,deg,", "slope-lateral16,5.00,deg,"]);
+    let wide = bench.run("log 5 slope-lateral16 --sync 100ms --count 1 --layout wide").exit(0);
+    assert!(wide.stdout.starts_with("time,elapsed_s,5.slope-lateral16 [deg],"), "{}", wide.stdout);
+    check(&bench, "5", "slope-long16 in -12.4..-12.3 deg").exit(0);
+    check(&bench, "5", "slope-long16 > 0 deg").exit(1);
+    let shown = bench.run("pdo show 5").exit(0);
+    assert!(shown.stdout.contains("0x6010:0/16 slope-long16 [deg]"), "{}", shown.stdout);
+    bench.run("pdo map 5 1 Slope-Lateral16").exit(0);
+    let page = bench.run("info 5").exit(0);
+    assert!(page.stdout.contains("slope-long16") && page.stdout.contains("resolution"), "{}", page.stdout);
+    bench.run("unit 5").exit(4);
+}
+
+#[test]
+fn other_resolutions_and_none() {
+    let with =
+        |resolution: &str| bench(&inclinometer().replace("default = 10\n", &format!("default = {resolution}\n")));
+    with("1").run("read 5 slope-long16").prints("-1.234\n");
+    with("100").run("read 5 slope-long16").prints("-123.4\n");
+    with("1000").run("read 5 slope-long16").prints("-1234\n");
+    let none = with("0").run("read 5 slope-long16 --format json").exit(0).json();
+    assert_eq!(
+        (none[0]["value"].as_i64(), none[0]["unit"].as_str()),
+        (Some(-1234), None),
+        "no unit without a resolution"
+    );
+}
+
+#[test]
+fn encoders_show_position_and_speed() {
+    let rotary = [("0x6004", "u32", "ro", "4096"), ("0x6030:0", "u8", "ro", "1"), ("0x6030:1", "i16", "ro", "-7")];
+    let mapping = ["0x60040020", "0x60300110"];
+    let bench = bench(&device("0x00020196", &rotary, &mapping));
+    assert_eq!(values(bench.run("read 5")), ["5 position-value 4096", "5 speed-value:1 -7"]);
+    check(&bench, "5", "speed-value:1 < 0").exit(0);
+    let steps = [("0x6005:0", "u8", "ro", "2"), ("0x6005:1", "u32", "rw", "5000"), ("0x6005:2", "u32", "rw", "10")];
+    let bench = self::bench(&device("0x00080196", &[&rotary[..], &steps[..]].concat(), &mapping));
+    assert_eq!(values(bench.run("read 5")), ["5 position-value 20.480 mm", "5 speed-value:1 -0.7 mm/s"]);
+    let log = bench.run("log 5 --sync 100ms --count 2").exit(0);
+    assert_eq!(rows(&log.stdout, 2), ["position-value,20.480,mm,", "speed-value:1,-0.7,mm/s,"]);
+}
+
+#[test]
+fn inputs_and_outputs_are_shown_as_they_are() {
+    let objects = [
+        ("0x6000:0", "u8", "ro", "2"),
+        ("0x6000:1", "u8", "ro", "165"),
+        ("0x6000:2", "u8", "ro", "1"),
+        ("0x6401:0", "u8", "ro", "1"),
+        ("0x6401:1", "i16", "ro", "32767"),
+    ];
+    let bench = bench(&device("0x000D0191", &objects, &["0x60000108", "0x64010110"]));
+    let expected = ["5 digital-input-8:1 165", "5 digital-input-8:2 1", "5 analogue-input-16:1 32767"];
+    assert_eq!(values(bench.run("read 5")), expected);
+    let log = bench.run("log 5 --start --sync 100ms --count 2");
+    let log = if log.code == Some(2) { bench.run("log 5 --sync 100ms --count 2") } else { log }.exit(0);
+    assert_eq!(rows(&log.stdout, 2), ["digital-input-8:1,165,,", "analogue-input-16:1,32767,,"]);
+}
+
+#[test]
+fn drives_and_devices_without_a_profile_show_their_tpdos() {
+    let drive = [("0x6041", "u16", "ro", "567"), ("0x6064", "i32", "ro", "-100000")];
+    let bench = bench(&device("0x00020192", &drive, &["0x60410010", "0x60640020"]));
+    assert_eq!(values(bench.run("read 5")), ["5 statusword 567", "5 position-actual-value -100000"]);
+    let other = [("0x2100:1", "r32", "ro", "21.5"), ("0x2100:2", "u16", "ro", "3")];
+    let bench = self::bench(&device("0", &other, &["0x21000120", "0x21000210"]));
+    let none = bench.run("read 5 --format json").exit(0).json();
+    assert_eq!((none[0]["signal"].as_str(), none[0]["value"].is_null()), (Some("0x2100:1"), true), "{none:?}");
+    let eds = "[ManufacturerObjects]\nSupportedObjects=1\n1=0x2100\n[2100]\nParameterName=Measurement\nObjectType=9\n\
+               SubNumber=3\n[2100sub0]\nParameterName=Entries\nDataType=5\nAccessType=ro\n[2100sub1]\n\
+               ParameterName=Temperature\nDataType=8\nAccessType=ro\nPDOMapping=1\n[2100sub2]\n\
+               ParameterName=4-20 mA Count\nDataType=6\nAccessType=ro\nPDOMapping=1\n";
+    fs::write(bench.path("x.eds"), eds).expect("written");
+    let run = |line: &str| bench.run(&format!("--eds x.eds {line}"));
+    assert_eq!(values(run("read 5")), ["5 temperature 21.5", "5 4-20-ma-count 3"]);
+    run("read 5 Temperature").prints("21.5\n");
+    run("read 5 4-20-ma-count").prints("3\n");
+    let log = run("log 5 --sync 100ms --count 2").exit(0);
+    assert_eq!(rows(&log.stdout, 2), ["temperature,21.5,,", "4-20-ma-count,3,,"]);
+    let log = run("log 5 temperature --sync 100ms --count 1 --layout wide").exit(0);
+    assert!(log.stdout.starts_with("time,elapsed_s,5.temperature,"), "{}", log.stdout);
+    run("pdo map 5 1 4-20-ma-count temperature").exit(0);
+    let shown = run("pdo show 5 --format json").exit(0).json();
+    assert_eq!(shown[0]["mapping"][1]["signal"], "temperature");
+    for (expression, code) in [
+        ("temperature < 60", 0),
+        ("temperature > 60", 1),
+        ("\"4-20-ma-count\" == 3", 0),
+        ("'4-20 mA Count' == 3", 0),
+        ("5.\"Temperature\" < 60", 0),
+        ("tempratur < 60", 2),
+    ] {
+        let done = check(&bench, "--eds x.eds 5", expression).exit(code);
+        assert!(code < 2 || done.stderr.contains("temperature"), "{}", done.stderr);
+    }
+    let unknown = run("log 5 tempratur --sync 100ms --count 1").exit(2);
+    assert!(unknown.stderr.contains("temperature"), "{}", unknown.stderr);
+    let unknown = run("read 5 tempratur").exit(2);
+    assert!(unknown.stderr.contains("temperature"), "{}", unknown.stderr);
+}
+
+#[test]
+fn described_signals_have_their_own_scale_and_status() {
+    let mut text = device("0", &[("0x2000:1", "i16", "ro", "1250"), ("0x2001", "u16", "ro", "0x100")], &["0x20000110"]);
+    text += "[[signal]]\nname = \"flow\"\nvalue = \"0x2000:1\"\nunit = \"l/h\"\nfactor = 0.01\nstatus = \"0x2001\"\n\
+             status_bits = { invalid = 0x80, high = 0x100 }\n";
+    let bench = bench(&text);
+    bench.run("devices check own.toml").exit(0);
+    assert_eq!(values(bench.run("--device own.toml read 5")), ["5 flow 12.50 l/h overload-high"]);
+    let log = bench.run("--device own.toml log 5 --sync 100ms --count 1").exit(0);
+    assert_eq!(rows(&log.stdout, 1), ["flow,12.50,l/h,"]);
+    check(&bench, "--device own.toml 5", "flow < 20 l/h").exit(1);
+    bench.run("--device own.toml unit 5 flow bar").exit(4);
+}
