@@ -157,6 +157,9 @@ _cangauge() {
             cangauge__subcmd__devices,help)
                 cmd="cangauge__subcmd__devices__subcmd__help"
                 ;;
+            cangauge__subcmd__devices,new)
+                cmd="cangauge__subcmd__devices__subcmd__new"
+                ;;
             cangauge__subcmd__devices,show)
                 cmd="cangauge__subcmd__devices__subcmd__show"
                 ;;
@@ -165,6 +168,9 @@ _cangauge() {
                 ;;
             cangauge__subcmd__devices__subcmd__help,help)
                 cmd="cangauge__subcmd__devices__subcmd__help__subcmd__help"
+                ;;
+            cangauge__subcmd__devices__subcmd__help,new)
+                cmd="cangauge__subcmd__devices__subcmd__help__subcmd__new"
                 ;;
             cangauge__subcmd__devices__subcmd__help,show)
                 cmd="cangauge__subcmd__devices__subcmd__help__subcmd__show"
@@ -264,6 +270,9 @@ _cangauge() {
                 ;;
             cangauge__subcmd__help__subcmd__devices,check)
                 cmd="cangauge__subcmd__help__subcmd__devices__subcmd__check"
+                ;;
+            cangauge__subcmd__help__subcmd__devices,new)
+                cmd="cangauge__subcmd__help__subcmd__devices__subcmd__new"
                 ;;
             cangauge__subcmd__help__subcmd__devices,show)
                 cmd="cangauge__subcmd__help__subcmd__devices__subcmd__show"
@@ -1540,7 +1549,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__devices)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version show check help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version show new check help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1672,7 +1681,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__devices__subcmd__help)
-            opts="show check help"
+            opts="show new check help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1713,6 +1722,20 @@ _cangauge() {
             COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
             return 0
             ;;
+        cangauge__subcmd__devices__subcmd__help__subcmd__new)
+            opts=""
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
         cangauge__subcmd__devices__subcmd__help__subcmd__show)
             opts=""
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
@@ -1720,6 +1743,72 @@ _cangauge() {
                 return 0
             fi
             case "${prev}" in
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
+        cangauge__subcmd__devices__subcmd__new)
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                --bus)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -b)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --timeout)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -t)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --retries)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --format)
+                    COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
+                    return 0
+                    ;;
+                -f)
+                    COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
+                    return 0
+                    ;;
+                --trace)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --progress)
+                    COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
+                    return 0
+                    ;;
+                --color)
+                    COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
+                    return 0
+                    ;;
                 *)
                     COMPREPLY=()
                     ;;
@@ -2120,7 +2209,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__help__subcmd__devices)
-            opts="show check"
+            opts="show new check"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2134,6 +2223,20 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__help__subcmd__devices__subcmd__check)
+            opts=""
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
+        cangauge__subcmd__help__subcmd__devices__subcmd__new)
             opts=""
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )

@@ -3,6 +3,7 @@
 //! `UPDATE_GENERATED=1 cargo test --test generated` rewrites them.
 
 use cangauge::cli::{Cli, program};
+use cangauge::device::description;
 use cangauge::sim::Bench;
 use clap::{Command, CommandFactory};
 use clap_complete::Shell;
@@ -134,6 +135,9 @@ fn see_also(command: &Command) -> String {
     if ["cangauge", "cangauge-log", "cangauge-check"].contains(&page) {
         pages.push(("cangauge-recording".to_owned(), 5));
     }
+    if ["cangauge", "cangauge-devices", "cangauge-objects"].contains(&page) {
+        pages.push(("cangauge-device".to_owned(), 5));
+    }
     if ["cangauge", "cangauge-sim"].contains(&page) {
         pages.push(("cangauge-bench".to_owned(), 5));
     }
@@ -225,4 +229,43 @@ fn the_example_of_the_bench_page_is_a_bench() {
     if let Err(error) = Bench::from_toml(&example.replace("\\-", "-"), Path::new("")) {
         panic!("{error}");
     }
+}
+
+/// The names in the mistake about an unknown key are all keys that the parser knows.
+#[test]
+fn every_key_of_a_description_has_an_entry_in_its_page() {
+    let page = &hand_written()["cangauge-device.5"];
+    for table in [
+        "",
+        "[identify]",
+        "[factory]",
+        "[sdo]",
+        "[pdo]",
+        "[startup]",
+        "[[assign]]",
+        "[[autozero]]",
+        "[[signal]]",
+        "[[object]]",
+        "[[emcy]]",
+    ] {
+        let mistakes = description::read(&format!("{table}\nno_such_key = 1\n")).expect_err("an unknown key");
+        let mistake = mistakes.iter().find(|mistake| mistake.message.contains("no_such_key")).expect(table);
+        let known = mistake.message.split_once("known: ").and_then(|(_, known)| known.strip_suffix(')')).expect("keys");
+        let section = if table.is_empty() { ".SH THE FILE\n".to_owned() } else { format!(".SS {table}\n") };
+        let text = page.split(&section).nth(1).unwrap_or_else(|| panic!("no section {table}"));
+        let text = if table.is_empty() { text } else { text.split("\n.SS").next().unwrap_or_default() };
+        for key in known.split(", ") {
+            let entry = text.contains(&format!("\\fB{key}\\fR"));
+            assert!(entry || text.contains(&format!("[{key}]")), "{key} of {table} is not in cangauge-device.5");
+        }
+    }
+}
+
+#[test]
+fn the_example_of_the_description_page_is_a_description() {
+    let page = &hand_written()["cangauge-device.5"];
+    let example = page.split(".SH EXAMPLE").nth(1).and_then(|rest| rest.split(".EX\n").nth(1)).expect("an example");
+    let example = example.split(".EE").next().unwrap_or_default().replace("\\-", "-");
+    let (result, notes) = description::read_with_notes(&example);
+    assert!(result.is_ok() && notes.is_empty(), "{:?} {notes:?}", result.err());
 }

@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// A description is a TOML file with the objects, signals and behaviour of one kind of device. Start your own with a copy.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  cangauge devices\n  cangauge devices show mh4 > mine.toml\n  cangauge devices check mine.toml\n  cangauge -b sim devices new 1 > mine.toml"
+    after_help = "Examples:\n  cangauge devices\n  cangauge devices show mh4 > mine.toml\n  cangauge devices check mine.toml\n  cangauge -b sim devices new 1"
 )]
 pub(crate) struct Devices {
     #[command(subcommand)]

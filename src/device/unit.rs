@@ -110,7 +110,8 @@ const PREFIXES: &[(i8, &str)] = &[
 ];
 
 /// Units of descriptions that CiA 303-2 has no code for. Their codes have a denominator that no device can send.
-const EXTRA: [&str; 12] = ["%", "rpm", "1/min", "1/s", "ppm", "dB", "pH", "step", "kWh", "%RH", "m3/h", "l/min"];
+const EXTRA: [&str; 13] =
+    ["%", "rpm", "1/min", "1/s", "ppm", "dB", "pH", "step", "kWh", "%RH", "m3/h", "l/min", "m/s2"];
 
 /// The first code of [`EXTRA`].
 const EXTRA_CODES: u32 = 0xffff_ff00;

@@ -301,7 +301,7 @@ impl Channel {
             Shows::Value => self.encode(objects, data_type, raw),
             Shows::Lowest => self.encode(objects, data_type, low),
             Shows::Highest => self.encode(objects, data_type, high),
-            Shows::Status => number::to_bytes(f64::from(status(overload)), data_type),
+            Shows::Status => number::to_bytes(self.status(overload), data_type),
             Shows::Field => {
                 let channel = self.quantity.channel();
                 let [start, end] = channel.field.unwrap_or([0.0, 10_000.0]);
@@ -337,10 +337,22 @@ impl Channel {
 
     /// A value as the number in a type: an integer is multiplied by its power of ten.
     fn scaled(&self, objects: &Objects, data_type: DataType, value: f64) -> f64 {
+        if let Some(scale) = self.signal.scale {
+            return (value - scale.offset.as_f64()) / scale.factor.as_f64();
+        }
         match data_type {
             DataType::Real32 | DataType::Real64 => value,
             _ => value * self.power(objects),
         }
+    }
+
+    /// The number in the status object.
+    fn status(&self, overload: Option<Direction>) -> f64 {
+        let bits = status(overload);
+        let Some(own) = &self.signal.status_bits else { return f64::from(bits) };
+        let masks = [(0b001, own.invalid), (0b010, own.high), (0b100, own.low)];
+        let own = masks.into_iter().filter(|(bit, _)| bits & bit != 0).fold(0, |number, (_, mask)| number | mask);
+        own as f64
     }
 
     fn digits(&self, objects: &Objects) -> u32 {

@@ -107,11 +107,11 @@ impl SimData {
             let end = |object: Option<ObjectId>| number(model, object?, signal.digits);
             let range = end(signal.span_start).zip(end(signal.span_end)).filter(|(start, end)| start < end);
             let (start, end) = range.unwrap_or((0.0, 100.0));
-            let unit = signal.unit.and_then(|unit| number(model, unit, None)).unwrap_or(0.0);
+            let coded = signal.unit.and_then(|unit| number(model, unit, None)).unwrap_or(0.0);
             let length = end - start;
             SimChannel {
                 channel: signal.channel,
-                unit: format!("{unit:.0}").parse().unwrap_or(0),
+                unit: signal.fixed_unit.map_or_else(|| format!("{coded:.0}").parse().unwrap_or(0), |unit| unit.0),
                 base: start + 0.5 * length,
                 amplitude: 0.05 * length,
                 period_s: 20.0 + f64::from(signal.channel),
@@ -164,7 +164,9 @@ mod tests {
                 assert!(quantity.start <= quantity.base - quantity.amplitude, "{device} {}", signal.name);
                 assert!(quantity.base + quantity.amplitude <= quantity.end, "{device} {}", signal.name);
                 let unit = signal.unit.and_then(|unit| model.dictionary.get(unit)?.default.clone());
-                assert_eq!(unit, Some(Scalar::Integer(quantity.unit.into())), "{device} {}", signal.name);
+                let fixed = signal.fixed_unit.map(|unit| Scalar::Integer(unit.0.into()));
+                let unit = fixed.or(unit).unwrap_or(Scalar::Integer(0));
+                assert_eq!(unit, Scalar::Integer(quantity.unit.into()), "{device} {}", signal.name);
             }
             assert_eq!(sim.channels.len(), model.description.signals.len(), "{device}");
         }

@@ -1,9 +1,8 @@
 //! `objects` and `devices`: what descriptions and EDS files know, without a bus.
 
 use super::Bench;
+use cangauge::device::catalog;
 use std::fs;
-
-const NAMES: [&str; 8] = ["baumer", "d20", "dps", "hydac", "hydac-old", "jumo", "mc1609", "mh4"];
 
 #[test]
 fn objects_of_a_description_need_no_bus() {
@@ -50,8 +49,9 @@ fn objects_of_an_eds_need_no_bus() {
 fn shown_descriptions_pass_the_check_and_give_the_same_device() {
     let bench = Bench::of("mh4@1");
     let listed = bench.run("devices --format json").exit(0).json();
-    assert_eq!(listed.iter().filter_map(|device| device["name"].as_str()).collect::<Vec<_>>(), NAMES);
-    for name in NAMES {
+    let names: Vec<&str> = catalog::names().collect();
+    assert_eq!(listed.iter().filter_map(|device| device["name"].as_str()).collect::<Vec<_>>(), names);
+    for name in names {
         let shown = bench.run(&format!("devices show {name}")).exit(0);
         fs::write(bench.path("own.toml"), &shown.stdout).expect("written");
         bench.run("devices check own.toml").exit(0);
@@ -76,4 +76,102 @@ fn every_mistake_of_a_description_has_its_line() {
     let done = bench.run("devices check own.toml").exit(2);
     assert!(done.stdout.contains("own.toml:8: channel: 0 is not in the range 1 to 199\n"), "{}", done.stdout);
     bench.run("devices check missing.toml").exit(8);
+}
+
+#[test]
+fn a_new_description_of_a_device_passes_the_check_and_gives_the_same_values() {
+    let bench = Bench::described("[[device]]\nkind = \"mh4\"\nnode = 5\n[[device]]\nkind = \"d20\"\nnode = 6\n");
+    for node in ["5", "6"] {
+        let new = bench.run(&format!("devices new {node}")).exit(0).stdout;
+        fs::write(bench.path("new.toml"), &new).expect("written");
+        bench.run("devices check new.toml").exit(0);
+        let signals = |line: &str| {
+            let done = bench.run(line).exit(0).json();
+            done.iter().map(|row| (row["signal"].clone(), row["unit"].clone())).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            signals(&format!("--device new.toml read {node} --format json")).len(),
+            signals(&format!("read {node} --format json")).len(),
+            "{new}"
+        );
+        let simulated =
+            bench.command(&["-b", "sim:new.toml@5", "--device", "new.toml", "read", "5"]).output().expect("run");
+        assert!(simulated.status.success(), "{}", String::from_utf8_lossy(&simulated.stderr));
+    }
+}
+
+#[test]
+fn a_new_description_leaves_open_what_no_source_states() {
+    let bench = Bench::described("[[device]]\nkind = \"own.toml\"\nnode = 5\n");
+    let text = "name = \"own\"\ntitle = \"T\"\nvendor = \"V\"\n\
+                [[object]]\nat = \"0x1000\"\nname = \"device-type\"\ntype = \"u32\"\naccess = \"ro\"\ndefault = 0\n\
+                [[object]]\nat = \"0x2000:1\"\nname = \"v\"\ntype = \"r32\"\naccess = \"ro\"\npdo = true\ndefault = 1.5\n\
+                [[object]]\nat = \"0x1800:1\"\nname = \"c\"\ntype = \"u32\"\naccess = \"rw\"\ndefault = \"$NODEID+0x180\"\n\
+                [[object]]\nat = \"0x1A00:0\"\nname = \"n\"\ntype = \"u8\"\naccess = \"rw\"\ndefault = 1\n\
+                [[object]]\nat = \"0x1A00:1\"\nname = \"m\"\ntype = \"u32\"\naccess = \"rw\"\ndefault = 0x20000120\n";
+    let text = text.replace("name = \"c\"", "name = \"cob\"");
+    fs::write(bench.path("own.toml"), text).expect("written");
+    let new = bench.run("devices new 5").exit(0).stdout;
+    fs::write(bench.path("new.toml"), &new).expect("written");
+    bench.run("devices check new.toml").exit(0);
+    assert!(
+        new.contains("# fill in the type of these 4 bytes: 0x0000C03F\n# [[object]]\n# at = \"0x2000:1\""),
+        "{new}"
+    );
+    let eds = "[ManufacturerObjects]\nSupportedObjects=1\n1=0x2000\n[2000]\nParameterName=Values\nObjectType=8\nSubNumber=2\n\
+               [2000sub0]\nParameterName=Count\nDataType=5\nAccessType=ro\n\
+               [2000sub1]\nParameterName=Oil Temp\nDataType=8\nAccessType=ro\nPDOMapping=1\n";
+    fs::write(bench.path("x.eds"), eds).expect("written");
+    let new = bench.run("--eds x.eds devices new 5").exit(0).stdout;
+    fs::write(bench.path("new.toml"), &new).expect("written");
+    bench.run("devices check new.toml").exit(0);
+    assert!(new.contains("name = \"values\"\ntype = \"r32\""), "{new}");
+}
+
+/// A description in the folder of the user.
+fn user_file(bench: &Bench, name: &str, text: &str) {
+    let folder = bench.path("config/cangauge/devices");
+    fs::create_dir_all(&folder).expect("a folder");
+    fs::write(folder.join(name), text).expect("written");
+}
+
+/// The command with the folder of the user.
+fn run_as_user(bench: &Bench, line: &str) -> super::Done {
+    let config = bench.path("config");
+    let words: Vec<&str> = line.split_whitespace().collect();
+    bench.finish(bench.traced(&words).env("XDG_CONFIG_HOME", config))
+}
+
+#[test]
+fn descriptions_of_the_user_are_found_and_have_priority() {
+    let bench = Bench::of("mh4@1");
+    let mh4 = catalog::text("mh4").expect("built in").replace("title = \"WIKA MH-4-CAN\"", "title = \"My sensor\"");
+    user_file(&bench, "a.toml", &mh4.replace("name = \"mh4\"", "name = \"my-mh4\""));
+    let listed = run_as_user(&bench, "devices --format json").exit(0).json();
+    assert!(listed.iter().any(|device| device["name"] == "my-mh4" && device["file"].is_string()), "{listed:?}");
+    let found = run_as_user(&bench, "scan 1 --format json").exit(0).json();
+    assert_eq!(found[0]["device"], "my-mh4");
+    run_as_user(&bench, "--device my-mh4 read 1").exit(0);
+    // Two for one device.
+    user_file(&bench, "b.toml", &mh4.replace("name = \"mh4\"", "name = \"my-other\""));
+    let done = run_as_user(&bench, "scan 1").exit(2);
+    assert!(
+        done.stderr.contains("two descriptions for the same device") && done.stderr.contains("b.toml"),
+        "{}",
+        done.stderr
+    );
+    // One that replaces a built-in description, and a broken one.
+    fs::remove_file(bench.path("config/cangauge/devices/a.toml")).expect("removed");
+    user_file(&bench, "b.toml", &mh4);
+    user_file(&bench, "broken.toml", "name = 1\n");
+    let done = run_as_user(&bench, "scan 1 --format json").exit(0);
+    assert_eq!(done.json()[0]["device"], "mh4");
+    assert!(
+        done.stderr.contains("b.toml replaces the built-in description \\\"mh4\\\"")
+            || done.stderr.contains("b.toml replaces the built-in description \"mh4\""),
+        "{}",
+        done.stderr
+    );
+    assert!(done.stderr.contains("not used: ") && done.stderr.contains("broken.toml:1: "), "{}", done.stderr);
+    assert!(run_as_user(&bench, "objects mh4 1008").exit(0).stdout.contains("device-name"));
 }

@@ -20,6 +20,9 @@ pub(super) fn words(_failure: &Failure, cause: &SettingsFailure) -> Words {
         SettingsFailure::HistoryNotCleared { count } => {
             Words::new(format!("it acknowledged the write of 0x1003:0, but the history still has {}", errors(*count)))
         }
+        SettingsFailure::NoChannel { signal } => {
+            Words::new(format!("{signal} is no channel of CiA 404: it has no settings of a channel"))
+        }
         SettingsFailure::NoUnit { signal } => Words::new(format!("{} has no unit (6131h)", of(signal.as_ref()))),
         SettingsFailure::UnitFixed { signal, unit } => {
             Words::new(format!("{signal} is in {unit}, and the device cannot change it"))

@@ -16,6 +16,11 @@ pub enum SettingsFailure {
         /// The signals of the device.
         available: Vec<String>,
     },
+    /// The signal is no channel of CiA 404, so it has no unit, filter or limits to set.
+    NoChannel {
+        /// The signal.
+        signal: String,
+    },
     /// The device has neither an error register (1001h) nor an error history (1003h).
     NoErrorObjects,
     /// The device has no error history (1003h).
@@ -214,6 +219,7 @@ impl SettingsFailure {
             | SettingsFailure::NoErrorHistory
             | SettingsFailure::HistoryNotCleared { .. }
             | SettingsFailure::NoUnit { .. }
+            | SettingsFailure::NoChannel { .. }
             | SettingsFailure::NoLimits { .. }
             | SettingsFailure::NoMinMax
             | SettingsFailure::NoMinMaxReset { .. }

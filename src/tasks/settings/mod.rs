@@ -52,7 +52,7 @@ pub fn find_signal<'a>(node: &'a Node, name: Option<&str>) -> Result<&'a Signal,
     match (name, node.channels().as_slice()) {
         (Some(name), _) => match super::read::find(node, name)? {
             signal if signal.has_channel() => Ok(signal),
-            _ => Err(Failure::at(node.id, SettingsFailure::NoMeasuredValue)),
+            signal => Err(Failure::at(node.id, SettingsFailure::NoChannel { signal: signal.name.clone() })),
         },
         (None, [only]) => Ok(only),
         (None, []) => Err(Failure::at(node.id, ReadFailure::NoMeasuredValue)),
