@@ -5,7 +5,6 @@ use super::exit::{several, stdout};
 use super::{Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
-use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::TpdoNumber;
 use crate::output::failure::ErrorMessage;
 use crate::output::notes;
@@ -107,8 +106,11 @@ impl FromStr for MapItem {
             }
         };
         if what.starts_with(|first: char| first.is_ascii_digit()) {
-            let object: ObjectId = what.parse().map_err(|error| format!("{error}"))?;
-            return Ok(MapItem(Item::Object(object, bits)));
+            // `4-20-ma-count` is a name.
+            return match what.parse::<ObjectArg>()? {
+                ObjectArg::Address(object) => Ok(MapItem(Item::Object(object, bits))),
+                ObjectArg::Name(name) => Ok(MapItem(Item::Name(name, bits))),
+            };
         }
         let bare = what.strip_suffix(".status").unwrap_or(what);
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';

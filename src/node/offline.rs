@@ -1,7 +1,7 @@
 //! A node as its description has it, without a bus.
 
 use super::Node;
-use super::survey::described;
+use super::signals::described;
 use crate::canopen::id::NodeId;
 use crate::canopen::pdo::{CobId, TpdoNumber};
 use crate::device::catalog::Model;

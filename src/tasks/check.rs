@@ -168,8 +168,8 @@ fn available(nodes: &[Node], expressions: &[Expression]) -> AvailableSignals {
     let mut available = AvailableSignals::from_layouts(nodes.iter().map(Node::layout));
     for node in nodes {
         for item in expressions.iter().flat_map(Expression::wanted) {
-            if let (Wanted::Signal(name), Wanted::Object(object, _)) = (&item, node.wanted(&item)) {
-                available.name_object(node.id, name, object);
+            if let (Wanted::Signal(name), Wanted::Named(known, _)) = (&item, node.wanted(&item)) {
+                available.name_object(node.id, name, &known);
             }
         }
     }

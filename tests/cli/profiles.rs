@@ -78,7 +78,7 @@ fn inclinometers_show_degrees() {
     bench.run("pdo map 5 1 Slope-Lateral16").exit(0);
     let page = bench.run("info 5").exit(0);
     assert!(page.stdout.contains("slope-long16") && page.stdout.contains("resolution"), "{}", page.stdout);
-    bench.run("unit 5").exit(4);
+    bench.run("unit 5").exit(6);
 }
 
 #[test]

@@ -5,7 +5,6 @@ use super::formula::{Formula, Rule};
 use super::tree::{Condition, Function, Quantity, SignalName};
 use super::{Expression, ExpressionError, LocatedError};
 use crate::canopen::id::NodeId;
-use crate::canopen::object::ObjectId;
 use crate::device::dictionary::{Dictionary, spellings};
 use crate::device::nearest::distance;
 use crate::device::unit::Unit;
@@ -37,8 +36,6 @@ pub struct AvailableSignals {
     signals: Vec<AvailableSignal>,
     /// Nodes whose objects can all be read by address.
     readable: Vec<NodeId>,
-    /// Objects that an expression names, of nodes that have no signal of this name.
-    named: Vec<(NodeId, String, ObjectId)>,
     /// The names of objects, in lower case, with the name as in [`Source`].
     objects: BTreeMap<(NodeId, String), AvailableSignal>,
 }
@@ -62,16 +59,10 @@ impl AvailableSignals {
         available
     }
 
-    /// Adds an object that has a name.
-    pub fn name_object(&mut self, node: NodeId, name: &str, object: ObjectId) {
-        self.named.push((node, name.to_owned(), object));
-    }
-
-    /// What to measure for a name: a signal, or the object with this name.
-    fn what(&self, node: NodeId, signal: &SignalName) -> Wanted {
-        let Wanted::Signal(name) = &signal.what else { return signal.what.clone() };
-        let object = self.named.iter().find(|(id, named, _)| *id == node && named == name);
-        object.map_or_else(|| signal.what.clone(), |(.., object)| Wanted::Object(*object, None))
+    /// Adds a name for the object that is called `known` in [`Source`], unless it is known.
+    pub fn name_object(&mut self, node: NodeId, name: &str, known: &str) {
+        let signal = AvailableSignal { node, name: known.to_owned(), unit: None };
+        self.objects.entry((node, name.to_lowercase())).or_insert(signal);
     }
 
     /// Adds every named object of the description or EDS, and the names in the spelling of the EDS.
@@ -109,13 +100,12 @@ impl AvailableSignals {
     fn find(&self, node: NodeId, signal: &SignalName) -> Option<AvailableSignal> {
         let name = signal.name();
         let known = self.signals.iter().find(|known| known.node == node && known.name == name).cloned();
-        let what = self.what(node, signal);
-        let is_readable = matches!(what, Wanted::Object(..)) && self.readable.contains(&node);
+        let is_readable = matches!(signal.what, Wanted::Object(..)) && self.readable.contains(&node);
         let object = || {
             let names = [name.to_lowercase()].into_iter().chain(spellings(&name));
             names.into_iter().find_map(|name| self.objects.get(&(node, name)).cloned())
         };
-        let address = || is_readable.then(|| AvailableSignal { node, name: what.name(), unit: None });
+        let address = || is_readable.then(|| AvailableSignal { node, name: name.clone(), unit: None });
         known.or_else(object).or_else(address)
     }
 
@@ -350,9 +340,7 @@ impl Binder<'_> {
         let Some(AvailableSignal { name, unit, .. }) = self.available.find(node, signal) else {
             return Err(self.unknown_signal(node, signal));
         };
-        // An object that only the caller knows by name is measured by its address.
-        let what = Some(self.available.what(node, signal)).filter(|what| what.name() == name);
-        let input = Input { node, name, what: what.unwrap_or_else(|| signal.what.clone()), unit };
+        let input = Input { node, name, what: signal.what.clone(), unit };
         if let Some(known) = self.bound.inputs.iter().position(|known| *known == input) {
             return Ok(known);
         }

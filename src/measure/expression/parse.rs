@@ -266,16 +266,29 @@ impl Parser {
 
     /// Parses the unit after a number, if there is one.
     fn unit(&mut self) -> Result<Option<Unit>, LocatedError> {
-        let Some(Token::Word(word)) = self.peek() else { return Ok(None) };
+        let Some(Token::Word(word)) = self.peek().cloned() else { return Ok(None) };
         if KEYWORDS.contains(&word.as_str()) {
             return Ok(None);
         }
-        let unit = Unit::from_symbol(word).ok_or_else(|| {
+        let unit = Unit::from_symbol(&word).ok_or_else(|| {
             LocatedError::new(self.at(), format!("unknown unit \"{word}\""))
                 .hint(format!("common units: {COMMON_UNITS}"))
         })?;
         self.next += 1;
-        Ok(Some(unit))
+        Ok(Some(self.divided_unit(&word).unwrap_or(unit)))
+    }
+
+    /// The unit with a denominator, such as `l/h`, if one follows and the unit exists.
+    fn divided_unit(&mut self, numerator: &str) -> Option<Unit> {
+        let [Token::Sign("/"), Token::Word(denominator)] = [0, 1]
+            .map(|at| self.tokens.get(self.next + at).map(|(token, _)| token.clone()))
+            .map(|token| token.unwrap_or(Token::Sign("")))
+        else {
+            return None;
+        };
+        let unit = Unit::from_symbol(&format!("{numerator}/{denominator}"))?;
+        self.next += 2;
+        Some(unit)
     }
 }
 
