@@ -3,9 +3,10 @@
 mod apply;
 mod diff;
 mod journal;
+mod table;
 
 use super::args::Nodes;
-use super::exit::FileError;
+use super::exit::{FileError, stdout};
 use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -13,12 +14,12 @@ use crate::device::catalog;
 use crate::device::config_file::{Document, Item};
 use crate::node::Node;
 use crate::node::offline::offline;
-use crate::output::config::write_toml;
+use crate::output::config::{SCHEMA, write_toml};
 use crate::tasks::Failure;
 use crate::tasks::config::{ConfigFailure, Mistake, Problem, read};
 use clap::{Args, Subcommand};
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Write};
 
 /// Show all settings of a device as a file, compare them with a file, and set them from a file
 ///
@@ -43,6 +44,8 @@ enum Action {
     Diff(diff::Diff),
     /// Set a device as a file says: check the file, write what differs, read everything back
     Apply(apply::Apply),
+    /// Print the JSON Schema of the file, for editors
+    Schema,
 }
 
 #[derive(Debug, Args)]
@@ -61,6 +64,7 @@ impl Config {
             Action::Dump(dump) => Claim::Nodes(vec![dump.node]),
             Action::Diff(diff) => diff.claim(),
             Action::Apply(apply) => apply.claim(),
+            Action::Schema => Claim::Nothing,
         }
     }
 
@@ -74,6 +78,7 @@ impl Config {
             Action::Dump(dump) => dump.run(global),
             Action::Diff(diff) => diff.run(global),
             Action::Apply(apply) => apply.run(global),
+            Action::Schema => std::io::stdout().lock().write_all(SCHEMA.as_bytes()).map_err(stdout),
         }
     }
 }

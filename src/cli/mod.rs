@@ -315,7 +315,6 @@ impl Global {
         render(reports, self.format, &mut io::stdout().lock()).map_err(exit::stdout)
     }
 
-    /// Prints reports if the format is for programs. People get a note on stderr.
     /// Prints reports if the format is for programs, else what `text` writes.
     pub(crate) fn print_or<R: Report>(
         &self,
@@ -325,7 +324,7 @@ impl Global {
         if self.prints_text() { text(&mut io::stdout().lock()).map_err(exit::stdout) } else { self.print(reports) }
     }
 
-    /// Prints reports if the format is for programs. A note on stderr tells people.
+    /// Prints reports if the format is for programs. People get a note on stderr.
     pub(crate) fn print_data<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
         self.print_or(reports, |_| Ok(()))
     }

@@ -257,3 +257,6 @@ impl Report for LineReport {
         Ok(())
     }
 }
+
+/// The JSON Schema of a file, for editors.
+pub const SCHEMA: &str = include_str!("config.schema.json");

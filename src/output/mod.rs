@@ -3,6 +3,7 @@
 pub mod autozero;
 pub mod check_progress;
 pub mod config;
+pub mod config_record;
 pub mod console;
 pub mod csv;
 pub mod devices;

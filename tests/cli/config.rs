@@ -365,3 +365,72 @@ fn address_and_calibration_are_set_only_on_request() {
     let two = bench.run("config apply 5,6 f.toml --address").exit(2);
     assert_eq!(two.frames, [""; 0]);
 }
+
+/// Forty transmitters from one file and one table; a device that is not in the table stays as it is.
+#[test]
+fn a_table_sets_forty_devices_and_no_other() {
+    let devices = (1..=41).map(|node| format!("[[device]]\nkind = \"mh4\"\nnode = {node}\nserial = {}\n", 1000 + node));
+    let bench = Bench::described(&devices.collect::<String>());
+    let rows = (1..=40).map(|node| format!("0x47,1,{},{},\"{}ms\"\n", 1000 + node, 50 + node, 100 + node));
+    std::fs::write(bench.path("t.csv"), format!("vendor,product,serial,node,timer\n{}", rows.collect::<String>()))
+        .expect("a file");
+    let file = "[device]\nkind = \"mh4\"\n[node]\nheartbeat = \"500ms\"\n[tpdo.1]\nevent-timer = \"{timer}\"\n";
+    std::fs::write(bench.path("f.toml"), file).expect("a file");
+    let done = bench.run("config apply --table t.csv f.toml --address --store --record r.json --format json").exit(0);
+    let reports = done.json();
+    assert_eq!(reports.len(), 40);
+    let last = reports.iter().find(|report| report["serial"] == 1040).expect("the last row");
+    let settings = last["settings"].as_array().expect("rows");
+    let row = |key: &str| {
+        settings.iter().find(|row| row["setting"] == key).unwrap_or_else(|| panic!("{key}"))["after"].clone()
+    };
+    assert_eq!((row("tpdo.1.event-timer"), row("address.node-id")), ("140ms".into(), 90.into()));
+    assert_eq!(writes(&done).iter().filter(|frame| frame.starts_with("629")).count(), 0, "node 41 is not in the table");
+    let record: serde_json::Value = serde_json::from_str(&bench.text("r.json")).expect("JSON");
+    assert_eq!(record["devices"].as_array().map(Vec::len), Some(40));
+    assert_eq!(record["devices"][0]["before"]["node.heartbeat"], "0ms");
+    assert_eq!(record["devices"][0]["after"]["node.heartbeat"], "500ms");
+}
+
+#[test]
+fn a_wrong_table_is_refused_before_anything_is_sent() {
+    let bench = Bench::of(ALL);
+    std::fs::write(bench.path("f.toml"), "[device]\nkind = \"mh4\"\n[node]\nheartbeat = \"{beat}\"\n").expect("a file");
+    for (table, message) in [
+        ("vendor,serial\n1,2\n", "t.csv:1: no column \"product\""),
+        ("vendor,product,serial,beat\n71,1,0,500ms\n", "t.csv:2: serial: devices with the serial number 0"),
+        ("vendor,product,serial,beat\n71,x,5,500ms\n", "t.csv:2: product: \"x\" is not a number"),
+        ("vendor,product,serial,beat\n71,1,5,500ms\n71,1,5,500ms\n", "t.csv:3: the device with the serial number 5"),
+        ("vendor,product,serial,node,beat\n71,1,5,9,1s\n71,1,6,9,1s\n", "t.csv:3: node: two devices get the node-ID 9"),
+        (
+            "vendor,product,serial,node,beat\n866,4469072,5,127,1s\n",
+            "t.csv:2: node: 127 is the node-ID of a new device",
+        ),
+        ("vendor,product,serial\n71,1,5\n", "f.toml (row 2 of t.csv):4:13: node.heartbeat: the table has no value"),
+        ("vendor,product,serial,beat\n71,1,5,fast\n", "f.toml (row 2 of t.csv):4:13: node.heartbeat: \"fast\" is not"),
+        ("vendor,product,serial\n", "t.csv:1: the table has no devices"),
+    ] {
+        std::fs::write(bench.path("t.csv"), table).expect("a file");
+        let done = bench.run("config apply --table t.csv f.toml --address").exit(2);
+        assert!(done.stderr.starts_with(&format!("cangauge: {message}")), "{table}: {}", done.stderr);
+        assert_eq!(done.frames, [""; 0], "{table}");
+    }
+    std::fs::write(bench.path("t.csv"), "vendor,product,serial,beat\n71,1,5,500ms\n").expect("a file");
+    let done = bench.run("config apply --table t.csv f.toml").exit(3);
+    assert!(done.stderr.contains("no device with the serial number 5 answers"), "{}", done.stderr);
+    assert_eq!(writes(&done), [""; 0]);
+}
+
+#[test]
+fn the_record_can_be_a_page_and_the_schema_is_json() {
+    let bench = Bench::of(ALL);
+    std::fs::write(bench.path("f.toml"), FILE).expect("a file");
+    bench.run("config apply 1 f.toml --store --reset --record r.html").exit(0);
+    let page = bench.text("r.html");
+    assert!(page.contains("serial number 10001") && page.contains("read again after a reset"), "{page}");
+    assert!(page.contains("<td>node.heartbeat</td><td>0ms</td><td><strong>500ms</strong></td>"), "{page}");
+    let schema: serde_json::Value = serde_json::from_str(&bench.run("config schema").exit(0).stdout).expect("JSON");
+    for key in ["device", "address", "node", "signal", "tpdo", "object", "calibration"] {
+        assert!(schema["properties"][key].is_object(), "{key}");
+    }
+}

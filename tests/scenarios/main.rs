@@ -3,6 +3,7 @@
 mod answers;
 mod assign;
 mod bit_rates;
+mod config;
 mod detect;
 mod full_queue;
 mod garbage;

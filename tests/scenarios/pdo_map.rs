@@ -24,7 +24,7 @@ const TIMEOUT: Duration = Duration::from_millis(500);
 
 /// A fault at one frame that the program sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Fault {
+pub(super) enum Fault {
     None,
     /// The frame does not reach the device.
     LoseRequest,
@@ -51,11 +51,11 @@ enum Fault {
 }
 
 /// A bus with a fault at the n-th frame that is sent.
-struct FaultyBus {
-    bus: MemoryBus,
+pub(super) struct FaultyBus {
+    pub(super) bus: MemoryBus,
     fault: Fault,
     at: usize,
-    sent: Vec<Frame>,
+    pub(super) sent: Vec<Frame>,
     events: VecDeque<Event>,
     lose_next: bool,
     reset_next: bool,
@@ -63,6 +63,12 @@ struct FaultyBus {
 }
 
 impl FaultyBus {
+    /// A bus with a fault at the n-th frame sent.
+    pub(super) fn new(bus: MemoryBus, fault: Fault, at: usize) -> FaultyBus {
+        let (sent, events) = (Vec::new(), VecDeque::new());
+        FaultyBus { bus, fault, at, sent, events, lose_next: false, reset_next: false, away_until: None }
+    }
+
     fn is_away(&self) -> bool {
         self.away_until.is_some_and(|until| self.bus.now().mono < until)
     }
@@ -247,16 +253,7 @@ impl Case {
 
     /// Runs the request with a fault at the n-th frame.
     fn run(&self, start: bool, fault: Fault, at: usize) -> Outcome {
-        let mut faulty = FaultyBus {
-            bus: self.bus(start),
-            fault,
-            at,
-            sent: Vec::new(),
-            events: VecDeque::new(),
-            lose_next: false,
-            reset_next: false,
-            away_until: None,
-        };
+        let mut faulty = FaultyBus::new(self.bus(start), fault, at);
         let mut master = Master::new(&mut faulty, Timing::default());
         let result = map(&mut master, &self.request(), false, &Default::default());
         master.settle();
@@ -284,7 +281,7 @@ impl Outcome {
     }
 }
 
-fn is_write(frame: &Frame) -> bool {
+pub(super) fn is_write(frame: &Frame) -> bool {
     frame.id() == CanId::sdo_request(node()) && frame.data().first().is_some_and(|command| command >> 5 == 1)
 }
 

@@ -2,21 +2,26 @@
 
 use super::journal::{FileJournal, Folder, latest};
 use super::{Failures, described, document, mistakes, nodes_and_file, parse};
+use crate::bus::Wall;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::cli::args::Nodes;
-use crate::cli::exit::several_each;
+use crate::cli::exit::{IntoFailure, several_each};
+use crate::cli::file::ReportFile;
 use crate::cli::{Global, descriptions, open};
 use crate::device::config_file::Document;
 use crate::master::Master;
-use crate::node::Overrides;
+use crate::node::survey::identify_each;
+use crate::node::{Node, Overrides};
 use crate::output::config::{AppliedReport, LineReport};
+use crate::output::config_record::ConfigRecord;
 use crate::output::failure::ErrorMessage;
 use crate::output::notes;
 use crate::tasks::config::diff::check_offline;
 use crate::tasks::config::{Applied, ConfigFailure, Line, Options, Sections, Snapshot, Wishes, apply, lines, read};
 use crate::tasks::{Failure, Kind, Note};
 use clap::Args;
+use std::path::{Path, PathBuf};
 
 /// Set a device as a file says: check the file, write what differs, read everything back
 ///
@@ -25,7 +30,7 @@ use clap::Args;
 /// what was not; the same command continues, and --rollback goes back.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1 mh4.toml --store --reset\n  cangauge config apply 1-16 mh4.toml --store\n  cangauge config apply 1 --rollback"
+    after_help = "Examples:\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1 mh4.toml --store --reset\n  cangauge config apply 1-16 mh4.toml --store\n  cangauge config apply --table forty.csv mh4.toml --address --store --record forty.html\n  cangauge config apply 1 --rollback"
 )]
 pub(super) struct Apply {
     /// Nodes (5, 0x7f, 1-16, 1,5, all), and the file
@@ -52,8 +57,36 @@ pub(super) struct Apply {
     /// Go back to the settings before the last apply that failed or was killed
     #[arg(long, conflicts_with_all = ["exact", "address", "with_calibration"])]
     rollback: bool,
+    /// Set many devices, one row each: vendor, product, serial, node (with --address), and columns that fill in
+    /// "{column}" in the file. A device that is not in the table is not changed
+    #[arg(long, value_name = "FILE.csv", conflicts_with = "rollback")]
+    table: Option<PathBuf>,
+    /// Write a record: when, which devices, before, after, how it was verified; HTML if the name ends with .html, else
+    /// JSON
+    #[arg(long, value_name = "FILE", conflicts_with = "dry_run")]
+    record: Option<PathBuf>,
     #[command(flatten)]
     folder: Folder,
+}
+
+/// One device to set.
+struct Job {
+    node: NodeId,
+    /// `None`: the journal.
+    document: Option<Document>,
+    /// The file, for messages.
+    label: String,
+}
+
+/// The results, and the failures of each device.
+type Results = (Vec<Outcome>, Failures);
+
+/// Checks what a file says against the description of the device that it names. Needs no bus.
+fn check_before(document: &Document, file: &str) -> anyhow::Result<()> {
+    match described(document) {
+        Some(node) => check_offline(document, &node).map_err(|found| mistakes(file, found)),
+        None => Ok(()),
+    }
 }
 
 /// What was done with one node.
@@ -72,47 +105,113 @@ impl Apply {
     }
 
     pub(super) fn claim(&self) -> Claim {
-        self.nodes().map_or(Claim::Nothing, |nodes| nodes.claim())
+        match &self.table {
+            Some(_) => Claim::every_node(),
+            None => self.nodes().map_or(Claim::Nothing, |nodes| nodes.claim()),
+        }
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let record = self.record.as_ref().map(|path| ReportFile::create(path, false)).transpose()?;
+        let (asked, (bus, time), (done, failures)) = match &self.table {
+            Some(table) => self.by_table(global, table)?,
+            None => self.by_nodes(global)?,
+        };
+        if let (Some(file), Some(path)) = (record, &self.record) {
+            let applied = done.iter().filter_map(|outcome| match outcome {
+                Outcome::Applied(applied) => Some(&**applied),
+                Outcome::Lines(..) => None,
+            });
+            let record = ConfigRecord {
+                time,
+                bus: bus,
+                file: self.words.last().cloned().unwrap_or_default(),
+                done: applied.collect(),
+                failed: failures.iter().flatten().map(|failure| ErrorMessage::of(failure).message).collect(),
+            };
+            let is_html = path.extension().is_some_and(|extension| extension == "html");
+            file.write(if is_html { record.html() } else { record.json() }.as_bytes())?;
+        }
+        self.report(global, done)?;
+        Ok(several_each(asked, failures)?)
+    }
+
+    /// Sets the nodes that the user named.
+    fn by_nodes(&self, global: &Global) -> anyhow::Result<(usize, (String, Wall), Results)> {
         let Some(nodes) = self.nodes() else { return Err(self.usage().into()) };
+        let label = self.words.last().cloned().unwrap_or_default();
         let document = match nodes_and_file(&self.words).filter(|_| !self.rollback) {
-            Some((_, file)) => {
-                let document = document(file)?;
-                if let Some(node) = described(&document) {
-                    check_offline(&document, &node).map_err(|found| mistakes(file, found))?;
-                }
-                Some(document)
-            }
+            Some((_, file)) => Some(document(file)?),
             None => None,
         };
+        document.as_ref().map_or(Ok(()), |document| check_before(document, &label))?;
         let is_one = matches!(&nodes, Nodes::These(nodes) if nodes.len() == 1);
         if self.address && !is_one {
-            let message = "--address is for one node: two nodes cannot have the same node-ID";
+            let message = "--address is for one node, or for a --table: two nodes cannot have the same node-ID";
             return Err(ErrorMessage::usage(message).into());
         }
-        let (asked, done, failures) = global.with_master(|master| {
+        global.with_master(|master| {
             let nodes = open::nodes(master, global, &nodes)?;
             let overrides = descriptions::overrides_on(master, global, &nodes)?;
-            let (mut done, mut failures) = (Vec::new(), Failures::new());
-            for &node in &nodes {
-                match self.one(global, master, node, document.as_ref(), &overrides) {
-                    Ok(outcome) => done.push(outcome),
-                    Err(of_node) => {
-                        let ends =
-                            of_node.iter().any(|failure| matches!(failure.kind(), Kind::Interrupted | Kind::Bus));
-                        failures.push(of_node);
-                        if ends {
-                            break;
-                        }
+            let job = |node: &NodeId| Job { node: *node, document: document.clone(), label: label.clone() };
+            let results = self.work(global, master, nodes.iter().map(job).collect(), &overrides);
+            Ok((nodes.len(), ended(master), results))
+        })
+    }
+
+    /// Sets the devices of a table, which are found by their identity.
+    fn by_table(&self, global: &Global, table: &Path) -> anyhow::Result<(usize, (String, Wall), Results)> {
+        let [file] = self.words.as_slice() else {
+            return Err(
+                ErrorMessage::usage("--table replaces NODES: cangauge config apply --table FILE.csv FILE").into()
+            );
+        };
+        let rows = super::table::read(table, file, self.address)?;
+        rows.iter().try_for_each(|row| check_before(&row.document, &row.label))?;
+        global.with_master(|master| {
+            let nodes = open::all(master, global)?;
+            let overrides = descriptions::overrides_on(master, global, &nodes)?;
+            let found = identify_each(master, &nodes, &overrides).or_fail()?;
+            let found: Vec<Node> = found.into_iter().filter_map(Result::ok).collect();
+            let (mut jobs, mut failures) = (Vec::new(), Failures::new());
+            let asked = rows.len();
+            for row in rows {
+                let [vendor, product, serial] = row.identity.map(Some);
+                let is_this = |node: &&Node| {
+                    let identity = &node.identity;
+                    (identity.vendor, identity.product, identity.serial) == (vendor, product, serial)
+                };
+                let own: Vec<NodeId> = found.iter().filter(is_this).map(|node| node.id).collect();
+                match own[..] {
+                    [node] => jobs.push(Job { node, document: Some(row.document), label: row.label }),
+                    _ => {
+                        let cause = ConfigFailure::NotOneDevice { serial: row.identity[2], nodes: own };
+                        failures.push(vec![Failure::general(cause)]);
                     }
                 }
             }
-            Ok((nodes.len(), done, failures))
-        })?;
-        self.report(global, done)?;
-        Ok(several_each(asked, failures)?)
+            let (done, failed) = self.work(global, master, jobs, &overrides);
+            failures.extend(failed);
+            Ok((asked, ended(master), (done, failures)))
+        })
+    }
+
+    /// Works on one device after the other. A bus failure or Ctrl-C ends it.
+    fn work(&self, global: &Global, master: &mut Master<'_>, jobs: Vec<Job>, overrides: &Overrides) -> Results {
+        let (mut done, mut failures) = (Vec::new(), Failures::new());
+        for job in &jobs {
+            match self.one(global, master, job, overrides) {
+                Ok(outcome) => done.push(outcome),
+                Err(of_node) => {
+                    let ends = of_node.iter().any(|failure| matches!(failure.kind(), Kind::Interrupted | Kind::Bus));
+                    failures.push(of_node);
+                    if ends {
+                        break;
+                    }
+                }
+            }
+        }
+        (done, failures)
     }
 
     fn usage(&self) -> ErrorMessage {
@@ -143,21 +242,21 @@ impl Apply {
         }
     }
 
-    /// Works on one node.
+    /// Works on one device.
     fn one(
         &self,
         global: &Global,
         master: &mut Master<'_>,
-        node: NodeId,
-        document: Option<&Document>,
+        job: &Job,
         overrides: &Overrides,
     ) -> Result<Outcome, Vec<Failure>> {
         let one = |failure: Failure| vec![failure];
+        let node = job.node;
         master.listen_to(&[node]).map_err(|error| one(error.into()))?;
-        let snapshot = read(master, node, overrides, document).map_err(one)?;
+        let snapshot = read(master, node, overrides, job.document.as_ref()).map_err(one)?;
         let mut journal = FileJournal::new(&self.folder, master.bus().name(), &snapshot, global);
-        let (file, document) = match document {
-            Some(document) => (self.words.last().cloned().unwrap_or_default(), document.clone()),
+        let (file, document) = match &job.document {
+            Some(document) => (job.label.clone(), document.clone()),
             None => {
                 let (file, text) = latest(&self.folder, master.bus().name(), &snapshot).map_err(one)?;
                 let unreadable = || Failure::at(node, ConfigFailure::Journal { reason: file.clone() });
@@ -202,6 +301,12 @@ impl Apply {
         }
         Ok(())
     }
+}
+
+/// The name of the bus, and its time.
+fn ended(master: &mut Master<'_>) -> (String, Wall) {
+    let bus = master.bus();
+    (bus.name().to_owned(), bus.now().wall)
 }
 
 /// The text of a snapshot, for the journal.

@@ -36,6 +36,13 @@ pub(super) fn words(cause: &ConfigFailure) -> Words {
             Words::new(format!("on the bus: node {}: nothing was changed", list.join(", ")))
                 .hint("a node-ID must be free, and a bit rate is only set on a bus with one node")
         }
+        ConfigFailure::NotOneDevice { serial, nodes } if nodes.is_empty() => {
+            Words::new(format!("no device with the serial number {serial} answers")).hint("find it: cangauge scan")
+        }
+        ConfigFailure::NotOneDevice { serial, nodes } => {
+            let list: Vec<String> = nodes.iter().map(ToString::to_string).collect();
+            Words::new(format!("several devices have the serial number {serial}: node {}", list.join(", ")))
+        }
         ConfigFailure::Journal { reason } => Words::new(format!("the journal cannot be written: {reason}")),
         ConfigFailure::NoJournal => Words::new("nothing to roll back: the last change of this device was complete"),
     }
@@ -89,6 +96,7 @@ fn of_problem(problem: &Problem) -> Words {
         Problem::Entries { high } => format!("the device maps at most {high} objects in this TPDO"),
         Problem::Mapping(cause) => return super::words(cause),
         Problem::NotMappable { object, text } => format!("the device cannot map {text} ({object}) here"),
+        Problem::NoColumn { column } => format!("the table has no value for {{{column}}}"),
         Problem::Fixed { present: Some(present) } => format!("the device has {present} and cannot change it"),
         Problem::Fixed { present: None } => "the device cannot change it".to_owned(),
         Problem::Crossed { other, value } => format!("beyond {other}, which is {value}"),

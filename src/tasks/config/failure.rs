@@ -46,6 +46,13 @@ pub enum ConfigFailure {
         /// The other nodes.
         nodes: Vec<NodeId>,
     },
+    /// No device, or several, have the identity of a row of a table.
+    NotOneDevice {
+        /// The serial number.
+        serial: u32,
+        /// The nodes with this identity.
+        nodes: Vec<NodeId>,
+    },
     /// The journal could not be written.
     Journal {
         /// The reason.
@@ -96,6 +103,8 @@ impl ConfigFailure {
             ConfigFailure::Condition { .. } | ConfigFailure::OthersOnBus { .. } | ConfigFailure::NoJournal => {
                 Kind::CheckFailed
             }
+            ConfigFailure::NotOneDevice { nodes, .. } if nodes.is_empty() => Kind::NoAnswer,
+            ConfigFailure::NotOneDevice { .. } => Kind::CheckFailed,
             ConfigFailure::NotKept { .. } => Kind::Unexpected,
             ConfigFailure::Journal { .. } => Kind::Io,
         }

@@ -147,6 +147,11 @@ pub enum Problem {
         /// The entry as the file writes it.
         text: String,
     },
+    /// The table has no such column, or the cell is empty.
+    NoColumn {
+        /// The column.
+        column: String,
+    },
     /// The value is fixed.
     Fixed {
         /// The value of the device; `None` if it is unknown.

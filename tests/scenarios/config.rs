@@ -1,0 +1,200 @@
+//! `config apply` on the four devices: there and back, and with a fault at every write.
+
+use super::pdo_map::{Fault, FaultyBus, is_write};
+use cangauge::bus::memory::{Clock, MemoryBus};
+use cangauge::bus::{Bus, Event, Mono};
+use cangauge::canopen::id::NodeId;
+use cangauge::device::catalog::by_name;
+use cangauge::device::config_file::Document;
+use cangauge::device::scalar::Scalar;
+use cangauge::master::{Master, Timing};
+use cangauge::node::Overrides;
+use cangauge::output::config::write_toml;
+use cangauge::output::failure::ErrorMessage;
+use cangauge::sim::{Device, Setup};
+use cangauge::tasks::config::{Applied, Journal, Options, Sections, Snapshot, apply, read};
+use cangauge::tasks::restore::restore;
+use cangauge::tasks::store::Group;
+use cangauge::tasks::{Failure, Kind};
+use std::time::Duration;
+
+/// The node of `FaultyBus`.
+const NODE: u8 = 5;
+
+/// A device, and a file that changes every kind of its settings.
+const DEVICES: [(&str, &str); 4] = [
+    (
+        "mh4",
+        "[node]\nheartbeat = \"500ms\"\nemcy-inhibit-time = \"5ms\"\nstartup = \"auto\"\n[signal.pressure]\nunit = \"psi\"\n\
+         digits = 2\nfilter = \"moving\"\nfilter-constant = 8\nlower = \"20 psi\"\nupper = \"2 bar\"\ndelta = 0.5\n\
+         [signal.temperature]\nunit = \"K\"\nlower = \"300 K\"\nupper = \"40 degC\"\n[tpdo.1]\n\
+         signals = [\"pressure\", \"temperature\"]\ntransmission = \"timer\"\nevent-timer = \"100ms\"\n\
+         [tpdo.2]\nenabled = false\n",
+    ),
+    (
+        "d20",
+        "[node]\nguard-time = \"0ms\"\nheartbeat = \"250ms\"\n[signal.pressure]\nfilter-constant = 5\ndigits = 2\n\
+         [tpdo.1]\nsignals = [\"pressure\"]\ntransmission = \"timer\"\nevent-timer = \"20ms\"\n[object]\n\
+         maximum-allowed-pressure = \"20.5 bar\"\n",
+    ),
+    (
+        "mc1609",
+        "[node]\nheartbeat = \"500ms\"\n[signal.ch2]\nfilter = \"moving\"\nfilter-constant = 9\n[tpdo.3]\n\
+         signals = [\"ch16\", \"ch1\"]\ntransmission = \"sync:3\"\nevent-timer = \"250ms\"\n[tpdo.4]\nenabled = false\n",
+    ),
+    (
+        "dps",
+        "[node]\nheartbeat = \"500ms\"\n[signal.pressure]\nunit = \"bar\"\nspan-end = \"5 bar\"\nspan-start = 1\n\
+         [tpdo.1]\nevent-timer = \"40ms\"\ntransmission = \"sync:2\"\n",
+    ),
+];
+
+struct NoJournal;
+
+impl Journal for NoJournal {
+    fn begin(&mut self, _: &Snapshot) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    fn finish(&mut self) {}
+}
+
+fn node(number: u8) -> NodeId {
+    NodeId::new(number).expect("a node-ID")
+}
+
+fn attach(bus: &mut MemoryBus, device: &str, number: u8, set: &[(&str, Scalar)], serial: Option<u32>) {
+    let mut setup = Setup::new(by_name(device).expect("built in"), node(number));
+    setup.set = set.iter().map(|(at, value)| (at.parse().expect("an object"), value.clone())).collect();
+    setup.serial = serial.unwrap_or(setup.serial);
+    bus.attach(Device::new(setup).expect("a device"));
+}
+
+fn bus(device: &str) -> MemoryBus {
+    let mut bus = MemoryBus::new(Clock::Virtual);
+    attach(&mut bus, device, NODE, &[], None);
+    while bus.receive(Mono::at(Duration::from_millis(20))).expect("the bus works") != Event::Timeout {}
+    bus
+}
+
+fn snapshot(bus: &mut dyn Bus, number: u8) -> Result<Snapshot, Failure> {
+    let mut master = Master::new(bus, Timing::default());
+    read(&mut master, node(number), &Overrides::new(), None)
+}
+
+/// The dump without `[calibration]` and what differs between devices of one kind.
+fn dump(bus: &mut dyn Bus, number: u8) -> String {
+    let mut text = Vec::new();
+    write_toml(&snapshot(bus, number).expect("read").dump(false), &mut text).expect("memory");
+    let text = String::from_utf8(text).expect("text");
+    let text = text.split("\n[calibration]").next().unwrap_or_default().to_owned();
+    let is_own = |line: &&str| !line.starts_with("node-id") && !line.starts_with("# revision");
+    text.lines().filter(is_own).collect::<Vec<_>>().join("\n")
+}
+
+fn set(bus: &mut dyn Bus, number: u8, file: &str, options: &Options) -> Result<Applied, Failure> {
+    let document = Document::parse(file).expect("TOML");
+    let mut master = Master::new(bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
+    let now = read(&mut master, node(number), &Overrides::new(), Some(&document))?;
+    let wishes = now.check(&document).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+    apply(&mut master, now, &wishes, options, &Overrides::new(), &mut NoJournal)
+}
+
+fn stored() -> Options {
+    Options { store: true, reset: false, ..Options::default() }
+}
+
+#[test]
+fn dump_defaults_apply_dump_is_the_same_file() {
+    for (device, file) in DEVICES {
+        let mut bus = bus(device);
+        let delivered = dump(&mut bus, NODE);
+        set(&mut bus, NODE, file, &stored()).unwrap_or_else(|failure| panic!("{device}: {failure}"));
+        let wanted = dump(&mut bus, NODE);
+        assert_ne!(wanted, delivered, "{device}");
+        let before = snapshot(&mut bus, NODE).expect("read").node;
+        let mut master = Master::new(&mut bus, Timing::default());
+        restore(&mut master, &before, Group::All, true).unwrap_or_else(|failure| panic!("{device}: {failure}"));
+        drop(master);
+        assert_ne!(dump(&mut bus, NODE), wanted, "{device}");
+        set(&mut bus, NODE, &wanted, &stored()).unwrap_or_else(|failure| panic!("{device}: {failure}"));
+        assert_eq!(dump(&mut bus, NODE), wanted, "{device}");
+        let again = set(&mut bus, NODE, &wanted, &Options::default()).expect("nothing to do");
+        assert_eq!(again.rows, [], "{device}");
+    }
+}
+
+#[test]
+fn a_replacement_gets_all_settings_except_the_calibration() {
+    let offsets = [("mh4", "0x6127:1"), ("d20", "0x6124:1"), ("dps", "0x6124:1")];
+    for (device, file) in DEVICES {
+        let mut old = bus(device);
+        set(&mut old, NODE, file, &stored()).unwrap_or_else(|failure| panic!("{device}: {failure}"));
+        let wanted = dump(&mut old, NODE);
+        let mut new = MemoryBus::new(Clock::Virtual);
+        let offset = offsets.iter().find(|(name, _)| *name == device);
+        let value = if device == "dps" { Scalar::Integer(3) } else { Scalar::Real(0.25) };
+        let values: Vec<(&str, Scalar)> = offset.map(|(_, object)| (*object, value)).into_iter().collect();
+        attach(&mut new, device, 9, &values, Some(77));
+        let before = snapshot(&mut new, 9).expect("read");
+        set(&mut new, 9, &wanted, &stored()).unwrap_or_else(|failure| panic!("{device}: {failure}"));
+        assert_eq!(dump(&mut new, 9), wanted, "{device}");
+        let after = snapshot(&mut new, 9).expect("read");
+        let own = |snapshot: &Snapshot| -> Vec<_> {
+            let rows = snapshot.dump(false).rows.into_iter();
+            rows.filter(|row| row.key.ends_with(".offset") && device == "d20").map(|row| row.value).collect()
+        };
+        assert_eq!(own(&before), own(&after), "{device}: the offset is that of the new device");
+    }
+}
+
+/// A fault at every write, three of seven kinds in turn: success is the state of the device, and a second run ends in the wanted state.
+#[test]
+fn an_interrupted_apply_is_completed_by_the_next_one() {
+    let refusal = Fault::Refuse(0x0800_0000);
+    let faults =
+        [refusal, Fault::LoseRequest, Fault::LoseAnswer, Fault::Interrupt, Fault::ResetBefore, Fault::ResetAfter];
+    let away = Fault::Away(Duration::from_secs(2));
+    for (device, file) in DEVICES {
+        let mut clean = FaultyBus::new(bus(device), Fault::None, 0);
+        set(&mut clean, NODE, file, &Options::default()).unwrap_or_else(|failure| panic!("{device}: {failure}"));
+        let wanted = dump(&mut clean.bus, NODE);
+        let writes: Vec<usize> = (0..clean.sent.len()).filter(|at| is_write(&clean.sent[*at])).collect();
+        assert!(writes.len() > 3, "{device}");
+        for (turn, at) in writes.into_iter().enumerate() {
+            for fault in faults.into_iter().chain([away]).cycle().skip(3 * turn).take(3) {
+                let told = format!("{device} {fault:?} at {at}: {}", clean.sent[at]);
+                let mut faulty = FaultyBus::new(bus(device), fault, at);
+                let result = set(&mut faulty, NODE, file, &Options::default());
+                let mut bus = faulty.bus;
+                // The device boots, and answers that were late arrive.
+                let until = Mono::at(bus.now().mono.since_start() + Duration::from_secs(3));
+                while bus.receive(until).expect("the bus works") != Event::Timeout {}
+                match &result {
+                    Ok(_) => assert_eq!(dump(&mut bus, NODE), wanted, "{told}: reported as done"),
+                    Err(failure) => {
+                        assert_ne!(failure.kind(), Kind::Usage, "{told}");
+                        assert!(!ErrorMessage::of(failure).message.is_empty(), "{told}");
+                    }
+                }
+                set(&mut bus, NODE, file, &Options::default()).unwrap_or_else(|failure| panic!("{told}: {failure}"));
+                assert_eq!(dump(&mut bus, NODE), wanted, "{told}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_address_is_set_last_and_confirmed() {
+    for (device, new) in [("mh4", 12), ("dps", 13)] {
+        let mut bus = bus(device);
+        let file =
+            format!("[address]\nnode-id = {new}\n[node]\nheartbeat = \"500ms\"\n[tpdo.1]\nevent-timer = \"60ms\"\n");
+        let options =
+            Options { sections: Sections { address: true, calibration: false }, store: true, ..Options::default() };
+        let applied = set(&mut bus, NODE, &file, &options).unwrap_or_else(|failure| panic!("{device}: {failure}"));
+        assert_eq!(applied.after.node.id, node(new), "{device}");
+        let again = set(&mut bus, new, &file, &options).unwrap_or_else(|failure| panic!("{device}: {failure}"));
+        assert_eq!(again.rows, [], "{device}");
+    }
+}
