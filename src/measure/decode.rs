@@ -9,7 +9,7 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{Field, lay_out};
 use crate::canopen::value::DataType;
 use crate::device::unit::Unit;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 /// A requested value of a node.
@@ -89,6 +89,8 @@ pub struct Decoder {
     sources: Vec<Source>,
     /// COB-IDs of two nodes that were not reported yet.
     shared: BTreeMap<CanId, (NodeId, NodeId)>,
+    /// Overloads that nodes report by emergencies, each with its channel if it has one.
+    overloads: BTreeSet<(NodeId, Option<u8>)>,
 }
 
 /// Lengths of TPDOs that differ from their mapping: the first one, and whether there were others.
@@ -169,6 +171,30 @@ impl Decoder {
     /// Removes the TPDOs of a node.
     pub fn remove(&mut self, node: NodeId) {
         self.tpdos.retain(|_, tpdo| tpdo.node != node);
+    }
+
+    /// A node reports an overload of a channel; `None` if the emergency names no channel.
+    pub fn begin_overload(&mut self, node: NodeId, channel: Option<u8>) {
+        self.overloads.insert((node, channel));
+    }
+
+    /// Takes what the error register of a node says about an overload.
+    pub fn set_overload(&mut self, node: NodeId, has_overload: bool) {
+        self.end_overload(node);
+        if has_overload {
+            self.begin_overload(node, None);
+        }
+    }
+
+    /// A node reports no overload any more.
+    pub fn end_overload(&mut self, node: NodeId) {
+        self.overloads.retain(|(of, _)| *of != node);
+    }
+
+    /// Gives a sample the status of the overloads that its node reports.
+    pub fn report_overloads(&self, node: NodeId, reading: &Reading, sample: &mut Sample) {
+        let of_node = self.overloads.iter().filter(|(of, _)| *of == node);
+        of_node.for_each(|(_, channel)| reading.report_overload(sample, *channel));
     }
 
     /// The setup of a node may have changed: its TPDOs make no samples until [`Decoder::replace`].
@@ -295,7 +321,12 @@ impl Decoder {
         for value in &tpdo.values {
             let Some((bytes, len)) = value.field.bytes(data) else { continue };
             let status = value.status.and_then(|status| status.bytes(data)).map(|(bits, _)| u64::from_le_bytes(bits));
-            samples.extend(value.reading.sample(received.at, &bytes[..len], status));
+            let mut sample = value.reading.sample(received.at, &bytes[..len], status);
+            if let Some(sample) = &mut sample {
+                let of_node = self.overloads.iter().filter(|(of, _)| *of == tpdo.node);
+                of_node.for_each(|(_, channel)| value.reading.report_overload(sample, *channel));
+            }
+            samples.extend(sample);
         }
         Decoded::Tpdo(tpdo.node)
     }

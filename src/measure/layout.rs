@@ -84,6 +84,11 @@ pub enum MeasuringRange {
 }
 
 impl Signal {
+    /// Whether the device reports no status: neither by a status object nor by a marker.
+    pub fn has_no_status(&self) -> bool {
+        self.status.is_none() && !self.marker
+    }
+
     /// Whether `object` holds the process value of this signal.
     ///
     /// True for the described objects, and for the four process value families of CiA 404 (6130h REAL32, 7130h

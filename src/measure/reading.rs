@@ -12,6 +12,8 @@ use crate::device::scale::Scale;
 pub struct Reading {
     /// The number of the source.
     pub source: usize,
+    /// The channel of a measured signal; `None` for other numbers.
+    channel: Option<u8>,
     data_type: Option<DataType>,
     scaling: Scaling,
     marker: bool,
@@ -45,6 +47,7 @@ impl Reading {
     pub fn of_signal(signal: &Signal, data_type: Option<DataType>, source: usize) -> Reading {
         Reading {
             source,
+            channel: Some(signal.channel),
             data_type,
             scaling: match signal.rules.scaling {
                 Rule::Digits => Scaling::Digits(signal.digits),
@@ -70,7 +73,7 @@ impl Reading {
     pub fn plain(data_type: Option<DataType>, source: usize) -> Reading {
         let range = MeasuringRange::Unknown;
         let rules = Rules::default();
-        Reading { source, data_type, scaling: Scaling::Plain, marker: false, has_status: true, range, rules }
+        Reading { source, channel: None, data_type, scaling: Scaling::Plain, marker: false, has_status: true, range, rules }
     }
 
     /// The data type of the value; `None` if no source states it.
@@ -140,6 +143,15 @@ impl Reading {
         self.rules.markers.status_bits(number)
     }
 
+    /// Gives the sample the status of an overload that the device reports for a channel (`None`: for all) by an
+    /// emergency or its error register. A signal with a status of its own keeps that.
+    pub fn report_overload(&self, sample: &mut Sample, channel: Option<u8>) {
+        let is_meant = self.channel.is_some_and(|own| channel.is_none_or(|channel| channel == own));
+        if let Some(value) = sample.value.filter(|_| is_meant && !self.has_status && !self.marker) {
+            sample.status = Some(sample.status.unwrap_or(self.range.nearer_end(value.as_f64())));
+        }
+    }
+
     /// Whether the measuring range goes beyond a value at the end of its type.
     fn range_goes_beyond(&self, value: f64) -> bool {
         match self.range {
@@ -163,6 +175,12 @@ impl MeasuringRange {
         } else {
             None
         }
+    }
+
+    /// The overload of a value that the device reports as one: at the nearer end of the range, else by its sign.
+    fn nearer_end(self, value: f64) -> Status {
+        let middle = if let MeasuringRange::Known(start, end) = self { f64::midpoint(start, end) } else { 0.0 };
+        if value < middle { Status::OverloadLow } else { Status::OverloadHigh }
     }
 }
 
@@ -289,5 +307,26 @@ mod tests {
         assert_eq!(sample(&dps, I32, &(-5000i32).to_le_bytes(), None), ("-5.000".into(), "overload-low"));
         assert_eq!(sample(&dps, I32, &104_000i32.to_le_bytes(), None), ("104.000".into(), "overload-high"));
         assert_eq!(sample(&dps, I32, &103_000i32.to_le_bytes(), None), ("103.000".into(), ""));
+    }
+
+    #[test]
+    fn reported_overload_is_the_status_of_a_signal_without_one() {
+        let status = |signal: &Signal, mantissa: i32, channel: Option<u8>| {
+            let reading = Reading::of_signal(signal, Some(I32), 0);
+            let bytes = mantissa.to_le_bytes();
+            let mut sample = reading.sample(Stamp::default(), &bytes, None).expect("a number");
+            reading.report_overload(&mut sample, channel);
+            assert!(sample.value.is_some(), "the value stays");
+            sample.status.map_or("", Status::as_str)
+        };
+        let dps = signal(Some(3), MeasuringRange::Known(0.0, 100.0));
+        assert_eq!(status(&dps, 99_000, None), "overload-high");
+        assert_eq!(status(&dps, 1_000, Some(1)), "overload-low");
+        assert_eq!(status(&dps, 1_000, Some(2)), "", "another channel");
+        assert_eq!(status(&signal(Some(3), UNKNOWN), 102_000, None), "overload-high");
+        assert_eq!(status(&signal(Some(3), UNKNOWN), -1, None), "overload-low");
+        let with_status = Signal { status: Some(ObjectId::new(0x6150, 1)), ..dps.clone() };
+        assert_eq!(status(&with_status, 1_000, None), "");
+        assert_eq!(status(&Signal { marker: true, ..dps }, 1_000, None), "ok");
     }
 }

@@ -124,6 +124,11 @@ impl Status {
         (status, valid && bits & 0b110 != 0b110)
     }
 
+    /// Whether the value is outside the measuring range.
+    pub fn is_overload(self) -> bool {
+        matches!(self, Status::OverloadHigh | Status::OverloadLow)
+    }
+
     /// The word in files and tables.
     pub fn as_str(self) -> &'static str {
         match self {

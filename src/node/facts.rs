@@ -68,6 +68,8 @@ pub struct Node {
     pub heartbeat_ms: Option<u16>,
     /// The CAN-ID of its emergencies (1014h, else 080h + node-ID).
     pub emergency: CanId,
+    /// Whether the error register (1001h) reports an overload that no status object reports.
+    pub has_overload: bool,
     /// The CAN-ID of the SYNC that it receives (1005h, else 080h).
     pub sync: CanId,
     /// The synchronous counter overflow value (1019h), 2 to 240; `None` if the node expects SYNC without a counter.
@@ -86,6 +88,7 @@ impl Node {
             tpdos: Vec::new(),
             heartbeat_ms: None,
             emergency: CanId::emergency(id),
+            has_overload: false,
             sync: CanId::SYNC,
             sync_overflow: None,
         }

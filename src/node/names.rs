@@ -14,6 +14,15 @@ use crate::measure::layout::{PROCESS_VALUES, Signal};
 use std::collections::BTreeSet;
 
 impl Node {
+    /// 1001h.
+    pub const ERROR_REGISTER: ObjectId = ObjectId::new(0x1001, 0);
+
+    /// The bits of the error register that mean an overload, if the node has a signal without a status of its own.
+    pub fn overload_register(&self) -> Option<u8> {
+        let needs_it = self.signals.iter().any(Signal::has_no_status) && self.may_have(Node::ERROR_REGISTER);
+        self.model.as_ref().filter(|_| needs_it)?.description.overload_register()
+    }
+
     /// The entry of an object, from the description or the standard. Asks the node nothing.
     pub fn entry(&self, object: ObjectId) -> Option<Entry> {
         let described = self.model.as_ref().and_then(|model| model.dictionary.get(object).cloned());

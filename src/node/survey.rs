@@ -4,6 +4,7 @@
 //! answers, or a [`BackgroundSurvey`], which does not wait.
 
 mod background;
+mod overload;
 
 use super::read::{Item, ask_optional, read_known, read_optional, read_values};
 use super::{Identity, Node, signals};
@@ -133,6 +134,7 @@ pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overri
     find_signals(master, &mut found)?;
     read_units(master, &mut found)?;
     read_ranges(master, &mut found)?;
+    overload::read_overloads(master, &mut found)?;
     Ok(found)
 }
 
@@ -430,7 +432,7 @@ fn read_ranges<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop
 fn needs_range(node: &Node, signal: &Signal) -> bool {
     let is_narrow = |data_type: Option<DataType>| matches!(data_type, Some(DataType::Integer(1..=3)));
     let mut mapped = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
-    let has_no_status = node.model.is_some() && signal.status.is_none() && !signal.marker;
+    let has_no_status = node.model.is_some() && signal.has_no_status();
     has_no_status
         || is_narrow(signal.value.1)
         || mapped.any(|entry| signal.is_value(entry.object) && is_narrow(node.mapped_type(entry.object, entry.bits)))

@@ -141,7 +141,7 @@ fn check_reading(master: &mut Master<'_>, options: &CheckOptions) -> Result<Chec
     let mut remarks = Vec::new();
     for target in &all {
         let value = answers.next();
-        let status = target.status.and_then(|_| answers.next());
+        let status = target.second_object().and_then(|_| answers.next());
         match value.map(|value| sample(target, value, status)) {
             Some(Ok(sample)) => {
                 let name = target.source.signal.to_string();

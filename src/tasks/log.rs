@@ -243,6 +243,7 @@ pub fn log(
             recording.decoder.add(node.layout(), &wanted);
         }),
     }
+    recording.take_overloads();
     recording.update_sources();
     recording.excuse_nodes_without_signals();
     observer.sources(recording.decoder.sources())?;

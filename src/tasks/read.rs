@@ -30,11 +30,26 @@ pub struct Target {
     pub status: Option<ObjectId>,
     /// The type of the status.
     pub status_type: DataType,
+    /// The bits of the error register (1001h) that mean an overload, if the signal has no status object. The register is
+    /// read as well.
+    pub overload_register: Option<u8>,
     /// How the bytes become a sample.
     pub reading: Reading,
 }
 
 impl Target {
+    /// The object that is read in addition to the value: the status, or the error register.
+    pub fn second_object(&self) -> Option<ObjectId> {
+        self.status.or(self.overload_register.map(|_| Node::ERROR_REGISTER))
+    }
+
+    /// Whether an answer with the error register reports an overload.
+    pub fn reports_overload(&self, register: Option<&Result<Answer, SdoError>>) -> bool {
+        let Some((Ok(answer), mask)) = register.zip(self.overload_register) else { return false };
+        let value = answer.value(self.source.node, Node::ERROR_REGISTER, Some(DataType::Unsigned(1)));
+        value.ok().and_then(|(bits, _)| bits.as_u64()).is_some_and(|bits| bits & u64::from(mask) == u64::from(mask))
+    }
+
     /// A value in another unit.
     ///
     /// # Errors
@@ -77,6 +92,7 @@ pub fn targets(node: &Node, wanted: &[Wanted], number: &mut usize) -> Result<Vec
                         object,
                         status: signal.status,
                         status_type: status_type(node, signal.status),
+                        overload_register: node.overload_register().filter(|_| signal.has_no_status()),
                         reading: Reading::of_signal(signal, data_type, next_number()),
                     }
                 }
@@ -105,7 +121,8 @@ fn plain(node: &Node, object: ObjectId, name: &str, number: usize) -> Target {
 }
 
 fn typed(node: &Node, object: ObjectId, name: &str, reading: Reading) -> Target {
-    Target { source: source(node.id, name, None), unit: None, object, status: None, status_type: U8, reading }
+    let (status, status_type, overload_register) = (None, U8, None);
+    Target { source: source(node.id, name, None), unit: None, object, status, status_type, overload_register, reading }
 }
 
 const U8: DataType = DataType::Unsigned(1);
@@ -147,7 +164,8 @@ pub fn sample(
         return sample.ok_or_else(not_a_number);
     };
     let (number, _) = answer.value(node, target.object, Some(data_type))?;
-    let bits = match status {
+    let is_overload = target.reports_overload(status.as_ref());
+    let bits = match status.filter(|_| target.status.is_some()) {
         None | Some(Err(SdoError { failure: SdoFailure::Refused(_), .. })) => None,
         Some(Err(error)) => return Err(error),
         Some(Ok(answer)) => {
@@ -156,7 +174,11 @@ pub fn sample(
         }
     };
     let bytes = wire_bytes(&number, data_type);
-    target.reading.sample(answer.at, &bytes, bits).ok_or_else(not_a_number)
+    let mut sample = target.reading.sample(answer.at, &bytes, bits).ok_or_else(not_a_number)?;
+    if is_overload {
+        target.reading.report_overload(&mut sample, None);
+    }
+    Ok(sample)
 }
 
 /// The bytes of a value in the width of its type. The answer may have more or fewer.
@@ -172,9 +194,9 @@ fn wire_bytes(value: &Value, data_type: DataType) -> Vec<u8> {
     }
 }
 
-/// The requests for a target: value and status.
+/// The requests for a target: value, and status or error register.
 pub fn requests(target: &Target) -> Vec<Request> {
-    let objects = [Some(target.object), target.status];
+    let objects = [Some(target.object), target.second_object()];
     objects.into_iter().flatten().map(|object| Request::read(target.source.node, object)).collect()
 }
 
@@ -209,7 +231,7 @@ fn readings(
         .into_iter()
         .filter_map(|target| {
             let value = answers.next()?;
-            let status = if target.status.is_some() { answers.next() } else { None };
+            let status = target.second_object().and_then(|_| answers.next());
             Some((target, value, status))
         })
         .collect();

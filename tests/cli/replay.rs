@@ -288,3 +288,25 @@ fn scan_reads_identities_from_the_sdo_traffic() {
     let node = &done.json()[0];
     assert_eq!((&node["device_type"], &node["vendor"]), (&"0x00020194".into(), &serde_json::Value::Null));
 }
+
+/// A recording of a DPS without status object: TPDO1 with an integer, and emergencies.
+fn dps_with(frames: &[&str]) -> String {
+    let line = |(at, frame): (usize, &&str)| format!("(1700000000.{:03}000) can0 {frame}\n", 100 * at);
+    frames.iter().enumerate().map(line).collect()
+}
+
+#[test]
+fn emergency_is_the_status_until_it_is_over() {
+    let bench = Bench::of("dps@127");
+    let setup = "(1699999999.000000) can0 67F#4032610100000000\n(1699999999.001000) can0 5FF#4F32610103000000\n";
+    for (end, after) in [("0FF#0000000000000000", ""), ("0FF#0000050000000000", "overload-high"), ("77F#00", "")] {
+        let frames = ["1FF#A0860100", "0FF#0132050000000000", "1FF#30750000", "1FF#58920100", end, "1FF#A0860100"];
+        fs::write(bench.path("t.log"), setup.to_owned() + &dps_with(&frames)).expect("written");
+        let done = replay(&bench, "t.log", "log 127 --device dps").exit(0);
+        let statuses: Vec<&str> = done.stdout.lines().skip(1).filter_map(|line| line.split(',').nth(6)).collect();
+        assert_eq!(statuses, ["", "overload-high", "overload-high", after], "{end}: {}", done.stdout);
+        assert!(done.stderr.contains("emergency 3201h, overflow or underflow\n"), "{}", done.stderr);
+        let words = ["-b", "replay:t.log", "check", "127", "pressure < 1000", "--device", "dps"];
+        bench.finish(&mut bench.command(&words)).exit(1);
+    }
+}

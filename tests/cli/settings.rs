@@ -266,7 +266,7 @@ fn errors_are_explained_by_the_description() {
     );
     assert!(done.frames_of("605").contains(&"2F03100000000000"));
     // The DPS counts its errors; the entries cannot be read.
-    bench.run("errors 127").prints("register  0x05 generic, voltage\nhistory   1 error\n");
+    bench.run("errors 127").prints("register  0x05 overflow or underflow\nhistory   1 error\n");
     bench.run("errors 2").prints("register  0x00 no error\nhistory   not supported\n");
     bench.run("errors 2 --clear").fails(6, "cangauge: node 2: it has no error history (1003h)\n");
     let done = bench.run("errors 9").exit(3);

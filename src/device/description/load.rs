@@ -272,7 +272,7 @@ fn object(table: &mut Table<'_>) -> Option<ObjectEntry> {
 fn emergency(table: &mut Table<'_>) -> Option<EmergencyEntry> {
     let (code, text) = (table.required("code"), table.required("text"));
     let (register_bit, register) = (table.optional("register_bit"), table.optional("register"));
-    let bytes = table.list("bytes");
+    let (bytes, overload) = (table.list("bytes"), table.optional("overload").unwrap_or(false));
     table.finish();
-    Some(EmergencyEntry { code: code?, text: text?, register_bit, register, bytes })
+    Some(EmergencyEntry { code: code?, text: text?, register_bit, register, bytes, overload })
 }

@@ -18,10 +18,11 @@ use super::quirk::Quirk;
 use super::scalar::Scalar;
 use super::scale::{Markers, Scale, StatusBits};
 use super::unit::Unit;
+use crate::canopen::emcy::ErrorRegister;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A mistake in a description.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -300,6 +301,21 @@ pub struct EmergencyEntry {
     pub register: Option<u8>,
     /// The contents of bytes 3 to 7.
     pub bytes: Vec<String>,
+    /// Whether it reports a value outside the measuring range. It is the status of signals without a status object.
+    pub overload: bool,
+}
+
+impl EmergencyEntry {
+    /// The register that means this error; 0 means none.
+    fn whole_register(&self) -> Option<u8> {
+        self.register.filter(|&register| register != 0)
+    }
+
+    /// The channel in bytes 3 to 7 of an emergency, if one of them is described as the channel.
+    pub fn channel(&self, bytes: [u8; 5]) -> Option<u8> {
+        let mut meanings = self.bytes.iter().zip(bytes);
+        meanings.find(|(meaning, _)| meaning.to_lowercase().contains("channel")).map(|(_, byte)| byte)
+    }
 }
 
 impl Description {
@@ -311,5 +327,29 @@ impl Description {
     /// The meaning of an emergency code on this device.
     pub fn emergency(&self, code: u16) -> Option<&EmergencyEntry> {
         self.emergencies.iter().find(|entry| entry.code == code)
+    }
+
+    /// The error register (1001h) during an overload, if no other error has the same register.
+    pub fn overload_register(&self) -> Option<u8> {
+        let register = self.emergencies.iter().find(|entry| entry.overload)?.register?;
+        (self.emergencies.iter().filter(|entry| entry.register == Some(register)).count() == 1).then_some(register)
+    }
+
+    /// The bits of an error register in words: those of the device, else those of CiA 301.
+    pub fn register_text(&self, bits: u8) -> String {
+        let has_all = |register: u8| register != 0 && bits & register == register;
+        // Every error sets bit 0. Alone, it belongs to an error whose whole register it is.
+        let is_meant = |register: u8| has_all(register) && (register != 1 || bits == 1);
+        let (mut texts, mut covered): (Vec<String>, u8) = (Vec::new(), 0);
+        let registers: BTreeSet<u8> = self.emergencies.iter().filter_map(EmergencyEntry::whole_register).collect();
+        for register in registers.into_iter().filter(|&register| is_meant(register)) {
+            let with = self.emergencies.iter().filter(|entry| entry.whole_register() == Some(register));
+            texts.push(with.map(|entry| entry.text.as_str()).collect::<Vec<_>>().join(" or "));
+            covered |= register | 1;
+        }
+        if bits & !covered != 0 || bits == 0 {
+            texts.push(ErrorRegister(bits & !covered).to_string());
+        }
+        texts.join(", ")
     }
 }

@@ -1,7 +1,7 @@
 //! Evaluates expressions: samples in, verdicts out.
 //!
 //! - Each sample must satisfy the expression. A sample without a valid value satisfies nothing; only `invalid()`
-//!   accepts it.
+//!   accepts it. A value outside the measuring range is not valid here, even if the device still sends a number.
 //! - A comparison of several signals is evaluated when each of them has a new value. If a signal has a second value
 //!   before that, its first value is compared with the latest values of the others. So no sample is skipped.
 
@@ -13,7 +13,7 @@ use crate::bus::Mono;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
-use crate::measure::sample::{Number, Sample, Source};
+use crate::measure::sample::{Number, Sample, Source, Status};
 
 /// Connects a source of samples to an input of a comparison.
 #[derive(Clone, Copy, Debug)]
@@ -157,7 +157,8 @@ impl Evaluator {
             let first = *self.first.get_or_insert(sample.at.mono);
             let elapsed = sample.at.mono.since(first);
             for route in self.routes.get(sample.source).into_iter().flatten() {
-                let value = sample.value.map(printed_value).and_then(|value| match route.unit {
+                let is_valid = !sample.status.is_some_and(Status::is_overload);
+                let value = sample.value.filter(|_| is_valid).map(printed_value).and_then(|value| match route.unit {
                     UnitChange::Unchanged => Some(value),
                     UnitChange::Convertible(from, to) => from.convert(value, to),
                     UnitChange::Incompatible => None,

@@ -295,6 +295,10 @@ fn each_sample_must_satisfy() {
     ] {
         assert_eq!(outcome(text, &pressure(values)), expected, "{text} of {values:?}");
     }
+    let mut overloaded = bound("pressure < 3", &pressure(&[])).expect("bound");
+    let sample = Sample { status: Some(Status::OverloadLow), ..sample(0, 0, Some(-5.0)) };
+    overloaded.add(&[sample], &sources(&pressure(&[])));
+    assert_eq!(overloaded.verdicts(None, &[])[0].outcome, Outcome::Fail, "outside the measuring range");
     let verdict = verdict("pressure < 3", &pressure(&[1.0, 4.0, 5.0, NAN]));
     assert_eq!((verdict.count, verdict.violations, verdict.invalid), (4, 2, 1));
     let first = verdict.first.expect("a violation");

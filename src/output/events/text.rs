@@ -102,8 +102,7 @@ fn emergency_text(emergency: Emergency, meaning: &str) -> String {
     if emergency.code == 0 {
         return "emergency over (0000h)".to_owned();
     }
-    let register = emergency.register.map(|register| format!(", {register}")).unwrap_or_default();
-    format!("emergency {:04X}h, {meaning}{register}", emergency.code)
+    format!("emergency {:04X}h, {meaning}", emergency.code)
 }
 
 fn fault_weight(fault: Fault) -> Weight {

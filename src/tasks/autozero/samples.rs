@@ -57,18 +57,17 @@ impl Samples {
         let node = target.source.node;
         let mut answers = master.transfer(requests(target), &mut |received| self.watch(node, received))?.into_iter();
         let Some(value) = answers.next() else { return Ok(()) };
-        let sample = sample(target, value, answers.next())?;
-        // Without a status object, an overload comes only from the span: a large zero error shows the same.
-        let from_span = |status| target.status.is_none() && sample.value.is_some() && is_overload(status);
+        let status = answers.next();
+        let is_reported = target.reports_overload(status.as_ref());
+        let sample = sample(target, value, status)?;
+        // An overload that comes only from the span is ignored: a large zero error shows the same.
+        let is_from_span = target.status.is_none() && sample.value.is_some() && !is_reported;
+        let from_span = |status: Status| is_from_span && status.is_overload();
         let bad = sample.status.filter(|&status| status != Status::Ok && !from_span(status));
         self.bad = self.bad.or(bad).or_else(|| sample.value.is_none().then_some(Status::Invalid));
         self.statistics.add(sample.value.map(|value| value.as_f64()), sample.at.mono.since_start());
         Ok(())
     }
-}
-
-fn is_overload(status: Status) -> bool {
-    matches!(status, Status::OverloadHigh | Status::OverloadLow)
 }
 
 /// Reads a signal `count` times. A pause before each reading makes sure that it is new.

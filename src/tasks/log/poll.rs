@@ -176,6 +176,7 @@ impl Poll {
         &mut self,
         ticket: Ticket,
         result: Result<Answer, SdoError>,
+        decoder: &Decoder,
         samples: &mut Vec<Sample>,
     ) -> Option<SdoError> {
         let (at, part) = self.open.remove(&ticket)?;
@@ -192,8 +193,10 @@ impl Poll {
         if !self.live[at] {
             return None;
         }
-        match sample(&self.targets[at], parts.value?, parts.status) {
-            Ok(sample) => {
+        let target = &self.targets[at];
+        match sample(target, parts.value?, parts.status) {
+            Ok(mut sample) => {
+                decoder.report_overloads(target.source.node, &target.reading, &mut sample);
                 samples.push(sample);
                 self.errors[at] = None;
                 None

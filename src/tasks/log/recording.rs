@@ -236,7 +236,7 @@ impl<'o> Recording<'o> {
         let Some(poll) = &mut self.poll else { return Ok(ControlFlow::Continue(())) };
         self.samples.clear();
         let cycle = poll.cycle_of(ticket);
-        if let Some(error) = poll.answer(ticket, result, &mut self.samples) {
+        if let Some(error) = poll.answer(ticket, result, &self.decoder, &mut self.samples) {
             observer.event(&LogEvent::Remark(Remark::PollFailed(error)), master.bus().now());
         }
         Ok(self.take_samples(cycle, observer))

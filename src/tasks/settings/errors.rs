@@ -75,10 +75,15 @@ pub fn read(master: &mut Master<'_>, node: &Node) -> Result<Errors, Failure> {
     let history = history.iter().flatten().filter_map(Value::as_u64).filter_map(|raw| u32::try_from(raw).ok());
     Ok(Errors {
         register,
-        register_text: register.map(|bits| ErrorRegister(bits).to_string()).unwrap_or_default(),
+        register_text: register.map(|bits| register_text(node, bits)).unwrap_or_default(),
         count,
         history: history.map(|raw| past(node, raw)).collect(),
     })
+}
+
+fn register_text(node: &Node, bits: u8) -> String {
+    let description = node.model.as_ref().map(|model| &model.description);
+    description.map_or_else(|| ErrorRegister(bits).to_string(), |description| description.register_text(bits))
 }
 
 fn past(node: &Node, raw: u32) -> PastError {
@@ -144,6 +149,22 @@ mod tests {
         assert_eq!(detail(entry(0xf001), [1, 3]), "channel 1, status 0x03");
         assert_eq!(detail(entry(0x8110), [0, 0]), "");
         assert_eq!(detail(entry(0x8120), [4, 6]), "CAN error state 4, CAN error type 6");
+        let dps = catalog::by_name("dps").expect("built in");
+        for (bits, text) in [
+            (0x00, "no error"),
+            (0x05, "overflow or underflow"),
+            (0x07, "sensor failure, overflow or underflow"),
+            (0x11, "CAN controller error passive or recovered from bus-off"),
+            (0x81, "EEPROM error"),
+            (0x0d, "overflow or underflow, temperature"),
+            (0x01, "generic"),
+        ] {
+            assert_eq!(dps.description.register_text(bits), text);
+        }
+        assert_eq!(mh4.description.register_text(0x81), "generic, manufacturer");
+        let jumo = catalog::by_name("jumo").expect("built in");
+        assert_eq!(jumo.description.register_text(0x01), "sensor break or short circuit");
+        assert_eq!(jumo.description.register_text(0x11), "generic, communication");
         assert_eq!(ErrorHistory::CodeHigh.read(0xff00_0102), (0xff00, None));
         assert_eq!(ErrorHistory::CodeLow.read(0x0102_8110), (0x8110, None));
     }

@@ -1,20 +1,22 @@
 //! The emergency messages of the recorded nodes.
 
 use crate::bus::Mono;
-use crate::canopen::emcy::Emergency;
+use crate::canopen::emcy::{Emergency, ErrorRegister};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::{CanId, NodeId};
+use crate::device::catalog::Model;
 use crate::device::quirk::Quirk;
 use crate::node::Node;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Recognises emergency messages.
 #[derive(Debug, Default)]
 pub(super) struct Emergencies {
     nodes: BTreeMap<CanId, NodeId>,
-    /// The meaning of each emergency code, from the descriptions.
-    meanings: BTreeMap<(NodeId, u16), String>,
+    /// The descriptions.
+    models: BTreeMap<NodeId, Arc<Model>>,
     /// The last emergency of each node that repeats it while it is pending ([`Quirk::EmergencyRepeats`]).
     repeating: BTreeMap<NodeId, Option<Emergency>>,
     /// Emergencies reported less than [`REPEAT_INTERVAL`] ago.
@@ -31,6 +33,15 @@ struct Recent {
     count: u64,
 }
 
+/// A change of the overload of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum OverloadChange {
+    /// An overload of this channel; `None` if the emergency names no channel.
+    Begins(Option<u8>),
+    /// It is over.
+    Ends,
+}
+
 /// Identical emergencies are reported once, then as one count in this time.
 const REPEAT_INTERVAL: Duration = Duration::from_secs(1);
 
@@ -40,9 +51,8 @@ impl Emergencies {
         let id = node.id;
         self.nodes.retain(|_, of| *of != id);
         self.nodes.insert(node.emergency, id);
-        self.meanings.retain(|(of, _), _| *of != id);
-        let described = node.model.as_ref().map_or(&[][..], |model| &model.description.emergencies);
-        self.meanings.extend(described.iter().map(|entry| ((id, entry.code), entry.text.clone())));
+        self.models.remove(&id);
+        self.models.extend(node.model.clone().map(|model| (id, model)));
         let quirks = node.model.as_ref().map_or(&[][..], |model| &model.description.quirks);
         self.repeating.remove(&id);
         if quirks.contains(&Quirk::EmergencyRepeats) {
@@ -90,16 +100,56 @@ impl Emergencies {
         Some((recent.node, recent.emergency, std::mem::take(&mut recent.count)))
     }
 
-    /// What an emergency code means on this node.
+    /// What an emergency code means on this node, and the bits of its error register in words, unless the device always
+    /// sends the same register with this code.
     pub(super) fn meaning(&self, node: NodeId, emergency: Emergency) -> String {
-        let described = self.meanings.get(&(node, emergency.code)).map(String::as_str);
-        described.unwrap_or_else(|| Emergency::class(emergency.code)).to_owned()
+        let description = self.models.get(&node).map(|model| &model.description);
+        let described = description.and_then(|description| description.emergency(emergency.code));
+        let text = described.map_or_else(|| Emergency::class(emergency.code), |entry| &entry.text).to_owned();
+        if described.is_some_and(|entry| entry.register.is_some()) {
+            return text;
+        }
+        let words = |register: ErrorRegister| {
+            description.map_or_else(|| register.to_string(), |description| description.register_text(register.0))
+        };
+        emergency.register.map(words).map_or(text.clone(), |words| format!("{text}, {words}"))
+    }
+
+    /// What an emergency says about an overload of its node.
+    pub(super) fn overload(&self, node: NodeId, emergency: Emergency) -> Option<OverloadChange> {
+        let description = &self.models.get(&node)?.description;
+        if emergency.code != 0 {
+            let entry = description.emergency(emergency.code).filter(|entry| entry.overload)?;
+            return Some(OverloadChange::Begins(entry.channel(emergency.manufacturer)));
+        }
+        // Another error may be the one that is over.
+        let pending = description.overload_register().zip(emergency.register);
+        let is_pending = pending.is_some_and(|(bits, register)| register.0 & bits == bits);
+        (!is_pending).then_some(OverloadChange::Ends)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn overload_of_a_device_without_status_lasts_until_the_error_is_over() {
+        let mut node = Node::new(NodeId::new(127).expect("a node-ID"));
+        node.model = crate::device::catalog::by_name("dps");
+        let mut emergencies = Emergencies::default();
+        emergencies.watch(&node);
+        for (frame, change, text) in [
+            ("0FF#0132050000000000", Some(OverloadChange::Begins(None)), "overflow or underflow"),
+            ("0FF#0122070000000000", None, "sensor failure"),
+            ("0FF#0000050000000000", None, "no error, overflow or underflow"),
+            ("0FF#0000000000000000", Some(OverloadChange::Ends), "no error, no error"),
+        ] {
+            let emergency = Emergency::parse(&frame.parse().expect("a frame")).expect("an emergency");
+            assert_eq!(emergencies.overload(node.id, emergency), change, "{frame}");
+            assert_eq!(emergencies.meaning(node.id, emergency), text, "{frame}");
+        }
+    }
 
     #[test]
     fn identical_emergencies_are_counted_once_a_second() {

@@ -1,6 +1,7 @@
 //! What can happen during a recording, and how it continues.
 
 use super::Recording;
+use super::emergencies::OverloadChange;
 use crate::bus::{Fault, Mono, Received, Stamp};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
@@ -18,6 +19,11 @@ impl Recording<'_> {
         for (id, (one, other)) in self.decoder.take_shared_cob_ids() {
             self.remark(Remark::SharedCobId(id, [one, other]), at, observer);
         }
+    }
+
+    /// Takes the overloads that the nodes reported before the recording.
+    pub(in crate::tasks::log) fn take_overloads(&mut self) {
+        self.nodes.iter().for_each(|node| self.decoder.set_overload(node.id, node.has_overload));
     }
 
     /// Reports signals whose values may be clipped.
@@ -57,6 +63,11 @@ impl Recording<'_> {
     }
 
     fn emergency(&mut self, node: NodeId, emergency: Emergency, at: Stamp, observer: &mut dyn Observer) {
+        match self.emergencies.overload(node, emergency) {
+            Some(OverloadChange::Begins(channel)) => self.decoder.begin_overload(node, channel),
+            Some(OverloadChange::Ends) => self.decoder.end_overload(node),
+            None => {}
+        }
         if self.emergencies.is_repetition(node, emergency) {
             return;
         }
@@ -88,6 +99,9 @@ impl Recording<'_> {
     /// Takes a heartbeat or boot-up message.
     fn life(&mut self, node: NodeId, life: Life, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let is_boot_up = life == Life::BootUp;
+        if is_boot_up {
+            self.decoder.end_overload(node);
+        }
         if let Some(listener) = self.listener.as_mut().filter(|_| is_boot_up) {
             listener.forget(node, &mut self.decoder);
             self.update_sources();
@@ -222,6 +236,7 @@ impl Recording<'_> {
         let (id, at) = (node.id, master.bus().now());
         let Some(place) = self.nodes.iter().position(|known| known.id == id) else { return Ok(()) };
         let changes = changes(&self.nodes[place], &node);
+        self.decoder.set_overload(id, node.has_overload);
         match &mut self.poll {
             Some(poll) => {
                 if let Err(failure) = poll.set_node(&node, &self.options.wanted, &mut self.decoder) {
