@@ -4,10 +4,13 @@ use super::Global;
 use super::exit::{FileError, IntoFailure};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::{DataType, Value};
 use crate::device::catalog::{self, MadeFor, Model};
 use crate::device::eds;
 use crate::master::{Master, OnTwoDevices};
 use crate::node::Overrides;
+use crate::node::read::read_values;
 use crate::node::survey::revisions;
 use crate::output::failure::ErrorMessage;
 use std::collections::BTreeSet;
@@ -126,7 +129,10 @@ fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[N
         }
         let message = mismatch(named.file(), **node, device, *vendor, *product);
         // No description is for a device of this vendor: the user names the one that comes nearest.
-        let is_nearest = named.is_built_in() && !vendor.is_some_and(catalog::has_vendor);
+        let is_nearest = named.is_built_in()
+            && !vendor.is_some_and(catalog::has_vendor)
+            && named.model.has_standard_values()
+            && has_profile_of(master, **node, &named.model)?;
         let writes = global.on_two_devices == OnTwoDevices::RefuseWrites;
         if !global.only_reads && (writes || !is_nearest) {
             let hint = "name the file of this device, or use this one anyway: --accept-mismatch";
@@ -135,6 +141,16 @@ fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[N
         global.console().warn(&message);
     }
     Ok(misfits)
+}
+
+/// Whether the device has the profile (1000h) of a description, as far as both are known.
+fn has_profile_of(master: &mut Master<'_>, node: NodeId, model: &Model) -> anyhow::Result<bool> {
+    let object = ObjectId::new(0x1000, 0);
+    let described = model.dictionary.get(object).and_then(|entry| entry.default_bytes(node));
+    let described = described.and_then(|bytes| DataType::Unsigned(4).decode(&bytes).ok());
+    let found = read_values(master, &[(node, object, DataType::Unsigned(4))]).or_fail()?.pop().and_then(Result::ok);
+    let profile = |value: Option<Value>| value?.as_u64().map(|number| number & 0xffff).filter(|&profile| profile != 0);
+    Ok(profile(described).zip(profile(found)).is_none_or(|(described, found)| described == found))
 }
 
 fn mismatch(file: &str, node: NodeId, device: &MadeFor, vendor: Option<u32>, product: Option<u32>) -> String {

@@ -13,11 +13,12 @@ use crate::master::{Master, TEXT_LIMIT};
 use crate::node::write::is_signature;
 use crate::node::{Form, Node, WriteOptions, Written, names};
 use crate::output::failure::ErrorMessage;
+use crate::output::notes;
 use crate::output::progress::Transfer;
 use crate::output::sdo::{ObjectValue, ValueForm};
 use crate::output::text;
 use crate::tasks::Failure;
-use crate::tasks::sdo::{FILE_LIMIT, ReadOptions, encode, find_form, read, write};
+use crate::tasks::sdo::{FILE_LIMIT, ReadOptions, clipping, encode, find_form, read, write};
 use clap::{Args, Subcommand, ValueEnum};
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -76,7 +77,7 @@ struct ReadArgs {
 struct WriteArgs {
     /// Which node: 5, 0x7f
     node: NodeId,
-    /// OBJECT VALUE, or several OBJECT=VALUE: decimal, 0x1F, -5, 1.25e3, or text
+    /// OBJECT VALUE, or several OBJECT=VALUE: decimal, 0x1F, -5, 1.25e3, text, or a word (save, Pt100)
     #[arg(required = true, allow_negative_numbers = true, value_name = "OBJECT VALUE")]
     items: Vec<String>,
     /// Encode the value as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
@@ -257,7 +258,9 @@ impl WriteArgs {
                 ObjectArg::Address(object) => node.entry(*object),
                 ObjectArg::Name(name) => node.entry_by_name(name),
             };
-            if let Some(data_type) = self.data_type.or(entry.map(|entry| entry.data_type)) {
+            let is_signature =
+                entry.as_ref().is_some_and(|entry| names::signature(node, entry.object, value).is_some());
+            if let Some(data_type) = self.data_type.or(entry.map(|entry| entry.data_type)).filter(|_| !is_signature) {
                 check(data_type, value).map_err(|error| ErrorMessage::usage(format!("{object}: {error}")))?;
             }
         }
@@ -308,6 +311,7 @@ impl WriteArgs {
                 bar.finish();
                 let written = text::wire_bytes(&bytes);
                 global.console().detail(&format!("node {}: {at} written: {written}", self.node));
+                clipping(master, &node, at).iter().for_each(|note| notes::print(&global.console(), note));
             }
             Ok(())
         })

@@ -5,6 +5,7 @@ use super::dictionary::Dictionary;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::device::eds::Eds;
+use crate::device::profiles;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
@@ -74,6 +75,18 @@ pub struct Traits {
 }
 
 impl Model {
+    /// Whether the process values have the types that CiA 404 gives their indices, and nothing stands for another scale.
+    /// Only such a description may be used for a similar device of another vendor.
+    pub fn has_standard_values(&self) -> bool {
+        let mut entries = self.dictionary.iter();
+        entries.all(|entry| {
+            let is_process =
+                profiles::meaning(entry.object) == Some(profiles::Meaning::Process) && entry.object.sub > 0;
+            let standard = profiles::data_type(profiles::MEASURING, entry.object);
+            !is_process || standard.is_none_or(|data_type| data_type == entry.data_type)
+        })
+    }
+
     /// Reads a description.
     ///
     /// # Errors
@@ -294,6 +307,13 @@ mod tests {
             device_name: bytes(ObjectId::new(0x1008, 0)).and_then(|bytes| String::from_utf8(bytes).ok()),
             answers: BTreeMap::new(),
         }
+    }
+
+    #[test]
+    fn only_two_descriptions_have_other_types_than_cia_404() {
+        let others: Vec<&str> =
+            names().filter(|name| !by_name(name).expect("built in").has_standard_values()).collect();
+        assert_eq!(others, ["dps", "mc1609"]);
     }
 
     #[test]

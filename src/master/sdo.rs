@@ -13,7 +13,7 @@ use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{AbortCode, Progress, TransferError};
+use crate::canopen::sdo::{AbortCode, Progress, TransferError, proves_60};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
@@ -69,7 +69,7 @@ impl SdoClient {
     }
 
     pub(super) fn accept_60(&mut self, node: NodeId, accept: bool) {
-        self.nodes.entry(node).or_default().accept_60 = accept;
+        self.nodes.entry(node).or_default().accept_60 |= accept;
     }
 
     pub(super) fn is_busy(&self) -> bool {
@@ -196,7 +196,8 @@ impl SdoClient {
         } else if !is_stale {
             self.clues.on_channel(number, &received.frame, received.at.mono);
         }
-        if let Some(node) = self.nodes.get(&number) {
+        if let Some(node) = self.nodes.get_mut(&number) {
+            node.accept_60 |= is_ours && proves_60(&received.frame);
             self.due = earlier(self.due, node.active.as_ref().and_then(|active| active.deadline));
             self.can_start |= node.active.is_none() && !node.waiting.is_empty();
         }

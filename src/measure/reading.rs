@@ -73,7 +73,16 @@ impl Reading {
     pub fn plain(data_type: Option<DataType>, source: usize) -> Reading {
         let range = MeasuringRange::Unknown;
         let rules = Rules::default();
-        Reading { source, channel: None, data_type, scaling: Scaling::Plain, marker: false, has_status: true, range, rules }
+        Reading {
+            source,
+            channel: None,
+            data_type,
+            scaling: Scaling::Plain,
+            marker: false,
+            has_status: true,
+            range,
+            rules,
+        }
     }
 
     /// The data type of the value; `None` if no source states it.

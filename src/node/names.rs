@@ -4,7 +4,7 @@ use super::error::{Error, NameError};
 use super::{Node, survey};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};
-use crate::device::description::ObjectEntry;
+use crate::device::description::{ObjectEntry, Signature};
 use crate::device::dictionary::{self, Entry};
 use crate::device::nearest::distance;
 use crate::device::standard;
@@ -180,12 +180,38 @@ pub fn type_for(master: &mut Master<'_>, node: &mut Node, object: ObjectId, text
     }
 }
 
-/// A value as bytes of a type.
+/// A value as bytes of a type: a number or text, the signature of the object by its word, or a word for one of the
+/// numbers that its description explains (`Pt100`).
 ///
 /// # Errors
 /// [`Error::Value`] if it does not fit.
 pub fn encode(node: &Node, object: ObjectId, data_type: DataType, text: &str) -> Result<Vec<u8>, Error> {
-    data_type.encode_text(text).map_err(|error| Error::Value { node: node.id, object, error })
+    let is_integer = matches!(data_type, DataType::Unsigned(_) | DataType::Integer(_));
+    if let Some(signature) = signature(node, object, text).filter(|_| is_integer) {
+        return Ok(signature);
+    }
+    let explained = || {
+        let values = &node.described(object).filter(|_| is_integer)?.values;
+        let mut alike = values.iter().filter(|(_, word)| word.eq_ignore_ascii_case(text));
+        let only = alike.next().filter(|_| alike.next().is_none())?.0;
+        data_type.encode_text(&only.to_string()).ok()
+    };
+    let encoded = data_type.encode_text(text);
+    encoded.or_else(|error| explained().ok_or(Error::Value { node: node.id, object, error }))
+}
+
+/// The bytes of the signature of an object, if `text` is its word: `save`, `load`, `zero`.
+pub fn signature(node: &Node, object: ObjectId, text: &str) -> Option<Vec<u8>> {
+    let standard = match object.index {
+        0x1010 if object.sub > 0 => Some(Signature::Save),
+        0x1011 if object.sub > 0 => Some(Signature::Load),
+        0x6125 if object.sub > 0 => Some(Signature::Zero),
+        _ => None,
+    };
+    let signature = node.described(object).and_then(|entry| entry.signature).or(standard)?;
+    // The number of a node-ID or bit rate comes before "set".
+    let is_complete = signature != Signature::Set;
+    (is_complete && text.eq_ignore_ascii_case(signature.as_str())).then(|| signature.as_str().as_bytes().to_vec())
 }
 
 /// The known names that are most similar to a word, at most three, the nearest first.

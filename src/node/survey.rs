@@ -4,7 +4,7 @@
 //! answers, or a [`BackgroundSurvey`], which does not wait.
 
 mod background;
-mod overload;
+mod ranges;
 
 use super::read::{Item, ask_optional, read_known, read_optional, read_values};
 use super::{Identity, Node, signals};
@@ -16,9 +16,9 @@ use crate::device::catalog::{Model, Traits, recognise, to_ask};
 use crate::device::quirk::Quirk;
 use crate::device::unit::Unit;
 use crate::master::{Answer, Error, Master, Request, SdoError};
-use crate::measure::layout::{MeasuringRange, PROCESS_VALUES, Scaling, Signal, Tpdo};
-use crate::measure::sample::Number;
+use crate::measure::layout::{PROCESS_VALUES, Tpdo};
 pub use background::BackgroundSurvey;
+pub use ranges::narrow_values;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -133,8 +133,8 @@ pub fn survey_nodes<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overri
     read_tpdos(master, &mut found)?;
     find_signals(master, &mut found)?;
     read_units(master, &mut found)?;
-    read_ranges(master, &mut found)?;
-    overload::read_overloads(master, &mut found)?;
+    ranges::read_ranges(master, &mut found)?;
+    ranges::read_overloads(master, &mut found)?;
     Ok(found)
 }
 
@@ -377,65 +377,6 @@ fn read_units<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
         }
     }
     Ok(())
-}
-
-/// Reads the measuring ranges (6148h, 6149h) if a value depends on them: an integer that may be too narrow, and a
-/// described signal without a status.
-fn read_ranges<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
-    // Node, signal, and its two ends.
-    type Range = (usize, usize, [(ObjectId, DataType); 2]);
-    let mut wanted: Vec<Range> = Vec::new();
-    for (at, node) in nodes.iter().enumerate() {
-        for (number, signal) in node.signals.iter().enumerate() {
-            if signal.rules.scaling != Scaling::Digits || !needs_range(node, signal) {
-                continue;
-            }
-            let entries = node.model.iter().flat_map(|model| &model.description.signals);
-            let entry = entries.into_iter().find(|entry| entry.name == signal.name);
-            let object = |described: Option<ObjectId>, low: u16| {
-                let of_channel = || signal.has_channel().then(|| ObjectId::new(low, signal.channel));
-                let object = described.or_else(of_channel)?;
-                Some((object, node.layout().data_type(object)?))
-            };
-            let start = object(entry.and_then(|entry| entry.span_start), 0x6148);
-            let end = object(entry.and_then(|entry| entry.span_end), 0x6149);
-            if let Some((start, end)) = start.zip(end) {
-                wanted.push((at, number, [start, end]));
-            }
-        }
-    }
-    let items: Vec<Item> = wanted
-        .iter()
-        .flat_map(|(at, _, objects)| {
-            let node = nodes[*at].id;
-            objects.map(|(object, data_type)| (node, object, data_type))
-        })
-        .collect();
-    let values = read_known(master, &items)?;
-    for (&(at, number, _), ends) in wanted.iter().zip(values.chunks(2)) {
-        let signal = &mut nodes[at].signals[number];
-        let digits = signal.digits.unwrap_or(0);
-        let number = |value: &Option<Value>| Number::from_value(value.as_ref()?, digits).map(Number::as_f64);
-        if let [start, end] = ends
-            && let Some((start, end)) = number(start).zip(number(end))
-            && start.is_finite()
-            && end.is_finite()
-            && start != end
-        {
-            signal.range = MeasuringRange::Known(start, end);
-        }
-    }
-    Ok(())
-}
-
-/// Whether the samples of a signal depend on its measuring range.
-fn needs_range(node: &Node, signal: &Signal) -> bool {
-    let is_narrow = |data_type: Option<DataType>| matches!(data_type, Some(DataType::Integer(1..=3)));
-    let mut mapped = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
-    let has_no_status = node.model.is_some() && signal.has_no_status();
-    has_no_status
-        || is_narrow(signal.value.1)
-        || mapped.any(|entry| signal.is_value(entry.object) && is_narrow(node.mapped_type(entry.object, entry.bits)))
 }
 
 /// Reads the identity of a node that is not identified yet.

@@ -44,7 +44,7 @@ pub fn type_remedy(node: NodeId, signal: &str) -> String {
 }
 
 /// Why the values of a signal may be clipped, with the remedy.
-pub fn may_clip(node: NodeId, value: &NarrowValue) -> String {
+pub fn may_clip(value: &NarrowValue) -> String {
     let unit = value.unit.map(|unit| format!(" {unit}")).unwrap_or_default();
     let range = value.range_end.map_or_else(
         || "the measuring range may go further".to_owned(),
@@ -52,7 +52,7 @@ pub fn may_clip(node: NodeId, value: &NarrowValue) -> String {
     );
     let (NarrowValue { signal, object, largest, .. }, channel) = (value, value.object.sub);
     format!(
-        "node {node}: {signal}: {object} ends at {largest}{unit}, and {range}: values may be clipped; use \
+        "{signal}: {object} ends at {largest}{unit}, and {range}: values may be clipped; use \
          0x6130:{channel} or 0x9130:{channel}"
     )
 }

@@ -3,6 +3,7 @@
 //! Each has a code for scripts, which never changes, and a message for people. Some have a command to type.
 
 use super::console::Console;
+use super::doubt;
 use super::failure::host::up_by_hand;
 use super::failure::{self, autozero, config, pdo, settings, store};
 use super::lss;
@@ -100,6 +101,7 @@ pub fn note(note: &Note) -> NoteText {
             "left-operational",
             "the node was started; its previous state is unknown, so it stays operational",
         ),
+        Fact::MayClip(value) => NoteText::new("may-clip", doubt::may_clip(value)),
         Fact::Autozero(fact) => autozero::fact(note.node, fact),
         Fact::Lss(fact) => lss::fact(fact),
         Fact::Config(fact) => config::fact(fact),

@@ -10,6 +10,7 @@ use super::settings::{SettingsEffect, SettingsFact};
 use super::store::{StoreEffect, StoreFact};
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
+use crate::measure::layout::NarrowValue;
 
 /// What a task that failed had changed before, or what state it left behind.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,6 +83,8 @@ pub enum Fact {
     OperationalAgain,
     /// The node was started, its previous state is unknown, and it stays operational.
     LeftOperational,
+    /// A signal is sent as an integer that is too narrow for its measuring range.
+    MayClip(NarrowValue),
     /// An autozero succeeded.
     Autozero(AutozeroFact),
     /// An LSS task reports a step or a warning.
@@ -108,7 +111,7 @@ impl Fact {
             Fact::Config(fact) => fact.is_warning(),
             Fact::Pdo(fact) => fact.is_warning(),
             Fact::Settings(fact) => fact.is_warning(),
-            Fact::State(_) => true,
+            Fact::State(_) | Fact::MayClip(_) => true,
             Fact::KeptUntilPowerOff
             | Fact::OperationalAgain
             | Fact::LeftOperational
@@ -120,6 +123,11 @@ impl Fact {
 }
 
 impl Note {
+    /// Warnings that signals of a node may be clipped.
+    pub fn may_clip(node: NodeId, values: Vec<NarrowValue>) -> impl Iterator<Item = Note> {
+        values.into_iter().map(move |value| Note { node: Some(node), fact: Fact::MayClip(value) })
+    }
+
     /// A note about one node.
     pub fn of_node(node: NodeId, fact: impl Into<Fact>) -> Note {
         Note { node: Some(node), fact: fact.into() }

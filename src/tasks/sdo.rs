@@ -7,8 +7,8 @@ use crate::canopen::value::{DataType, Value};
 use crate::master::transfer::{BlockMode, Moved};
 use crate::master::{Error, Master, NUMBER_LIMIT, Request};
 use crate::node::write::write_with;
-use crate::node::{self, Node, WriteOptions, Written, names, survey};
-use crate::tasks::Failure;
+use crate::node::{self, Node, Overrides, WriteOptions, Written, names, survey};
+use crate::tasks::{self, Failure};
 
 /// The longest object that is read into a file.
 pub const FILE_LIMIT: usize = LONGEST;
@@ -101,6 +101,18 @@ pub fn find_form(master: &mut Master<'_>, node: &mut Node) -> Result<(), Failure
         Ok(()) | Err(Error::Sdo(_)) => Ok(()),
         Err(error) => Err(error.into()),
     }
+}
+
+/// Warnings that signals may be clipped, after a write to an object that decides about it: unit, decimal digits, or the
+/// mapping of a TPDO.
+pub fn clipping(master: &mut Master<'_>, node: &Node, written: ObjectId) -> Vec<tasks::Note> {
+    if !matches!(written.index, 0x1a00..=0x1bff | 0x6131 | 0x6132) {
+        return Vec::new();
+    }
+    let overrides: Overrides = node.model.clone().map(|model| (node.id, model)).into_iter().collect();
+    // The write is done. Without these warnings it is a success as well.
+    let found = survey::survey_nodes(master, &[node.id], &overrides).unwrap_or_default();
+    found.iter().flat_map(|node| tasks::Note::may_clip(node.id, node.layout().narrow_values())).collect()
 }
 
 /// Writes bytes to an object, reads them back if `verify` says so, and compares. Returns how the write was confirmed.

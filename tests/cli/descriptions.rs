@@ -212,3 +212,23 @@ fn mistakes_in_a_description_are_shown_with_their_lines() {
         }
     }
 }
+
+#[test]
+fn description_of_another_vendor_is_used_only_if_its_types_are_those_of_cia_404() {
+    let devices = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/device/devices/mh4.toml");
+    let text = fs::read_to_string(devices).expect("the description");
+    let other = text.replacen("name = \"mh4\"", "name = \"other\"", 1).replace("default = 71\n", "default = 0x7777\n");
+    let bench = Bench::described("[[device]]\nkind = \"other.toml\"\nnode = 5\n");
+    for (file, fitting) in [(other.clone(), &["mh4", "hydac"][..]), (other.replace("0x00820194", "0x00820191"), &[])] {
+        fs::write(bench.path("other.toml"), file).expect("written");
+        for device in ["mh4", "hydac", "dps", "mc1609"] {
+            let line = format!("--device {device} log 5 --sync 100ms --count 2");
+            if fitting.contains(&device) {
+                let done = bench.run(&line).exit(0);
+                assert!(done.stderr.contains("is for another device"), "{line}: {}", done.stderr);
+            } else {
+                bench.run(&line).exit(2);
+            }
+        }
+    }
+}

@@ -106,8 +106,47 @@ fn table_19_with_its_60h() {
     for printed in ["603161010000AB00", "6030610150C30000", "6031610100000000", "6031610100004E00"] {
         assert!(answers.contains(&printed), "{printed}");
     }
-    // Without the quirk such an answer is a protocol error.
-    bench.run("unit 127 bar").exit(6);
+    // Without the quirk the device is recognised by its answer to 1000h, which cannot be written.
+    bench.run("read 127 pressure").prints("50.000\n");
+    let done = bench.run("sdo read 127 0x6131:1").exit(6);
+    assert!(done.stderr.contains("cangauge sdo read 127 0x1000 0x6131:1"), "{}", done.stderr);
+    bench.run("sdo read 127 0x1000 0x6131:1").exit(0);
+}
+
+#[test]
+fn words_of_signatures_and_of_the_description_are_values() {
+    let bench = constant();
+    for (line, id, frame) in [
+        ("sdo write 5 0x1010:1 save", "605", "2310100173617665"),
+        ("sdo write 5 0x1011:1 LOAD", "605", "231110016C6F6164"),
+        ("sdo write 127 0x6125:1 zero", "67F", "222561017A65726F"),
+    ] {
+        let done = bench.run(line).exit(0);
+        assert!(done.frames_of(id).contains(&frame), "{line}: {:?}", done.frames);
+    }
+    let done = bench.run("sdo write 127 0x6131:1 bar").exit(0);
+    assert!(done.frames_of("67F").contains(&"2231610100004E00"), "{:?}", done.frames);
+    bench.run("sdo write 5 0x1017 save").exit(2);
+    bench.run("sdo write 5 0x1010:1 load").exit(2);
+}
+
+#[test]
+fn too_narrow_integer_is_a_warning_before_it_clips() {
+    let mapped = |set: &str| {
+        Bench::described(&format!("[[device]]\nkind = \"mh4\"\nnode = 5\nset = {{ {set} }}\n{}", channel(1, 1.25)))
+    };
+    let narrow = "\"0x1A00:1\" = 0x71300110, \"0x1A00:0\" = 1";
+    for (set, line) in [
+        (narrow, "unit 5 pressure psi"),
+        (narrow, "sdo write 5 0x6131:1 0x00AB0000"),
+        ("\"0x6131:1\" = 0x00AB0000", "pdo map 5 1 0x7130:1"),
+    ] {
+        let done = mapped(set).run(line).exit(0);
+        let warning = "warning: node 5: pressure: 0x7130:1 ends at 32.767 psi";
+        assert!(done.stderr.contains(warning) && done.stderr.contains("0x9130:1"), "{line}: {}", done.stderr);
+    }
+    let done = mapped("\"0x1017\" = 0").run("pdo map 5 1 0x7130:1").exit(0);
+    assert!(!done.stderr.contains("clipped"), "10 bar fit: {}", done.stderr);
 }
 
 #[test]
@@ -252,7 +291,7 @@ fn errors_are_explained_by_the_description() {
     bench.run("errors 5").prints(
         "register  0x81 generic, manufacturer\n\
          history   1 error\n\
-         \u{20}         0xF001 user input overload: pressure outside the range by more than 3.125 % (channel 1, status 0x03)\n",
+         \u{20}         0xF001 user input overload: pressure outside the range by more than 3.125 %; check the system: the accuracy is no longer guaranteed, also after the overload (channel 1, status 0x03)\n",
     );
     let done = bench.run("errors 5 -f json").exit(0);
     let object = &done.json()[0];

@@ -59,6 +59,13 @@ pub struct Upload {
     segments: usize,
 }
 
+/// Whether a server answers reads with 60h and the data: this frame contains a device type (1000h). It is no acknowledge
+/// of a write, since 1000h cannot be written.
+pub fn proves_60(frame: &Frame) -> bool {
+    let [0x60, 0x00, 0x10, 0, number @ ..] = frame.data() else { return false };
+    number.len() == 4 && number.iter().any(|&byte| byte != 0)
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Initiated,
@@ -129,7 +136,7 @@ impl Upload {
         let data = frame.data();
         let expedited = command & 0x02 != 0;
         let indicated = command & 0x01 != 0;
-        if command == 0x60 && self.accept_60 {
+        if command == 0x60 && (self.accept_60 || proves_60(frame)) {
             return Progress::Done(Uploaded { indicated: false, ..Uploaded::complete(data[4..].to_vec()) });
         }
         if command >> 5 != 2 {

@@ -153,7 +153,9 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::SyncsOmittedTooSlow(count) => format!("{count} SYNC omitted: the program was stopped or too slow"),
         Remark::SmallReceiveBuffer(buffer) => format!("frames were dropped: {}", buffer_text(*buffer)),
         Remark::Doubt(node, signal, doubt) => crate::output::doubt::doubt(*node, signal, *doubt),
-        Remark::MayClip(node, value) => crate::output::doubt::may_clip(*node, value),
+        Remark::MayClip(node, value) => {
+            format!("node {node}: {}", crate::output::doubt::may_clip(value))
+        }
         Remark::NoMeasurements(node, None, silence) => {
             format!("node {node}: no measurements: {}", diagnosis::reason(silence))
         }

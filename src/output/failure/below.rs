@@ -96,6 +96,10 @@ pub(super) fn sdo(error: &SdoError) -> Words {
             error.node
         )),
         SdoFailure::Disturbed => words.hint("stop the other program for a moment, or try again"),
+        SdoFailure::Violation(Violation::WriteAcknowledgeToRead, _) => words.hint(format!(
+            "if the device answers every read in this way, read its device type before: cangauge sdo read {} 0x1000 {}",
+            error.node, error.object
+        )),
         SdoFailure::Violation(Violation::Crc, _) => words.hint("read it without blocks: add --block never"),
         SdoFailure::Refused(_)
         | SdoFailure::Violation(..)

@@ -13,6 +13,8 @@ use crate::canopen::pdo::TpdoNumber;
 use crate::device::catalog::Model;
 use crate::device::description::Access;
 use crate::master::Master;
+use crate::measure::layout::Tpdo;
+use crate::node::survey::narrow_values;
 use crate::node::{Node, Overrides};
 use crate::tasks::settings::open;
 use crate::tasks::store::{self, Group};
@@ -54,6 +56,17 @@ pub fn map(
         return Err(Failure::at(node.id, PdoFailure::Multiplexed { number }));
     }
     let wanted = request.settings(&old, mapping, &node)?;
+    if wanted.mapping != old.mapping {
+        let tpdo = Tpdo {
+            number,
+            cob_id: wanted.cob_id,
+            transmission: None,
+            event_timer_ms: None,
+            mapping: wanted.mapping.clone(),
+        };
+        let mut planned = Node { tpdos: vec![tpdo], ..node.clone() };
+        notes.extend(Note::may_clip(node.id, narrow_values(session.master, &mut planned)?));
+    }
     let Changed { writes, wanted, notes: of_change } = change_settings(session, old, wanted)?;
     let note = |fact: PdoFact| Note::of_node(node.id, fact);
     if writes == 0 {

@@ -104,6 +104,11 @@ fn detail(entry: &EmergencyEntry, bytes: [u8; 2]) -> String {
             Some(format!("channel {byte}"))
         } else if folded.contains("status") {
             Some(format!("status 0x{byte:02X}"))
+        } else if let Some((name, words)) = meaning.split_once(": ") {
+            // The meanings of its numbers follow: `CAN error state: 0 stopped, 1 sleep`.
+            let mut words = words.split(", ").filter_map(|word| word.split_once(' '));
+            let word = words.find(|(number, _)| number.parse() == Ok(byte)).map(|(_, word)| format!(" ({word})"));
+            Some(format!("{name} {byte}{}", word.unwrap_or_default()))
         } else {
             // A byte with a constant value carries no information.
             meaning.parse::<u8>().is_err().then(|| format!("{meaning} {byte}"))
@@ -148,7 +153,8 @@ mod tests {
         assert_eq!((code, bytes), (0xf001, Some([1, 3])));
         assert_eq!(detail(entry(0xf001), [1, 3]), "channel 1, status 0x03");
         assert_eq!(detail(entry(0x8110), [0, 0]), "");
-        assert_eq!(detail(entry(0x8120), [4, 6]), "CAN error state 4, CAN error type 6");
+        assert_eq!(detail(entry(0x8120), [4, 6]), "CAN error state 4 (error passive), CAN error type 6 (acknowledge)");
+        assert_eq!(detail(entry(0x8100), [9, 0]), "CAN error state 9, CAN error type 0 (none)");
         let dps = catalog::by_name("dps").expect("built in");
         for (bits, text) in [
             (0x00, "no error"),

@@ -9,6 +9,7 @@ use crate::master::Master;
 use crate::measure::layout::Signal;
 use crate::measure::sample::Number;
 use crate::node::Node;
+use crate::node::survey::narrow_values;
 use crate::tasks::{Fact, Failure, Note};
 
 /// The unit of a signal.
@@ -147,6 +148,8 @@ pub fn set(master: &mut Master<'_>, node: &mut Node, signal: Option<&str>, unit:
     if let Some(kept) = node.signals.iter_mut().find(|kept| kept.name == signal.name) {
         *kept = renewed;
     }
+    // The new unit is set. Without these warnings it is a success as well.
+    notes.extend(Note::may_clip(node.id, narrow_values(master, node).unwrap_or_default()));
     Ok(UnitChange { before: old.unit, now: UnitOf { unit, ..old }, rescaled, notes })
 }
 
