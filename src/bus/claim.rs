@@ -1,11 +1,11 @@
-//! Claims: one program at a time works with a node of a bus of this machine.
+//! Claims: only one cangauge process at a time uses a node.
 //!
 //! Two programs that send SDO requests to one node at the same time disturb each other. So each command claims the
 //! nodes it works with. The next command waits for them, or fails and names the holder.
 //!
 //! A claim is a name in the abstract namespace of Unix sockets, `@cangauge/can0/5`. It belongs to the same network
-//! namespace as the interface, needs no directory, and is free again as soon as the process ends. Programs that do
-//! not ask for claims are not affected. On other systems than Linux nothing is claimed.
+//! namespace as the interface, needs no directory, and is free again as soon as the process ends. Other programs are not
+//! affected. On other systems than Linux nothing is claimed.
 
 #[cfg(target_os = "linux")]
 mod holder;
@@ -21,7 +21,7 @@ use std::time::Duration;
 #[cfg(target_os = "linux")]
 pub use linux::Claims;
 
-/// What a command needs for itself.
+/// What no other process may use while a command runs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Claim {
     /// Nothing: the command only listens, or its bus belongs to this process.
@@ -108,7 +108,7 @@ pub enum ClaimError {
     System(Part, std::io::Error),
 }
 
-/// Claims on a system that has none.
+/// Claims on systems other than Linux: always granted.
 #[cfg(not(target_os = "linux"))]
 #[derive(Debug, Default)]
 pub struct Claims;

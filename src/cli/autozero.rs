@@ -13,11 +13,13 @@ use clap::Args;
 
 /// Set the zero of a channel (6125h), with checks before and after
 ///
-/// The command measures first. It changes nothing and exits with 1 if a reading is invalid, if the sensor measures
-/// absolute pressure, if the mean exceeds the limit, if the readings vary by more than 0.5 % of the measuring range
-/// (half of the limit if the range is unknown), or if the total offset would exceed 5 % of the range. Then it writes
-/// the signature once, and measures again. If the reading is not zero, it exits with 6. It prints the shift, and on
-/// stderr the command to undo it.
+/// The command measures, writes the signature once, and measures again. If the reading is then not zero, it exits
+/// with 6. It prints the shift, and on stderr the command to undo it.
+///
+/// Before the write it checks the readings. In these cases it changes nothing and exits with 1: a reading is invalid;
+/// the sensor measures absolute pressure; the mean exceeds the limit; the readings vary by more than 0.5 % of the
+/// measuring range (half of the limit if the range is unknown); the total offset would exceed 5 % of the range (or a
+/// larger --limit).
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim autozero 1 --limit 2bar --samples 2 --dry-run\n  cangauge -b sim autozero 1 --limit 2bar --samples 2 --store\n  cangauge -b sim autozero 127 --limit 25% --samples 2 --format json"

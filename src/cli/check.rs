@@ -25,8 +25,8 @@ use std::path::PathBuf;
 
 /// Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)
 ///
-/// Without --for, one reading by SDO is checked. With --for, each sample of that time is checked, as log would record
-/// it. With -b replay:FILE, each sample of the file is checked. An invalid sample fails the check.
+/// Without --for, one reading by SDO is checked. With --for, the command records like log for that time, and checks each
+/// sample. With -b replay:FILE, each sample of the file is checked. An invalid sample fails the check.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Expressions (quote each of them; all must be satisfied):
@@ -37,10 +37,10 @@ Expressions (quote each of them; all must be satisfied):
                                      for each of NODES
   'noise(pressure) < 0.01 bar'       functions of all samples: mean, min, max, noise (standard
                                      deviation), rate (1/s), gap (longest interval, s), count,
-                                     invalid (number of invalid samples, which then do not fail)
+                                     invalid (number of invalid samples; they do not fail this check)
   < <= > >= == != in, + - * /, | |, ( ), and, or, not; pressure.status, 0x6130:1
 
-Calculated values are equal if they differ by less than 1e-9 of the larger one.
+Equality: calculated values are equal if they differ by less than 1e-9 of the larger one.
 
 Examples:
   cangauge -b sim check 1 'pressure > 0.5 bar'

@@ -24,8 +24,8 @@ use std::io::{Read, Write};
 /// Show all settings of a device as a file, compare them with a file, and set them from a file
 ///
 /// The file is TOML with the sections [device], [address], [node], [signal.NAME], [tpdo.N], [object] and [calibration].
-/// Values have units: "100ms", "3.2 bar". The whole file is checked before the first write; only what differs is
-/// written, and everything is read back.
+/// Values have units: "100ms", "3.2 bar". The whole file is checked before the first write. Only settings that differ
+/// are written, and all of them are read back.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim config dump 1 > mh4.toml\n  cangauge -b sim config dump 127 --changed\n  cangauge config diff 1 mh4.toml\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1-16 mh4.toml --store"
@@ -38,11 +38,11 @@ pub(crate) struct Config {
 #[derive(Debug, Subcommand)]
 #[command(defer = true)]
 enum Action {
-    /// Show all settings of a device, as a file that apply reads
+    /// Print all settings of a device as a file for config apply
     Dump(Dump),
     /// Compare a device with a file, two devices, or two files; exit 1 if anything differs
     Diff(diff::Diff),
-    /// Set a device as a file says: check the file, write what differs, read everything back
+    /// Set a device from a file: check the file, write the differences, read everything back
     Apply(apply::Apply),
     /// Print the JSON Schema of the file, for editors
     Schema,

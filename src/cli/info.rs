@@ -9,9 +9,9 @@ use clap::Args;
 
 /// Show everything about a device on one page
 ///
-/// Identity, versions, bit rate, NMT state (if its heartbeat shows it), monitoring, errors, signals with unit, range and
-/// status, their settings, TPDOs, manufacturer-specific objects, and the settings that 1010h stores. Missing objects are
-/// omitted.
+/// Shows identity, versions, bit rate, NMT state (if the node sends a heartbeat), monitoring and errors. Then the
+/// signals with unit, range, status and settings, the TPDOs and the manufacturer-specific objects. At the end, the
+/// settings that 1010h stores. Missing objects are omitted.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b sim info 1\n  cangauge -b sim info 127 --format json")]
 pub(crate) struct Info {

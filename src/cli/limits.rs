@@ -11,8 +11,8 @@ use clap::Args;
 
 /// Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)
 ///
-/// Values are in the unit of the signal. They apply to transmission types 254 and 255. A TPDO of these types whose event
-/// timer and delta are both 0 may never be sent; a warning names it.
+/// Values are in the unit of the signal. They apply to transmission types 254 and 255. If event timer and delta of such a
+/// TPDO are both 0, it may never be sent. A warning names it.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim limits 1 pressure\n  cangauge -b sim limits 1 temperature --delta 0.5\n  cangauge -b sim limits 1 pressure --lower 0.5 --upper 8 --hysteresis 0.1"

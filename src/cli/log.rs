@@ -26,8 +26,8 @@ use std::io::{self, IsTerminal};
 
 /// Record measurements as CSV or JSON Lines
 ///
-/// Without --sync and --poll, log records the TPDOs as the nodes send them. It starts nodes that are not known to be
-/// operational, and at the end returns them to their previous state if that was known.
+/// Without --sync and --poll, log records the TPDOs as the nodes send them. It starts all nodes except those that are
+/// known to be operational. At the end it returns them to their previous state if that was known.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Columns: time (UTC), elapsed_s, node, signal, value, unit, status (ok, invalid, overload-high,
@@ -36,9 +36,10 @@ Layout wide: time, elapsed_s, then 5.pressure [bar] and 5.pressure.status for ea
 Each cycle is a row with the time of its first value. Cells without data are empty. If a mapping or
 a unit changes, the new columns start a new file.
 
-If the output is slow, 12 MiB of rows wait for it. Further rows are lost and counted (exit code 8).
-With --count or --duration, a recording that ends earlier exits with 130 (Ctrl-C) or 8 (output
-closed).
+Slow output: up to 12 MiB of rows wait for it. Further rows are lost and counted (exit code 8).
+
+Early end: with --count or --duration, a recording that ends earlier exits with 130 (Ctrl-C) or 8
+(output closed).
 
 Examples:
   cangauge -b sim log 1 --sync 100ms --count 20

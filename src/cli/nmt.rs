@@ -20,8 +20,9 @@ use std::ops::ControlFlow;
 
 /// Send NMT commands and show NMT states
 ///
-/// After a command the state is confirmed: by heartbeat or boot-up message, by node guarding if it is harmless, or by
-/// SDO, which proves only "stopped". Unconfirmed states are shown as "none".
+/// After a command the state is confirmed by a heartbeat, a boot-up message or node guarding. A node that no longer
+/// answers SDO is stopped. Node guarding is not used if it would start life guarding, or if another master uses it.
+/// Unconfirmed states are shown as "none".
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim nmt start 1\n  cangauge -b sim nmt reset 127\n  cangauge -b sim nmt state 1-3"
@@ -44,11 +45,11 @@ enum Action {
     Reset(Targets),
     /// Restart the communication
     ResetComm(Targets),
-    /// Show states, from the heartbeat or by node guarding if it is harmless; "-" if unknown
+    /// Show states, from the heartbeat or node guarding; "-" if unknown
     State(StateArgs),
     /// Follow heartbeats, boot-ups and losses until Ctrl-C
     Watch(WatchArgs),
-    /// Show or set how a device starts after power on: wait for the master, or auto (by itself)
+    /// Show or set the start after power-on: wait (for the master) or auto (the device starts itself)
     Startup(StartupArgs),
 }
 

@@ -25,7 +25,7 @@ use clap::Args;
 pub(crate) struct Read {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
-    /// pressure, temperature, ch1 to ch16, pressure.status, or an object as it is: 0x6130:1, 0x6010:0/i16
+    /// pressure, temperature, ch1 to ch16, pressure.status, or an object, unscaled: 0x6130:1, 0x6010:0/i16
     signals: Vec<SignalArg>,
     /// Convert to this unit: bar, mbar, kPa, MPa, psi, degC, degF, K
     #[arg(long = "in", value_name = "UNIT", value_parser = parse_unit)]

@@ -26,7 +26,7 @@ pub(crate) struct Scan {
     /// Which nodes: 5, 0x7f, 1-16, 1,5, all
     #[arg(default_value = "1-127")]
     nodes: Nodes,
-    /// Send nothing: list the nodes that send something within 3 s
+    /// Send nothing: list the nodes that send something within 3 s (or --timeout)
     #[arg(long)]
     passive: bool,
 }

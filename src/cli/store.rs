@@ -15,8 +15,7 @@ use clap::{Args, ValueEnum};
 ///
 /// The capability of the device is read first. "save" is sent once and never repeated; the time-out is at least 3 s. If
 /// storing everything would reset custom COB-IDs (MH-4), comm and app are stored instead. Settings that the device does
-/// not store are listed. After a restore, reset the device before you store: until the reset it has its old settings,
-/// and would store those.
+/// not store are listed. After a restore, reset the device before you store. Otherwise it stores its old settings again.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim store 1\n  cangauge -b sim store 1 --group app --verify\n  cangauge -b sim store 1,127 --format json"

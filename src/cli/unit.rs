@@ -13,8 +13,8 @@ use clap::Args;
 
 /// Show or set the physical unit of a signal (6131h)
 ///
-/// After the unit is set, it is read back, and so is everything that the device rescales: measuring range, offset,
-/// limits, process value. The unit of a single signal is printed without its name.
+/// After a change, the unit is read back. All values that the device converts are read back as well: measuring range,
+/// offset, limits, process value. The unit of a single signal is printed without its name.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim unit 1\n  cangauge -b sim unit 1 temperature K\n  cangauge -b sim unit 1 pressure 0x06220000"

@@ -32,7 +32,7 @@ struct Node {
     answers: Answers,
     /// Whether a write was acknowledged.
     is_written: bool,
-    /// [`crate::device::quirk::Quirk::UploadAnswered60`] acts here.
+    /// Whether the node has [`crate::device::quirk::Quirk::UploadAnswered60`].
     accept_60: bool,
 }
 
@@ -48,7 +48,7 @@ pub(super) struct SdoClient {
     nodes: BTreeMap<NodeId, Node>,
     finished: VecDeque<(Ticket, Result<Answer, SdoError>)>,
     next_ticket: u64,
-    /// Not later than the earliest deadline. It saves a search through all nodes for each frame.
+    /// The earliest deadline, or an earlier moment. It avoids a search through all nodes for each frame.
     due: Option<Mono>,
     /// When all transfers together must have ended, and the time that they had.
     limit: Option<(Mono, Duration)>,
@@ -438,7 +438,8 @@ impl SdoClient {
         self.nodes.entry(node).or_default().answers.needs_check()
     }
 
-    /// Until when second answers may arrive. `None` if all nodes are known to be single, or a transfer is in progress.
+    /// The end of the time in which second answers may arrive. `None` if no node needs this time, or if a transfer is in
+    /// progress.
     pub(super) fn second_answer_until(&self) -> Option<Mono> {
         if self.is_busy() {
             return None;
@@ -446,7 +447,7 @@ impl SdoClient {
         self.nodes.values().filter_map(|node| node.answers.wait_until()).max()
     }
 
-    /// The time for second answers until `now` has passed.
+    /// Records that the master has waited for second answers until `now`.
     pub(super) fn on_waited(&mut self, now: Mono) {
         self.nodes.values_mut().for_each(|node| node.answers.on_waited(now));
     }
@@ -478,7 +479,7 @@ impl Node {
         [DEVICE_TYPE, ERROR_REGISTER, IDENTITY].into_iter().find(is_fresh).unwrap_or(fallback)
     }
 
-    /// Why no transfer with this node is carried out; `None` if it is.
+    /// Why transfers with this node are refused; `None` if they are not.
     fn refusal(&self, reaction: OnTwoDevices) -> Option<SdoFailure> {
         let answers = self.answers.differing()?;
         match reaction {

@@ -1,4 +1,4 @@
-//! The only wait loop: receives until a deadline, until the caller has what it waits for, or until the policy ends it.
+//! The only wait loop. It ends at a deadline, when the caller has received what it needs, or when the policy ends it.
 //!
 //! | | [`Policy::Command`] | [`Policy::Observe`] | [`Policy::Reconnect`] | [`Policy::Record`] |
 //! |---|---|---|---|---|
@@ -15,7 +15,7 @@ use crate::bus::{BusError, Mono};
 use crate::master::{Error, Happening, Master};
 use std::ops::ControlFlow;
 
-/// What ends a wait, beside its deadline and its caller.
+/// Which events end a wait before its deadline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Policy {
     /// A step of a command: Ctrl-C and an interface that goes down are errors.
@@ -51,7 +51,7 @@ impl<T> Waited<T> {
     }
 }
 
-/// Until when the next event may come.
+/// How long to wait for the next event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Until {
     /// Wait for events until this moment.
@@ -60,19 +60,20 @@ pub enum Until {
     Drained(Mono),
 }
 
-/// A wait whose deadline changes with what is received.
+/// A wait whose deadline depends on the received events.
 pub trait Waiter {
     /// What the wait returns.
     type Output;
     /// How it fails.
     type Error: From<Error>;
 
-    /// Until when the next event may come. Called before each event.
+    /// How long to wait for the next event. Called before each event.
     fn until(&self) -> Until;
 
-    /// Handles an event: frames, ends of SDO transfers, faults, drop counts, and [`Happening::Deadline`] once the moment
-    /// of [`Waiter::until`] is reached; [`Happening::Ended`], and as the policy says [`Happening::Interrupted`] and
-    /// [`Happening::Link`].
+    /// Handles an event: a frame, the end of an SDO transfer, a fault, a drop count, or [`Happening::Ended`].
+    ///
+    /// [`Happening::Deadline`] is the end of the time in [`Waiter::until`]. The policy decides whether
+    /// [`Happening::Interrupted`] and [`Happening::Link`] are passed.
     ///
     /// # Errors
     /// An error ends the wait.
@@ -99,7 +100,8 @@ pub fn run<W: Waiter>(master: &mut Master<'_>, policy: Policy, waiter: &mut W) -
 
 /// Waits until `until`, or until `on_event` breaks.
 ///
-/// `on_event` receives frames, ends of SDO transfers, faults, drop counts, and changes of the link as the policy says.
+/// `on_event` receives frames, ends of SDO transfers, faults and drop counts. The policy decides whether it receives
+/// changes of the link.
 ///
 /// # Errors
 /// Bus errors, and what the policy treats as an error.
@@ -135,7 +137,7 @@ pub fn wait<T>(
     run(master, policy, &mut Simple(until, on_event))
 }
 
-/// Lets time pass until `until`. Frames are ignored.
+/// Waits until `until`, and ignores frames.
 ///
 /// # Errors
 /// Bus errors, and what the policy treats as an error.

@@ -3,14 +3,14 @@
 //! An expedited download either contains its size (23h, 27h, 2Bh, 2Fh) or not (22h). Some devices accept only one of the
 //! two forms:
 //! 1. The first request has the form of the device description, else it contains the size.
-//! 2. If the node rejects the command (0504 0001h), the same form is sent once more: a transfer that another master did
-//!    not finish may be the reason. Not a signature. Foreign SDO traffic is a failure of its own, without a repetition.
+//! 2. If the node rejects the command (0504 0001h), the same form is sent once more. The reason may be a transfer that
+//!    another master did not finish. A signature is not sent again, and nothing is sent again after foreign SDO traffic.
 //! 3. If the node then rejects the form (0504 0001h) or the length (0607 0010h), the other form is sent once. If that is
 //!    rejected as well, the first abort code is reported.
-//! 4. Before a value is sent without its size, the width of the object is checked. Otherwise a node would fill up a
-//!    narrower value: -5 as INTEGER16 would become 65531 in an INTEGER32.
+//! 4. Before a value is sent without its size, the width of the object is checked. If the object is wider, the node
+//!    would add zero bytes: -5 as INTEGER16 would become 65531 in an INTEGER32.
 //! 5. A signature ("save", "load", "zero", a number with "set") starts an action. It is sent once and never repeated.
-//! 6. If no answer comes, a plain value is read back. A signature reads as something else, so its result is unknown.
+//! 6. If no answer comes, a plain value is read back. A signature cannot be read back, so its result is unknown.
 
 use super::Node;
 use super::error::{Error, shown};
@@ -38,7 +38,8 @@ pub enum Form {
 /// Whether a request without an answer may be sent again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Repeat {
-    /// It is repeated as often as the timing says, then the object is read back. Not for signatures.
+    /// The master repeats it up to [`crate::master::Timing::retries`] times, then reads the object back. Not for
+    /// signatures.
     #[default]
     Repeatable,
     /// The object is read back after each request. It is written again only if it holds another value.
@@ -54,7 +55,7 @@ pub struct WriteOptions<'a> {
     /// Whether a request without an answer may be sent again.
     pub repeat: Repeat,
     /// The shortest time-out for the answer. Writing to non-volatile memory takes up to 3 s.
-    pub at_least: Duration,
+    pub min_timeout: Duration,
     /// Called every 100 ms with the bytes transferred.
     pub progress: &'a mut dyn FnMut(Moved),
     /// Called with each frame that belongs to no SDO transfer.
@@ -97,7 +98,7 @@ pub fn write_with(
     let mut sizes = sizes(node, options.form);
     let mut first_refusal: Option<SdoError> = None;
     let mut may_repeat = !is_signature(data) && options.blocks != BlockMode::Always;
-    // A rejected block transfer was not rejected for its form.
+    // The form concerns expedited downloads only.
     let is_expedited = (1..=4).contains(&data.len()) && options.blocks != BlockMode::Always;
     let is_auto = options.form == Form::Auto && is_expedited;
     if is_auto && sizes[0] == DownloadSize::Omitted {
@@ -156,7 +157,7 @@ pub fn write_and_verify(
 
 /// Whether these bytes are a signature: "save", "load", "zero", or a number with "set".
 ///
-/// A signature starts an action, and what the object reads afterwards is something else (2321h: the detected bit rate).
+/// A signature starts an action. A read of the object returns another value (2321h: the detected bit rate).
 pub fn is_signature(data: &[u8]) -> bool {
     data == b"save" || data == b"load" || data == b"zero" || data.len() == 4 && data[1..] == *b"set"
 }
@@ -168,7 +169,7 @@ impl<'a> WriteOptions<'a> {
             form: Form::Auto,
             blocks: BlockMode::Never,
             repeat: Repeat::Repeatable,
-            at_least: Duration::ZERO,
+            min_timeout: Duration::ZERO,
             progress,
             watch,
         }
@@ -197,12 +198,13 @@ fn request(
     options: &WriteOptions<'_>,
 ) -> Request {
     let request = Request::write(node.id, object, data.to_vec(), size).blocks(options.blocks.for_write(data.len()));
-    let request = if options.at_least > master.timing().timeout { request.within(options.at_least) } else { request };
+    let is_longer = options.min_timeout > master.timing().timeout;
+    let request = if is_longer { request.within(options.min_timeout) } else { request };
     if options.repeat == Repeat::Once || is_signature(data) { request.once() } else { request }
 }
 
-/// Checks that the object is not wider than the value. The width comes from the description, else from the object if
-/// the node indicates sizes. A signature fills its object.
+/// Checks that the object is not wider than the value. The width comes from the description. If it is not described, the
+/// object is read, and a node that indicates sizes shows the width. A signature always has the width of its object.
 fn check_width(
     master: &mut Master<'_>,
     node: &Node,
@@ -227,7 +229,7 @@ fn check_width(
     }
 }
 
-/// Whether the object holds the value; `None` if that cannot be known: a signature, or an object that cannot be read.
+/// Whether the object holds the value. `None` for a signature, and for an object that cannot be read.
 fn read_back(
     master: &mut Master<'_>,
     node: &Node,
@@ -241,8 +243,8 @@ fn read_back(
     let answer = master.carry_out_watching(Request::read(node.id, object), options.progress, options.watch)?;
     let Some(uploaded) = answer.ok().and_then(|answer| answer.uploaded) else { return Ok(None) };
     // A node that does not indicate the size sends four bytes for every type.
-    let has_width = !uploaded.indicated || uploaded.bytes.len() == data.len();
-    Ok(Some(has_width && uploaded.bytes.get(..data.len()) == Some(data)))
+    let may_be_equal = !uploaded.indicated || uploaded.bytes.len() == data.len();
+    Ok(Some(may_be_equal && uploaded.bytes.get(..data.len()) == Some(data)))
 }
 
 /// What was received instead of the answer.

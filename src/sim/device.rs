@@ -1,4 +1,4 @@
-//! A simulated device: NMT, heartbeat, guarding, and the causes of its frames.
+//! A simulated device: NMT, heartbeat, guarding, and the events that make it send frames.
 
 mod assign;
 mod station;
@@ -36,13 +36,13 @@ const NMT_STARTUP: ObjectId = ObjectId::new(0x1f80, 0);
 /// Emergency code for a SYNC of unexpected length (CiA 301).
 const SYNC_LENGTH: u16 = 0x8240;
 
-/// What a device does at present.
+/// The operating phase of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     Off,
-    /// Initialising until then.
+    /// Initialising until this time.
     Starting(Mono),
-    /// Without a node-ID: it answers LSS only.
+    /// The device has no node-ID and answers LSS only.
     Unconfigured,
     Running(State),
     /// It changes its bit rate at `switch`, is silent until `until`, and then has the state `after`.
@@ -214,12 +214,12 @@ impl Device {
         }
         self.memory.settings.reset();
         self.restart(area);
-        let is_gone = self.setup.oddities.offline_after.contains(&OfflineAfter::Reset);
-        let away = if area == Area::All { RESTART } else { RECONNECT };
-        self.phase = if is_gone { Phase::Off } else { Phase::Starting(now + away) };
+        let goes_offline = self.setup.oddities.offline_after.contains(&OfflineAfter::Reset);
+        let reset_time = if area == Area::All { RESTART } else { RECONNECT };
+        self.phase = if goes_offline { Phase::Off } else { Phase::Starting(now + reset_time) };
     }
 
-    /// Drops every pending frame and everything that would cause one.
+    /// Drops the pending frames, and stops timers and transfers that would send more.
     fn drop_pending(&mut self, out: &mut Outbox) {
         // A frame that is already being transmitted still arrives and is recorded.
         let mut dropped: Vec<Frame> = std::iter::from_fn(|| out.pop()).collect();
@@ -280,12 +280,12 @@ impl Device {
         }
         let pre_operational = self.phase == Phase::Running(State::PreOperational);
         let mut access = self.memory.at(now.since_start(), pre_operational);
-        let was_giving = self.sdo.is_giving();
+        let was_sending_block = self.sdo.is_sending_block();
         let answers = self.sdo.request(now, request, &mut access);
         let written = access.written;
         let id = CanId::sdo_response(self.memory.node);
-        if was_giving {
-            // The remaining segments of a sub-block that the client has given up.
+        if was_sending_block {
+            // The client sent a request, so the device drops the remaining segments of the sub-block.
             out.retain(|frame| frame.id() != id);
         }
         let due_time = now + self.setup.oddities.latency;
@@ -406,8 +406,8 @@ impl Device {
     }
 }
 
-/// The next time after `due`, in whole periods, so that it does not drift. Periods that were missed are skipped.
-pub(super) fn next_turn(due: Mono, period: Duration, now: Mono) -> Mono {
+/// The next due time, one period after `due`, so that it does not drift. If that time has passed, one period after `now`.
+pub(super) fn next_due(due: Mono, period: Duration, now: Mono) -> Mono {
     let next = due + period;
     if next > now { next } else { now + period }
 }

@@ -1,6 +1,6 @@
 //! Emergencies of a simulated device: pending errors, the error register, the history, and the frames.
 
-use super::device::next_turn;
+use super::device::next_due;
 use super::objects::Objects;
 use crate::bus::time::Mono;
 use crate::canopen::frame::Frame;
@@ -149,7 +149,7 @@ impl Emergencies {
             self.again = None;
         } else if due <= now {
             self.waiting.push_back(message);
-            self.again = repeat_time(objects).map(|period| (message, next_turn(due, period, now)));
+            self.again = repeat_time(objects).map(|period| (message, next_due(due, period, now)));
         }
     }
 

@@ -109,7 +109,7 @@ impl SdoServer {
     }
 
     /// Whether a sub-block is being sent. Any frame from the client cancels the rest of it.
-    pub(super) fn is_giving(&self) -> bool {
+    pub(super) fn is_sending_block(&self) -> bool {
         matches!(self.transfer, Transfer::Block { block: Block::Giving { .. }, .. })
     }
 

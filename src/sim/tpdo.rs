@@ -3,7 +3,7 @@
 
 use super::abort::Abort;
 use super::channels::Channels;
-use super::device::next_turn;
+use super::device::next_due;
 use super::objects::Objects;
 use crate::bus::time::Mono;
 use crate::canopen::id::CanId;
@@ -163,7 +163,7 @@ impl Tpdo {
         }
         // The timer counts from its previous due time, so that it does not drift.
         let from = self.timer.filter(|due| *due <= now).unwrap_or(now);
-        self.timer = self.event_timer(objects).map(|period| next_turn(from, period, now));
+        self.timer = self.event_timer(objects).map(|period| next_due(from, period, now));
         let inhibit = Duration::from_micros(100) * objects.number(self.communication(3));
         let free = self.sent_at.map_or(now, |sent| sent + inhibit);
         self.held_back = (free > now).then_some(free);

@@ -1,7 +1,7 @@
 //! Sets a measuring channel to zero (CiA 404, 6125h): measures, checks, writes the signature once, measures again.
 //!
-//! The limits are shares of the measuring range: a reading within 1 % is accepted, the total offset is limited to 5 %,
-//! and the readings may vary by 0.5 %. A limit that the user states also limits the total offset.
+//! By default the limits are parts of the measuring range: 1 % for the reading, 5 % for the total offset, 0.5 % for the
+//! variation of the readings. A larger limit from the user applies to the total offset, too.
 
 mod channel;
 mod failure;
@@ -19,7 +19,7 @@ use crate::master::{Master, SdoFailure};
 use crate::measure::sample::Number;
 use crate::node::survey::survey_nodes;
 use crate::node::write::write;
-use crate::node::{Error as Cannot, Node, Overrides};
+use crate::node::{Error as NodeError, Node, Overrides};
 use crate::tasks::store::{self, Group, StorePlan};
 use crate::tasks::{Effect, Failure, Kind, Note};
 use channel::{Channel, Offset};
@@ -39,7 +39,7 @@ pub struct Options {
     pub force: bool,
     /// Whether the zero is stored.
     pub store: bool,
-    /// Whether nothing is changed.
+    /// Whether to measure and check only.
     pub dry_run: bool,
 }
 
@@ -87,7 +87,7 @@ struct Procedure<'a> {
     group: Group,
 }
 
-/// The result of the signature.
+/// What the device showed after the signature.
 struct Written {
     offsets: Vec<Offset>,
     after: Samples,
@@ -184,14 +184,14 @@ impl<'a> Procedure<'a> {
         };
         let error = match write(master, device, channel.object, &channel.signature) {
             Ok(_) => None,
-            Err(Cannot::Unknown(error)) if !matches!(error.failure, SdoFailure::Cancelled) => Some(error),
-            Err(error @ (Cannot::Unknown(_) | Cannot::Bus(_) | Cannot::Interrupted)) => {
+            Err(NodeError::Unknown(error)) if !matches!(error.failure, SdoFailure::Cancelled) => Some(error),
+            Err(error @ (NodeError::Unknown(_) | NodeError::Bus(_) | NodeError::Interrupted)) => {
                 return Err(unsure(error.into()));
             }
             Err(error) => return Err(error.into()),
         };
         let after = samples::take(master, device, &channel.signal.name, count).map_err(unsure)?;
-        // Last: a device that restarted in between then shows the old offset.
+        // Read the offset last: if the device restarted in between, it shows the old offset.
         let offsets = channel::offsets(master, device, channel).map_err(unsure)?;
         let is_offset_proof = match error {
             None => None,
@@ -211,8 +211,8 @@ impl<'a> Procedure<'a> {
         pairs.into_iter().find(|(old, new)| old.value != new.value)
     }
 
-    /// The largest reading that is accepted as zero afterwards: the allowed variation of the readings; if that is
-    /// unknown, half of the reading before.
+    /// The largest reading that is accepted as zero afterwards: the allowed variation of the readings. If no limits are
+    /// known, it is half of the reading before.
     fn tolerance(&self) -> f64 {
         let before = self.before.mean().unwrap_or(0.0).abs();
         self.limits.map_or(before / 2.0, |limits| limits.spread).max(self.before.spread())
@@ -222,8 +222,8 @@ impl<'a> Procedure<'a> {
         samples.mean().is_some_and(|mean| mean.abs() <= self.tolerance())
     }
 
-    /// Whether the reading proves that the signature acted: it is nearer to zero by more than its variation. Not used
-    /// if the description names the object of the offset.
+    /// Whether the reading proves that the device executed the signature: it moved towards zero by more than its
+    /// variation. Always false if the description names the object of the offset.
     fn has_moved(&self, after: &Samples) -> bool {
         let means = self.before.mean().zip(after.mean()).filter(|_| !self.channel.is_described);
         means.is_some_and(|(before, after)| after.abs() + self.before.spread() < before.abs())
@@ -260,8 +260,8 @@ impl<'a> Procedure<'a> {
         fail(AutozeroFailure::NotZero { signal: self.channel.signal.name.clone(), reading, has_acted, offset })
     }
 
-    /// Stores the zero if requested, and checks that the stored offset is the new one: a device that restarts just
-    /// before the store keeps the old one.
+    /// Stores the zero if requested, and checks that the new offset was stored. A device that restarts just before the
+    /// store would store the old offset.
     fn keep(
         &self,
         master: &mut Master<'_>,

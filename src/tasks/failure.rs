@@ -153,13 +153,17 @@ impl Cause {
 }
 
 fn node_kind(error: &node::Error) -> Kind {
-    use node::Error as Cannot;
+    use node::Error as NodeError;
     match error {
-        Cannot::Bus(_) => Kind::Bus,
-        Cannot::Interrupted => Kind::Interrupted,
-        Cannot::Sdo(_) | Cannot::Unknown(_) | Cannot::NotKept { .. } | Cannot::Restarted(_) => Kind::Unexpected,
-        Cannot::Width { .. } | Cannot::Value { .. } | Cannot::TypeUnknown { .. } | Cannot::Name(_) => Kind::Usage,
-        Cannot::NoBootUp(_) => Kind::NoAnswer,
+        NodeError::Bus(_) => Kind::Bus,
+        NodeError::Interrupted => Kind::Interrupted,
+        NodeError::Sdo(_) | NodeError::Unknown(_) | NodeError::NotKept { .. } | NodeError::Restarted(_) => {
+            Kind::Unexpected
+        }
+        NodeError::Width { .. } | NodeError::Value { .. } | NodeError::TypeUnknown { .. } | NodeError::Name(_) => {
+            Kind::Usage
+        }
+        NodeError::NoBootUp(_) => Kind::NoAnswer,
     }
 }
 
@@ -305,17 +309,17 @@ impl From<Error> for Failure {
 
 impl From<node::Error> for Failure {
     fn from(error: node::Error) -> Failure {
-        use node::Error as Cannot;
+        use node::Error as NodeError;
         let (node, object) = match error {
-            Cannot::Bus(error) => return error.into(),
-            Cannot::Interrupted => return Error::Interrupted.into(),
-            Cannot::Sdo(error) | Cannot::Unknown(error) => return error.into(),
-            Cannot::NotKept { node, object, .. }
-            | Cannot::Width { node, object, .. }
-            | Cannot::Value { node, object, .. }
-            | Cannot::TypeUnknown { node, object } => (node, Some(object)),
-            Cannot::Name(ref error) => (error.node, None),
-            Cannot::Restarted(node) | Cannot::NoBootUp(node) => (node, None),
+            NodeError::Bus(error) => return error.into(),
+            NodeError::Interrupted => return Error::Interrupted.into(),
+            NodeError::Sdo(error) | NodeError::Unknown(error) => return error.into(),
+            NodeError::NotKept { node, object, .. }
+            | NodeError::Width { node, object, .. }
+            | NodeError::Value { node, object, .. }
+            | NodeError::TypeUnknown { node, object } => (node, Some(object)),
+            NodeError::Name(ref error) => (error.node, None),
+            NodeError::Restarted(node) | NodeError::NoBootUp(node) => (node, None),
         };
         Failure { object, ..Failure::at(node, Cause::Node(Arc::new(error))) }
     }

@@ -82,25 +82,26 @@ pub enum Mode {
 /// An event during a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LogEvent {
-    /// Something to know about the recording.
+    /// An observation that the summary contains as well.
     Remark(Remark),
     /// A node sent an emergency message with this meaning.
     Emergency(NodeId, Emergency, String),
-    /// SYNC at this interval and the TPDOs that follow it take this share of the bus (0 to 1).
+    /// The bus load (0 to 1) of SYNC at this interval and of the TPDOs that answer it.
     Share(Duration, f64),
     /// A node restarted.
     Restarted(NodeId),
-    /// The setup of a node was read again, and has these changes. From now on its frames are decoded with them.
+    /// The setup of a node was read again, and has these changes. Its next frames are decoded with the new setup.
     ReadAgain(NodeId, Vec<Change>),
-    /// The setup of a node could not be read again. The program tries further; until then the node's frames make no rows.
+    /// The setup of a node could not be read again. The program repeats the attempt. Until it succeeds, the node's frames
+    /// make no rows.
     Unreadable(NodeId, Box<Failure>),
     /// The heartbeat of a node stopped this long ago.
     HeartbeatLost(NodeId, Duration),
     /// The heartbeat of a node is back.
     HeartbeatBack(NodeId),
-    /// By its heartbeat, a node is no longer operational.
+    /// The heartbeat of a node shows another state than OPERATIONAL.
     State(NodeId, NmtState),
-    /// A TPDO or polled value of the node came after this interval, longer than [`LogOptions::max_gap`].
+    /// The interval before a TPDO or polled value of the node was longer than [`LogOptions::max_gap`].
     Gap(NodeId, Duration),
     /// The node has sent no samples for this time.
     Silent(NodeId, Duration),
@@ -112,7 +113,7 @@ pub enum LogEvent {
     LongerTpdo(NodeId, usize, usize),
     /// The heartbeats of the node have this many bytes, not one.
     HeartbeatLength(NodeId, usize),
-    /// A node sent this emergency with this meaning again, so many times.
+    /// A node repeated this emergency with this meaning, this many times.
     EmergencyRepeated(NodeId, Emergency, String, u64),
     /// The controller reports a fault.
     Fault(Fault),
@@ -152,7 +153,7 @@ pub trait Observer {
         ControlFlow::Continue(())
     }
 
-    /// Samples that were requested in this cycle, which need not be the last one.
+    /// Samples that were requested in this cycle, which may be an earlier one.
     fn polled(&mut self, _cycle: u64, samples: &[Sample], sources: &[Source]) -> ControlFlow<()> {
         self.samples(samples, sources)
     }
@@ -183,7 +184,7 @@ pub struct RecordingReport {
     pub failed: Vec<Failure>,
     /// Nodes that sent no samples, or stopped before the end.
     pub lost: Vec<NodeId>,
-    /// Why there is not one value.
+    /// Why there are no values.
     pub nothing: Option<Failure>,
     /// Frames dropped by the kernel.
     pub dropped: u64,
@@ -201,7 +202,7 @@ pub struct RecordingReport {
     pub receive_buffer: Option<ReceiveBuffer>,
     /// The source of the time stamps.
     pub timestamps: TimestampSource,
-    /// What else to know.
+    /// Further observations.
     pub remarks: Vec<Remark>,
     /// Whether the user ended it.
     pub interrupted: bool,
@@ -213,10 +214,10 @@ const FIRST_SAMPLE_TIMEOUT: Duration = Duration::from_secs(5);
 /// The interval of [`Observer::tick`].
 const TICK: Duration = Duration::from_millis(100);
 
-/// Records.
+/// Records until the duration, the count, Ctrl-C or the observer ends the recording.
 ///
 /// # Errors
-/// What stops it before the first value. Later every end is an [`RecordingReport`].
+/// The recording fails before its first value. After the first value, Ctrl-C returns a [`RecordingReport`].
 pub fn log(
     master: &mut Master<'_>,
     options: &LogOptions,
@@ -245,7 +246,7 @@ pub fn log(
     }
     recording.take_overloads();
     recording.update_sources();
-    recording.excuse_nodes_without_signals();
+    recording.ignore_nodes_without_signals();
     observer.sources(recording.decoder.sources())?;
     recording.report_shared_cob_ids(master.bus().now(), observer);
     if recording.poll.is_none() {
@@ -315,7 +316,7 @@ fn record_passively(
     finish(recording, result)
 }
 
-/// With at least one value, Ctrl-C is an end and not a failure.
+/// Makes the report. If at least one value was recorded, Ctrl-C is not a failure.
 fn finish(mut recording: Recording<'_>, result: Result<(), Error>) -> Result<RecordingReport, Failure> {
     match result {
         Ok(()) => {}

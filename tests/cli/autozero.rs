@@ -112,7 +112,7 @@ fn unsteady_or_invalid_reading_is_refused() {
         &Bench::described(overloaded),
         "autozero 1",
         "cangauge: node 1: pressure has no valid value: overload-low: nothing was changed\n\
-         hint: find the reason, then try again\n",
+         hint: show the errors of the device: cangauge errors 1\n",
     );
     // With --force, the reading afterwards is still not zero: an error.
     let done = Bench::described(overloaded).run("autozero 1 --force").exit(6);
@@ -175,5 +175,5 @@ fn arguments_are_checked_before_the_bus_is_opened() {
     bench.run("autozero 1 --limit 0").refuses("\"0\": a limit must be greater than 0");
     bench.run("autozero 1 --samples 1").exit(2);
     let done = bench.run("autozero 1 --limit 5degC").exit(2);
-    assert!(done.stderr.contains("pressure is in bar, and a limit in degC does not convert"), "{}", done.stderr);
+    assert!(done.stderr.contains("the limit in degC cannot be converted: pressure is in bar"), "{}", done.stderr);
 }

@@ -89,7 +89,7 @@ fn value_is_written_with_the_width_of_its_type() {
 fn acknowledged_value_that_is_not_kept_is_exit_6() {
     // HYDAC: a COB-ID of 0 sets the default.
     let bench = Bench::of("hydac@5");
-    let message = "0x1800:1 was acknowledged and reads 0x85010040 instead of 0x00000000";
+    let message = "the write of 0x1800:1 was acknowledged, but it reads 0x85010040 instead of 0x00000000";
     bench.run("sdo write 5 0x1800:1 0 --verify").fails(6, &format!("cangauge: node 5: {message}\n"));
 }
 

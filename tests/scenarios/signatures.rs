@@ -209,7 +209,7 @@ fn reported_zero_matches_the_device() {
                     assert!(!nothing || sent_count == 0, "{place}");
                     assert!(nothing || sent_count == 1 || fault != Fault::Interrupt, "{place}");
                     assert!(!nothing || holds == [0; 4], "{place}");
-                    if sent_count > 0 && ErrorMessage::of(&failure).message.contains("the offset is as before") {
+                    if sent_count > 0 && ErrorMessage::of(&failure).message.contains("the offset is unchanged") {
                         assert_eq!(holds, [0; 4], "{place}");
                     }
                     assert_eq!(failure.kind() == Kind::Interrupted, fault == Fault::Interrupt, "{place}");

@@ -23,11 +23,12 @@ use crate::tasks::{Failure, Kind, Note};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Set a device as a file says: check the file, write what differs, read everything back
+/// Set a device from a file: check the file, write the differences, read everything back
 ///
 /// Order: sensor type, unit, digits, filter, limits, other objects, guarding and heartbeat, TPDOs, COB-IDs, store, and
-/// last node-ID and bit rate. A second run prints "0 changes". If a write fails, the command says what was written and
-/// what was not; the same command continues, and --rollback goes back.
+/// last node-ID and bit rate. A second run prints "0 changes". If a write fails, the error lists the written settings
+/// and the missing ones. Run the same command again to continue, or with --rollback to restore the old settings. They are
+/// kept in $XDG_STATE_HOME/cangauge (or ~/.local/state/cangauge) until the change is complete.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1 mh4.toml --store --reset\n  cangauge config apply 1-16 mh4.toml --store\n  cangauge config apply --table forty.csv mh4.toml --address --store --record forty.html\n  cangauge config apply 1 --rollback"
@@ -54,7 +55,7 @@ pub(super) struct Apply {
     /// Set [calibration], too. The serial number must be equal
     #[arg(long)]
     with_calibration: bool,
-    /// Go back to the settings before the last apply that failed or was killed
+    /// Restore the settings from before the last apply that failed or was killed
     #[arg(long, conflicts_with_all = ["exact", "address", "with_calibration"])]
     rollback: bool,
     /// Set many devices, one row each: vendor, product, serial, node (with --address), and columns that fill in

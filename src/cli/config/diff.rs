@@ -15,8 +15,8 @@ use clap::Args;
 
 /// Compare a device with a file, two devices, or two files; exit 1 if anything differs
 ///
-/// [address] and [calibration] differ between devices of one kind: they are compared only with --address and
-/// --with-calibration, and always between two files.
+/// Each device has its own [address] and [calibration]. So they are compared only with --address and --with-calibration.
+/// Between two files they are always compared.
 #[derive(Debug, Args)]
 pub(super) struct Diff {
     /// Node-ID or file

@@ -62,7 +62,7 @@ pub(super) struct Set {
 
 #[derive(Debug, Args)]
 struct RateOptions {
-    /// Index in the bit rate table of the device, if its table is unknown
+    /// Index of the bit rate in the table of the device; --retime needs RATE as well
     #[arg(long, value_name = "N")]
     table_index: Option<u8>,
     /// Switch the host interface as well; store after the device responds at the new bit rate. Requires that the device

@@ -29,8 +29,8 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
             Words::new(format!("it has no autozero of channel {channel} (no {object})"))
         }
         AutozeroFailure::LimitUnit { signal, unit, limit } => {
-            let present = unit.map_or_else(|| "in no known unit".to_owned(), |unit| format!("in {unit}"));
-            Words::new(format!("{signal} is {present}, and a limit in {limit} does not convert"))
+            let present = unit.map_or_else(|| "has no known unit".to_owned(), |unit| format!("is in {unit}"));
+            Words::new(format!("the limit in {limit} cannot be converted: {signal} {present}"))
         }
         AutozeroFailure::RestartedBefore => {
             Words::new("the device restarted during the measurement: nothing was changed")
@@ -38,11 +38,11 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
         AutozeroFailure::Unsafe { objection, channel } => {
             let words = Words::new(format!("{}: nothing was changed", reason(objection)));
             let choice = channel.map(|channel| format!(" --channel {channel}")).unwrap_or_default();
-            words.hint(way_out(objection, &format!("cangauge autozero {node}{choice}")))
+            words.hint(remedy(objection, &node, &choice))
         }
-        AutozeroFailure::RestartedAfter => {
-            Words::new("the device accepted the signature and restarted: a zero that was not stored is lost")
-        }
+        AutozeroFailure::RestartedAfter => Words::new(
+            "the device accepted the signature, then restarted: the zero is lost unless the device stored it",
+        ),
         AutozeroFailure::NotZero { signal, reading, has_acted, offset } => {
             let reads = match reading {
                 Some(mean) if *has_acted => format!("{signal} reads {} afterwards, not zero", quantity(*mean)),
@@ -51,13 +51,13 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
             };
             let offset = match offset {
                 OffsetChange::Changed(old, new) => format!("the offset went from {old} to {new}"),
-                OffsetChange::Unchanged => "the offset is as before".to_owned(),
-                OffsetChange::Unreadable => "no offset can be read here".to_owned(),
+                OffsetChange::Unchanged => "the offset is unchanged".to_owned(),
+                OffsetChange::Unreadable => "the offset cannot be read".to_owned(),
             };
             Words::new(format!("the device accepted the signature, and {reads}; {offset}"))
         }
         AutozeroFailure::OtherOffsetStored => {
-            Words::new("the offset has changed since it was set: the stored offset is not this zero")
+            Words::new("the offset changed between the zero and the store: another offset was stored")
         }
     }
 }
@@ -103,13 +103,15 @@ fn reason(objection: &Objection) -> String {
 }
 
 /// What to do about an objection.
-fn way_out(objection: &Objection, command: &str) -> String {
+fn remedy(objection: &Objection, node: &str, choice: &str) -> String {
     match objection {
         Objection::Absolute => "apply a vacuum and use --force".to_owned(),
-        Objection::Invalid { .. } => "find the reason, then try again".to_owned(),
+        Objection::Invalid { .. } => format!("show the errors of the device: cangauge errors {node}"),
         Objection::RangeUnknown { .. } => "state the largest reading to accept as zero: --limit VALUE".to_owned(),
         Objection::TooFar { enough, .. } => {
-            format!("vent or isolate the line; if the limit is too low: {command} --limit {enough}")
+            format!(
+                "vent or isolate the line; if the limit is too low: cangauge autozero {node}{choice} --limit {enough}"
+            )
         }
         Objection::Unsteady { .. } => "wait until the pressure is steady, or use --force".to_owned(),
         Objection::TotalOffset { .. } => {
@@ -131,14 +133,14 @@ pub(in crate::output) fn effect(node: &str, effect: &AutozeroEffect) -> NoteText
         AutozeroEffect::OffsetBefore { offset, signal } => {
             let text = match offset {
                 Some((object, number)) => format!("the offset {object} was {number}"),
-                None => "no offset can be read here".to_owned(),
+                None => "the offset cannot be read".to_owned(),
             };
             look(NoteText::new("offset-before", text), &offset.map(|(object, _)| object.to_string()), signal)
         }
         AutozeroEffect::NoChangeSeen { offset, signal } => {
             let text = match offset {
-                Some(_) => "the offset is as before",
-                None => "no offset can be read here, and the reading is not zero",
+                Some(_) => "the offset is unchanged",
+                None => "the offset cannot be read, and the reading is not zero",
             };
             look(NoteText::new("no-change-seen", text), &offset.map(|object| object.to_string()), signal)
         }
@@ -146,7 +148,7 @@ pub(in crate::output) fn effect(node: &str, effect: &AutozeroEffect) -> NoteText
             NoteText::new("zero-moved", format!("the zero was moved by {}", quantity(*shift)))
         }
         AutozeroEffect::Moved(None) => NoteText::new("zero-moved", "the zero was set"),
-        AutozeroEffect::Stored => NoteText::new("stored", "it was stored"),
+        AutozeroEffect::Stored => NoteText::new("stored", "the zero was stored"),
         AutozeroEffect::Undo(undo) => undo_text(node, undo),
     }
 }
@@ -179,9 +181,11 @@ fn undo_text(node: &str, undo: &Undo) -> NoteText {
             NoteText::new("undo", "the previous offset is known")
                 .command("undo", format!("cangauge sdo write {node} {object} {value} --type {data_type}{store}"))
         }
-        Undo::Restore => NoteText::new("undo", "no offset can be written; the factory defaults undo it")
-            .command("undo", format!("cangauge restore {node} --reset")),
-        Undo::Reset => NoteText::new("undo", "the zero is not stored, so a reset undoes it")
+        Undo::Restore => {
+            NoteText::new("undo", "the offset cannot be written; only the factory defaults remove the zero")
+                .command("undo", format!("cangauge restore {node} --reset"))
+        }
+        Undo::Reset => NoteText::new("undo", "the zero is not stored, so a reset removes it")
             .command("undo", format!("cangauge nmt reset {node}")),
     }
 }

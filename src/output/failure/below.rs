@@ -36,7 +36,7 @@ pub(super) fn bus(error: &BusError) -> Words {
             Some(hint) => words.hint(hint),
             None => words,
         },
-        BusError::Unsupported(_) => words.hint("without it: --bus sim"),
+        BusError::Unsupported(_) => words.hint("use simulated devices: --bus sim"),
         _ => words,
     }
 }
@@ -91,8 +91,8 @@ pub(super) fn sdo(error: &SdoError) -> Words {
             }
         }
         SdoFailure::TwoDevices(_) | SdoFailure::NotWritten(_) => words.hint(format!(
-            "disconnect one of them, or give one another node-ID: cangauge lss scan; to see both answers: cangauge \
-             scan {} --trace -",
+            "disconnect one of them, or change its node-ID: cangauge lss scan; to see both answers: cangauge scan {} \
+             --trace -",
             error.node
         )),
         SdoFailure::Disturbed => words.hint("stop the other program for a moment, or try again"),

@@ -33,7 +33,8 @@ pub(super) fn words(cause: &ConfigFailure) -> Words {
         }
         ConfigFailure::OthersOnBus { nodes } => {
             let list: Vec<String> = nodes.iter().map(ToString::to_string).collect();
-            Words::new(format!("on the bus: node {}: nothing was changed", list.join(", ")))
+            let nodes = if nodes.len() == 1 { "node" } else { "nodes" };
+            Words::new(format!("{nodes} {} on the bus: nothing was changed", list.join(", ")))
                 .hint("a node-ID must be free, and a bit rate is only set on a bus with one node")
         }
         ConfigFailure::NotOneDevice { serial, nodes } if nodes.is_empty() => {
@@ -75,7 +76,7 @@ fn of_problem(problem: &Problem) -> Words {
             "a number without a unit, and the file sets no unit for this signal (\"3.2 bar\")".to_owned()
         }
         Problem::OtherQuantity { from, to } => format!("{from} cannot be converted to {to}, the unit of the signal"),
-        Problem::TooFine { digits } => format!("the device has {digits} decimal digits: the number is too fine"),
+        Problem::TooFine { digits } => format!("the number has more than the {digits} decimal digits of the device"),
         Problem::Value(error) => error.to_string(),
         Problem::Range { low, high } => match (low.is_empty(), high.is_empty()) {
             (_, true) => format!("below the lowest value {low}"),
@@ -89,7 +90,7 @@ fn of_problem(problem: &Problem) -> Words {
         }
         Problem::NotACobId { text } => format!("\"{text}\" is not an 11-bit identifier (0x1A5) or \"default\""),
         Problem::Restricted { id } => format!("CiA 301 reserves the identifier 0x{id:X} for other services"),
-        Problem::SameId { id, other } => format!("the identifier 0x{id:X} is also that of {other}"),
+        Problem::SameId { id, other } => format!("{other} uses the identifier 0x{id:X} too"),
         Problem::NoId => "a TPDO that is on needs an identifier: add its cob-id to [address]".to_owned(),
         Problem::NotABitRate { text } => format!("\"{text}\" is not a bit rate (250k, 1M)"),
         Problem::Bits { bits } => format!("{bits} bits: a TPDO has at most 64"),
@@ -101,7 +102,7 @@ fn of_problem(problem: &Problem) -> Words {
         Problem::Fixed { present: None } => "the device cannot change it".to_owned(),
         Problem::Crossed { other, value } => format!("beyond {other}, which is {value}"),
         Problem::Excluded { other, value } => {
-            format!("the device accepts it only if {other} is 0, and that is {value}")
+            format!("the device accepts it only if {other} is 0; {other} is {value}")
         }
     })
 }
@@ -137,7 +138,10 @@ pub(in crate::output) fn fact(fact: &ConfigFact) -> NoteText {
         }
         ConfigFact::NotInFile { keys } => NoteText::new(
             "not-in-file",
-            format!("not the factory default and not in the file: {} (--exact sets them)", keys.join(", ")),
+            format!(
+                "these are not in the file and not at their factory defaults: {} (--exact sets the defaults)",
+                keys.join(", ")
+            ),
         ),
         ConfigFact::RateAfterRestart { rate } => NoteText::new(
             "rate-after-restart",

@@ -42,7 +42,7 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
         LogFailure::UnknownMapping => {
             let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
             Words::new("it sends TPDOs, and their mapping is unknown").hint(format!(
-                "name the device: --device {node}=mh4 (or a file), or record from the start of a log that reads it"
+                "name the device: --device {node}=mh4 (or a file), or start recording before another master reads it"
             ))
         }
         LogFailure::NothingReceived { within, nodes, has_traffic, interface } => {

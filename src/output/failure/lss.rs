@@ -13,7 +13,7 @@ use crate::tasks::lss::{
 };
 
 /// What to do if one identity or one node-ID belongs to several devices.
-const CONNECT_ALONE: &str = "connect the device as the only one";
+const CONNECT_ALONE: &str = "connect only this device";
 
 /// The message and the hint for a cause. A device without a known node-ID is named by its identity.
 pub(super) fn words(failure: &Failure, cause: &LssFailure) -> Words {
@@ -29,7 +29,7 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
         LssCause::Service(error) => service(&cause.device, error),
         LssCause::NoSerialNumber => {
             Words::new("it has no serial number, so it cannot be distinguished from another device")
-                .hint("connect it as the only device, and use the target \"only\"")
+                .hint("connect only this device, and use the target \"only\"")
         }
         LssCause::DuplicateNodeId(sign) => {
             Words::new(format!("{}: it seems that several devices have this node-ID", duplicate(*sign))).hint(
@@ -59,8 +59,8 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
             .hint("read its identity by SDO: cangauge scan"),
         LssCause::Taken(new, sign) => {
             let sign = match sign {
-                TakenSign::Answer => "a node answers there",
-                TakenSign::Heartbeat => "a node sends heartbeats there",
+                TakenSign::Answer => "a node answers",
+                TakenSign::Heartbeat => "a node sends heartbeats",
             };
             Words::new(format!("node-ID {new} is taken ({sign})")).hint("list the devices: cangauge lss scan")
         }
@@ -90,8 +90,8 @@ fn service(device: &DeviceName, error: &LssError) -> Words {
     let is_silent = matches!(error, LssError::NoAnswer { service, .. } if below::is_addressing(*service));
     match (device.node, device.address) {
         (Some(node), Some(address)) if is_silent => words.hint(format!(
-            "it may answer LSS in STOPPED only: cangauge nmt stop {node}; cangauge lss inquire {address} (if that \
-             answers, give the same target to the other LSS commands); cangauge nmt preop {node}"
+            "it may answer LSS in STOPPED only: cangauge nmt stop {node}; cangauge lss inquire {address} (if it answers, \
+             use this target for the other LSS commands); cangauge nmt preop {node}"
         )),
         _ => words,
     }
@@ -158,8 +158,10 @@ fn after_reset(failure: &Failure, cause: &LssCause) -> Words {
             };
             Words::new(format!("not reset, because {why}: node-ID {new} is not confirmed"))
         }
-        LssCause::OtherDeviceAnswers(found) => Words::new(format!("another device answers there: {found}")),
-        LssCause::NotIdentified => Words::new("the device there reports no identity"),
+        LssCause::OtherDeviceAnswers(found) => {
+            Words::new(format!("another device answers under the new node-ID: {found}"))
+        }
+        LssCause::NotIdentified => Words::new("the device with the new node-ID reports no identity"),
         LssCause::DuplicateNewNodeId(sign) => {
             Words::new(format!("{}: several devices have this node-ID", duplicate(*sign)))
         }
@@ -226,25 +228,28 @@ pub(in crate::output) fn effect(effect: &LssEffect) -> NoteText {
             "host-restored",
             format!("the host is back at {}", short(*bit_rate)),
         )
-        .command("nothing was stored: power the device off and on, then see whether it answers", "cangauge lss scan"),
+        .command("nothing was stored; power the device off and on, then check that it answers", "cangauge lss scan"),
         LssEffect::HostIsBack { bit_rate, new, device_answers: true } => {
             let (old, new) = (short(*bit_rate), short(*new));
-            let message = format!("it still answers at {old}, and the host is back at {old}; see its manual for {new}");
-            NoteText::new("host-restored", message).command("see its state", "cangauge lss scan")
+            let message =
+                format!("the device still answers at {old}, and the host is back at {old}; check its manual for {new}");
+            NoteText::new("host-restored", message).command("show its state", "cangauge lss scan")
         }
         LssEffect::Progress(device, done, next) => {
             let text = NoteText::new("progress", progress(done));
             match next {
                 NextStep::Cause => text,
                 NextStep::SeeAfterPowerCycle => {
-                    text.command("power it off and on, then see its node-ID", "cangauge lss scan")
+                    text.command("power it off and on, then show its node-ID", "cangauge lss scan")
                 }
                 NextStep::StoreAgain => text.command(
-                    "store it again, or power it off and on and see what it has kept",
+                    "store again, or power the device off and on and check its settings",
                     format!("cangauge lss store {}", argument(device)),
                 ),
-                NextStep::PowerCycle => text
-                    .command("power off and on discards what is not stored; then see its node-ID", "cangauge lss scan"),
+                NextStep::PowerCycle => text.command(
+                    "power the device off and on to discard values that are not stored, then show its node-ID",
+                    "cangauge lss scan",
+                ),
             }
         }
     }

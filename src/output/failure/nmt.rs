@@ -12,7 +12,7 @@ pub(super) fn words(failure: &Failure, cause: &NmtFailure) -> Words {
         NmtFailure::NoSign => Words::new("command sent, but no heartbeat, no boot-up and no SDO answer came")
             .hint("list the nodes: cangauge scan"),
         NmtFailure::NoBootUp => Words::new("command sent, but no boot-up message came")
-            .hint(format!("check whether the node is there: cangauge nmt state {node}")),
+            .hint(format!("check whether the node answers: cangauge nmt state {node}")),
         NmtFailure::NotConfirmed => Words::new("command sent, not confirmed: the node sends no heartbeat (1017h is 0)")
             .hint(format!("set a heartbeat: cangauge sdo write {node} producer-heartbeat-time 1000")),
         NmtFailure::Absent => Words::new("no heartbeat and no SDO answer").hint("list the nodes: cangauge scan"),

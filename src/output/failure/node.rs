@@ -15,7 +15,7 @@ pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
         Error::Sdo(error) | Error::Unknown(error) => super::below::sdo(error),
         Error::NotKept { object, written, found, .. } => {
             let (found, written) = (shown(found), shown(written));
-            Words::new(format!("{object} was acknowledged and reads {found} instead of {written}"))
+            Words::new(format!("the write of {object} was acknowledged, but it reads {found} instead of {written}"))
         }
         Error::Width { object, width, given, .. } => Words::new(format!(
             "write {object}: the object has {width} bytes, the value {given}, and the device accepts no size"
@@ -34,7 +34,7 @@ pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
         Error::Restarted(_) => Words::new("the device restarted"),
         Error::NoBootUp(_) => match failure.node {
             Some(node) => Words::new("no boot-up message after the reset")
-                .hint(format!("check whether it is there: cangauge nmt state {node}; cangauge scan")),
+                .hint(format!("check whether it answers: cangauge nmt state {node}; cangauge scan")),
             None => Words::new("no boot-up message after the reset"),
         },
     }

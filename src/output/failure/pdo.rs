@@ -93,7 +93,7 @@ fn occupant(by: &Occupant) -> String {
         Occupant::Service(name) => (*name).to_owned(),
         Occupant::Own(name) => format!("its {name}"),
         Occupant::Other(node, name) => format!("{name} of node {node}"),
-        Occupant::Traffic => "a node that sends with it".to_owned(),
+        Occupant::Traffic => "an unknown sender".to_owned(),
     }
 }
 
@@ -129,7 +129,7 @@ fn step(error: &StepError, write: Option<&StepWrite>) -> String {
         StepError::Interrupted => at.map_or_else(|| "interrupted".to_owned(), |at| format!("interrupted at {at}")),
         StepError::Bus(error) => at.map_or_else(|| error.to_string(), |at| format!("{error} at {at}")),
         StepError::NotKept { object, found, written } => {
-            format!("{object} was acknowledged and reads {found:#X} instead of {written:#X}")
+            format!("the write of {object} was acknowledged, but it reads {found:#X} instead of {written:#X}")
         }
     }
 }

@@ -123,8 +123,8 @@ pub(in crate::output) fn fact(node: Option<NodeId>, fact: &StoreFact) -> NoteTex
         StoreFact::Unchanged(settings) => NoteText::new(
             "unchanged",
             format!(
-                "the device was reset; these did not change and differ from the usual defaults; they are factory \
-                 settings, or were not restored: {}",
+                "the device was reset; these settings did not change and are not the usual defaults: either the \
+                 factory set them, or they were not restored: {}",
                 list(settings, with_value)
             ),
         ),

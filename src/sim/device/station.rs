@@ -56,7 +56,7 @@ impl Station for Device {
         let Phase::Running(state) = self.phase else { return };
         if let Some(due) = self.heartbeat.filter(|due| *due <= now) {
             out.send(Frame::byte(CanId::heartbeat(self.memory.node), state.code()));
-            self.heartbeat = self.heartbeat_period().map(|period| next_turn(due, period, now));
+            self.heartbeat = self.heartbeat_period().map(|period| next_due(due, period, now));
         }
         if self.sdo.deadline().is_some_and(|deadline| deadline <= now)
             && let Some(abort) = self.sdo.give_up()

@@ -435,8 +435,8 @@ fn the_seed_decides_the_frames() {
 #[test]
 fn periods_do_not_drift_and_missed_ones_are_skipped() {
     let second = Duration::from_secs(1);
-    assert_eq!(next_turn(ms(1000), second, ms(1000)), ms(2000));
-    assert_eq!(next_turn(ms(1000), second, ms(1999)), ms(2000));
-    assert_eq!(next_turn(ms(1000), second, ms(2000)), ms(3000));
-    assert_eq!(next_turn(ms(1000), second, ms(90_500)), ms(91_500));
+    assert_eq!(next_due(ms(1000), second, ms(1000)), ms(2000));
+    assert_eq!(next_due(ms(1000), second, ms(1999)), ms(2000));
+    assert_eq!(next_due(ms(1000), second, ms(2000)), ms(3000));
+    assert_eq!(next_due(ms(1000), second, ms(90_500)), ms(91_500));
 }

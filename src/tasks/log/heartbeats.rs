@@ -7,10 +7,10 @@ use crate::node::Node;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A heartbeat is lost after two periods and this time: devices keep their period no better.
+/// A heartbeat is lost after two periods and this tolerance. The timers of devices are inaccurate.
 const TOLERANCE: Duration = Duration::from_millis(50);
 
-/// What a heartbeat or boot-up message changes.
+/// The effect of a heartbeat or boot-up message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum HeartbeatChange {
     /// Nothing.
@@ -80,7 +80,7 @@ impl HeartbeatMonitor {
         Some((node, now.since(heartbeat.last)))
     }
 
-    /// Nothing could be received until now: all periods start here.
+    /// Starts all periods now, because nothing could be received before.
     pub(super) fn restart(&mut self, now: Mono) {
         self.heartbeats.values_mut().for_each(|heartbeat| heartbeat.last = now);
     }

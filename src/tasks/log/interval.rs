@@ -1,4 +1,4 @@
-//! How often something is received, when an interval is a gap, and when the sender counts as silent.
+//! The usual interval of messages. It decides which interval is a gap, and when the sender counts as silent.
 
 use crate::bus::Mono;
 use std::time::Duration;
@@ -12,7 +12,7 @@ const SILENCE_FACTOR: u32 = 5;
 /// A sender is never silent before this time.
 const MIN_SILENCE: Duration = Duration::from_secs(1);
 
-/// The usual interval of something, and when it was last received.
+/// The usual interval of a message, and the time of the last one.
 #[derive(Clone, Debug, Default)]
 pub(super) struct IntervalTracker {
     last: Option<Mono>,
@@ -20,16 +20,16 @@ pub(super) struct IntervalTracker {
 }
 
 impl IntervalTracker {
-    /// Takes one reception. Returns the interval since the last one if it is a gap: longer than `max_gap`, or than
-    /// three usual intervals if there is no `max_gap`.
+    /// Adds a message received at `now`. Returns the interval since the last one if it is a gap: longer than `max_gap`, or
+    /// than three usual intervals if there is no `max_gap`.
     pub(super) fn add(&mut self, now: Mono, max_gap: Option<Duration>) -> Option<Duration> {
         let mut gap = None;
         if let Some(last) = self.last.filter(|&last| last < now) {
             let interval = now.since(last);
             let longest = max_gap.or(self.usual.map(|usual| usual * GAP_FACTOR));
             gap = longest.filter(|&longest| interval > longest).map(|_| interval);
-            // A gap counts only as the longest interval that is none. So the next gap is detected as well, and a
-            // sender that became slower has its new interval after a few receptions.
+            // In the average, an interval counts as at most three usual ones. So one gap does not hide the next one. If a
+            // sender becomes slower, its new interval is the usual one after a few messages.
             self.usual = Some(match self.usual {
                 Some(usual) => (usual * 7 + interval.min(usual * GAP_FACTOR)) / 8,
                 None => interval,
@@ -55,7 +55,7 @@ impl IntervalTracker {
         self.last.is_none() || self.silence(now).is_some()
     }
 
-    /// Nothing could be received until now: the silence starts here.
+    /// Starts the silence now, because nothing could be received before.
     pub(super) fn restart(&mut self, now: Mono) {
         self.last = self.last.map(|_| now);
     }

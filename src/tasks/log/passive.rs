@@ -1,5 +1,5 @@
-//! Passive recording: the setup of the nodes is read from the SDO traffic of another master, or taken from a
-//! description that the user names. It is never guessed.
+//! Passive recording. The setup of the nodes comes from the SDO traffic of another master, or from a description that the
+//! user names. It is never guessed.
 
 use crate::bus::Received;
 use crate::canopen::frame::Frame;
@@ -48,8 +48,8 @@ impl SetupListener {
         nodes.into_iter().for_each(|node| self.update(node, decoder));
     }
 
-    /// Takes a frame. If it completes the setup of a TPDO, `decoder` decodes that TPDO from now on. Returns a recorded node
-    /// of which something new is known.
+    /// Takes a frame. If it completes the setup of a TPDO, `decoder` decodes that TPDO from now on. Returns the recorded node
+    /// if the frame contained information about it.
     pub(super) fn take(&mut self, received: &Received, decoder: &mut Decoder) -> Option<NodeId> {
         let frame = &received.frame;
         if let Some((node, _)) = self.overheard.take(frame).filter(|(node, _)| self.nodes.contains(node)) {
@@ -75,7 +75,7 @@ impl SetupListener {
         }
     }
 
-    /// An object's number: overheard, else the default of the description that the user named.
+    /// The number in an object: from the SDO traffic, else the default in the description that the user named.
     fn number(&self, node: NodeId, object: ObjectId) -> Option<u32> {
         let default = || first_four(&self.named(node)?.dictionary.get(object)?.default_bytes(node)?).into();
         self.overheard.number(node, object).or_else(default)
@@ -115,7 +115,7 @@ impl SetupListener {
         }
     }
 
-    /// The node as far as it is known, with the TPDOs whose COB-ID and whole mapping are known.
+    /// What is known of a node. It contains only TPDOs with known COB-ID and complete mapping.
     pub(super) fn known_node(&self, id: NodeId) -> Node {
         let mut node = Node::new(id);
         node.identity = self.overheard.identity(id);

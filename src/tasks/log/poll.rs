@@ -68,7 +68,8 @@ impl Poll {
     /// A requested signal cannot be read.
     pub(super) fn set_node(&mut self, node: &Node, wanted: &[Wanted], decoder: &mut Decoder) -> Result<(), Failure> {
         let mut number = 0;
-        // Of several nodes each is polled for the signals it has. At least one has them: that was checked before.
+        // If a node lacks a requested signal, only its other signals are polled. `check_wanted` ensures that at least one
+        // node has the signal.
         let has = |item: &Wanted| match item {
             Wanted::Signal(name) | Wanted::Status(name) => node.signals.iter().any(|signal| signal.name == *name),
             Wanted::Object(..) | Wanted::Named(..) => true,
@@ -79,7 +80,7 @@ impl Poll {
         }
         for mut target in targets(node, &own, &mut number)? {
             target.reading.source = decoder.add_source(target.source.clone());
-            // Earlier places of this node are free again.
+            // Reuse the places of earlier targets of this node.
             let is_free = |&at: &usize| {
                 !self.live[at] && self.answers[at].under_way == 0 && self.targets[at].source.node == node.id
             };

@@ -15,8 +15,8 @@ pub struct SyncStatistics {
     pub sent: u64,
     /// SYNC messages omitted because their time had passed or the bus did not accept them.
     pub left_out: u64,
-    /// The delay of each SYNC after its nominal time. Nominal times are multiples of the interval since the start: a
-    /// delay does not shift later ones.
+    /// The delay of each SYNC after its nominal time. Nominal times are multiples of the interval since the start, so one
+    /// delay does not shift later times.
     pub delays: Histogram,
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Producer {
     overflow: Option<u8>,
     start: Mono,
     slot: u64,
-    /// The slot whose SYNC the master has, and the bus has not sent yet.
+    /// The slot of the SYNC that is queued and not sent yet.
     waiting: Option<u64>,
     statistics: SyncStatistics,
 }
@@ -54,7 +54,7 @@ impl Producer {
         }
     }
 
-    /// When the next SYNC is due. It is computed from the start, so that nothing drifts.
+    /// When the next SYNC is due. The time is computed from the start, so it does not drift.
     pub(super) fn due(&self) -> Mono {
         self.start + nth(self.interval, self.slot)
     }
@@ -92,8 +92,8 @@ impl Producer {
     }
 }
 
-/// The slot that follows `slot`. A program that was stopped omits the SYNC messages it has missed: a burst would not be
-/// periodic, and two would be closer together than the interval.
+/// The slot that follows `slot`. If the program was stopped, the missed SYNC messages are omitted. Otherwise they would
+/// be sent in a burst, closer together than the interval.
 fn next_slot(start: Mono, now: Mono, interval: Duration, slot: u64) -> u64 {
     let passed = now.since(start).as_nanos() / interval.as_nanos().max(1);
     let passed = u64::try_from(passed).unwrap_or(u64::MAX - 2);

@@ -29,10 +29,10 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 use tally::Tally;
 
-/// In a shorter recording, a signal without values is no finding.
+/// A signal without values is reported only if the recording is at least this long.
 const MIN_SIGNAL_TIME: Duration = Duration::from_secs(1);
 
-/// A recording: what is known of the nodes, and what was recorded.
+/// A recording: the setup of the nodes, and what was recorded.
 pub(super) struct Recording<'o> {
     pub(super) options: &'o LogOptions,
     pub(super) nodes: Vec<Node>,
@@ -58,9 +58,9 @@ pub(super) struct Recording<'o> {
     started: Mono,
     /// Nodes whose TPDOs were reported to have a wrong length.
     wrong_length_reported: BTreeSet<NodeId>,
-    /// Nodes whose heartbeats were reported to have not one byte.
-    odd_heartbeats: BTreeSet<NodeId>,
-    /// What each node sent last.
+    /// Nodes whose heartbeats were reported to have a wrong length.
+    heartbeat_length_reported: BTreeSet<NodeId>,
+    /// The last messages of each node.
     pub(super) heard: BTreeMap<NodeId, Heard>,
     pub(super) remarks: Vec<Remark>,
     /// Doubts about sources that were reported.
@@ -72,7 +72,7 @@ pub(super) struct Recording<'o> {
 
 impl<'o> Recording<'o> {
     pub(super) fn new(nodes: Vec<Node>, options: &'o LogOptions, bus: &dyn Bus) -> Recording<'o> {
-        // A passive recording has no nodes here, and expects none in particular.
+        // A passive recording does not know its nodes yet, and expects no particular node.
         let expected: Vec<NodeId> = nodes.iter().map(|node| node.id).collect();
         let mut emergencies = Emergencies::default();
         nodes.iter().for_each(|node| emergencies.watch(node));
@@ -97,7 +97,7 @@ impl<'o> Recording<'o> {
             questions: Questions::default(),
             started: bus.mono(),
             wrong_length_reported: BTreeSet::new(),
-            odd_heartbeats: BTreeSet::new(),
+            heartbeat_length_reported: BTreeSet::new(),
             heard: BTreeMap::new(),
             remarks: Vec::new(),
             doubts: BTreeSet::new(),
@@ -131,7 +131,7 @@ impl<'o> Recording<'o> {
         self.liveness.has_sent(node)
     }
 
-    /// Whether the setup of this node is not known any more.
+    /// Whether the setup of this node may have changed.
     pub(super) fn is_held(&self, node: NodeId) -> bool {
         self.rereads.held().any(|held| held == node)
     }
@@ -156,8 +156,8 @@ impl<'o> Recording<'o> {
         self.interrupted = true;
     }
 
-    /// Expects nothing from nodes that have none of the requested signals, if another node has them.
-    pub(super) fn excuse_nodes_without_signals(&mut self) {
+    /// Expects no samples from nodes without any of the requested signals. At least one node has them.
+    pub(super) fn ignore_nodes_without_signals(&mut self) {
         if self.options.wanted.is_empty() {
             return;
         }

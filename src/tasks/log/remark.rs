@@ -1,4 +1,4 @@
-//! What a recording reports besides its rows and counts.
+//! Observations that a recording reports besides its rows and counts.
 
 use crate::bus::ReceiveBuffer;
 use crate::canopen::id::{CanId, NodeId};
@@ -9,7 +9,7 @@ use crate::tasks::Failure;
 use crate::tasks::diagnosis::Silence;
 use std::time::Duration;
 
-/// Something to know about a recording.
+/// An observation about a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Remark {
     /// The node has none of the requested signals.
@@ -18,7 +18,7 @@ pub enum Remark {
     SharedCobId(CanId, [NodeId; 2]),
     /// A value could not be polled.
     PollFailed(SdoError),
-    /// The node's setup changed while frames were lost: its rows of this time before may be wrong.
+    /// The node's setup changed while frames were lost. The rows of this time before the change was found may be wrong.
     ChangedWhileFramesLost(NodeId, Duration),
     /// The node could not be read again: its later frames made no rows.
     NotReadAgain(NodeId),

@@ -16,12 +16,12 @@ use crate::node::survey::BackgroundSurvey;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Another master that writes a mapping writes many objects: read after this time without a write.
+/// A node is read again after this time without a write: another master that changes a mapping writes many objects.
 const WRITE_SETTLE_TIME: Duration = Duration::from_millis(500);
 /// Interval between two attempts to read a node that does not answer.
 const RETRY_INTERVAL: Duration = Duration::from_secs(1);
-/// Shortest interval between two rereads of a node because frames were lost. On an overloaded bus frames are lost
-/// all the time.
+/// Shortest interval between two rereads of a node because frames were lost. An overloaded bus loses frames all the
+/// time.
 const FRAMES_LOST_INTERVAL: Duration = Duration::from_secs(60);
 /// Shortest interval between two rereads of a node because of a wrong length, if nothing had changed.
 const WRONG_LENGTH_INTERVAL: Duration = Duration::from_secs(60);
@@ -29,14 +29,14 @@ const WRONG_LENGTH_INTERVAL: Duration = Duration::from_secs(60);
 /// Why the setup of a node must be read again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum RereadReason {
-    /// The node restarted, or nothing could be received from it for a while. It may have to be started again.
+    /// The node restarted, or nothing could be received from it for a while. It may need a start command.
     Away,
     /// Another master wrote an object that its TPDOs depend on.
     Written,
     /// A TPDO has another length than its mapping and made no row. Other TPDOs still make rows.
     WrongLength,
-    /// Frames were lost, and among them perhaps a boot-up or a write. This is rare, and rows are missing anyway: the
-    /// node's frames still make rows. If its setup did change, the time since then is reported.
+    /// Frames were lost, perhaps also a boot-up or a write. This is rare, so the node's frames still make rows. If its
+    /// setup did change, the affected time is reported.
     FramesLost,
 }
 
@@ -45,7 +45,8 @@ struct Pending {
     /// When to start.
     due: Mono,
     survey: Option<BackgroundSurvey>,
-    was_away: bool,
+    /// Whether the node may need a start command.
+    may_need_start: bool,
     /// Since when the node's frames make rows although its setup is uncertain.
     recorded_since: Option<Mono>,
     /// Whether a failed attempt was reported.
@@ -55,8 +56,8 @@ struct Pending {
 /// A node that was read again.
 pub(super) struct Reread {
     pub(super) node: Node,
-    /// Whether it may have to be started again.
-    pub(super) was_away: bool,
+    /// Whether it may need a start command.
+    pub(super) may_need_start: bool,
     /// Since when its frames made rows although its setup was uncertain.
     pub(super) recorded_since: Option<Mono>,
 }
@@ -65,9 +66,9 @@ pub(super) struct Reread {
 pub(super) struct Rereads {
     overrides: Overrides,
     pending: BTreeMap<NodeId, Pending>,
-    /// When each node was last to be read because of a wrong length.
+    /// When a reread of each node was last requested because of a wrong length.
     wrong_lengths: BTreeMap<NodeId, Mono>,
-    /// When each node was last to be read because frames were lost.
+    /// When a reread of each node was last requested because frames were lost.
     frames_lost: BTreeMap<NodeId, Mono>,
 }
 
@@ -81,7 +82,7 @@ impl Rereads {
         }
     }
 
-    /// Requests that a node is read again; a survey under way starts again. Returns `false` if there is no need.
+    /// Requests that a node is read again. A survey in progress is started again. Returns `false` if no reread is needed.
     pub(super) fn request(&mut self, node: NodeId, why: RereadReason, now: Mono, master: &mut Master<'_>) -> bool {
         if why == RereadReason::WrongLength {
             if self.wrong_lengths.get(&node).is_some_and(|&before| now.since(before) < WRONG_LENGTH_INTERVAL) {
@@ -89,21 +90,26 @@ impl Rereads {
             }
             self.wrong_lengths.insert(node, now);
         }
-        let new =
-            || Pending { due: now, survey: None, was_away: false, recorded_since: None, is_failure_reported: false };
+        let new = || Pending {
+            due: now,
+            survey: None,
+            may_need_start: false,
+            recorded_since: None,
+            is_failure_reported: false,
+        };
         if why == RereadReason::FramesLost {
             self.pending.entry(node).or_insert_with(|| {
                 let earliest = self.frames_lost.get(&node).map_or(now, |&before| before + FRAMES_LOST_INTERVAL);
                 let due = earliest.max(now + WRITE_SETTLE_TIME);
                 self.frames_lost.insert(node, due);
-                Pending { due, was_away: true, recorded_since: Some(now), ..new() }
+                Pending { due, may_need_start: true, recorded_since: Some(now), ..new() }
             });
             return true;
         }
         let delay = if why == RereadReason::Written { WRITE_SETTLE_TIME } else { Duration::ZERO };
         let pending = self.pending.entry(node).or_insert_with(new);
         pending.due = now + delay;
-        pending.was_away |= why == RereadReason::Away;
+        pending.may_need_start |= why == RereadReason::Away;
         if why != RereadReason::WrongLength {
             pending.recorded_since = None;
         }
@@ -137,7 +143,7 @@ impl Rereads {
         self.pending.values().any(|pending| pending.has(ticket))
     }
 
-    /// Takes the result of a transfer. Returns a node when all of it was read, and the first failure of a node.
+    /// Takes the result of a transfer. Returns a node when it was read completely, and the first failure of a node.
     pub(super) fn take(
         &mut self,
         ticket: Ticket,
@@ -147,9 +153,9 @@ impl Rereads {
         let (&node, pending) = self.pending.iter_mut().find(|(_, pending)| pending.has(ticket))?;
         match pending.survey.as_mut()?.take(ticket, result, master)? {
             Ok(node) => {
-                let (was_away, recorded_since) = (pending.was_away, pending.recorded_since);
+                let (may_need_start, recorded_since) = (pending.may_need_start, pending.recorded_since);
                 self.pending.remove(&node.id);
-                Some(Ok(Reread { node, was_away, recorded_since }))
+                Some(Ok(Reread { node, may_need_start, recorded_since }))
             }
             Err(error) => {
                 pending.survey = None;
@@ -160,7 +166,7 @@ impl Rereads {
         }
     }
 
-    /// The mapping of a node has changed: the next wrong length is a reason again.
+    /// Allows a reread at the next wrong length, because the mapping of the node has changed.
     pub(super) fn forget_wrong_length(&mut self, node: NodeId) {
         self.wrong_lengths.remove(&node);
     }

@@ -38,7 +38,7 @@ pub(super) struct Questions {
     pub(super) findings: BTreeMap<NodeId, Findings>,
 }
 
-/// Why a recording has not one row.
+/// Why a recording has no rows.
 pub(super) fn why_nothing(recording: &Recording<'_>, options: &LogOptions) -> Failure {
     let within = waited(options);
     if let Some(&node) = recording.listener.as_ref().and_then(|listener| listener.not_understood.first()) {
@@ -129,7 +129,7 @@ impl Recording<'_> {
         }
     }
 
-    /// A COB-ID with which another recorded node sends TPDOs too.
+    /// A COB-ID that another recorded node uses for TPDOs, too.
     fn shared_cob_id(&self, node: &Node, carries: &dyn Fn(&Tpdo) -> bool) -> Option<(CanId, NodeId)> {
         let valid = |node: &Node| {
             node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).map(|tpdo| tpdo.cob_id.can_id()).collect::<Vec<_>>()
@@ -142,7 +142,7 @@ impl Recording<'_> {
         })
     }
 
-    /// What to ask silent nodes. A polled node has answered already, or not.
+    /// The objects to read from silent nodes. None for polled nodes: their polls show the reason.
     fn questions(&self) -> Vec<(NodeId, Vec<ObjectId>)> {
         if matches!(self.options.mode, Mode::Poll(_) | Mode::Passive) || !self.link_is_up || self.interface.is_none() {
             return Vec::new();

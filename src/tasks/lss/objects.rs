@@ -93,12 +93,12 @@ fn write_bytes(
     node: &Node,
     object: ObjectId,
     data: &[u8],
-    at_least: Duration,
+    min_timeout: Duration,
     stage: &mut Stage,
 ) -> Result<(), Failure> {
     *stage = Stage::Sent;
     let (progress, watch) = (&mut |_| {}, &mut |_: &Received| {});
-    let mut options = WriteOptions { at_least, ..WriteOptions::new(progress, watch) };
+    let mut options = WriteOptions { min_timeout, ..WriteOptions::new(progress, watch) };
     let result = write_with(master, node, object, data, &mut options);
     *stage = match &result {
         Ok(_) => Stage::Done,

@@ -37,7 +37,7 @@ pub struct MapReport {
 ///
 /// # Errors
 /// If a step failed, the old settings are restored. If that failed as well, the failure contains the last confirmed step
-/// and what is needed to repair the settings.
+/// and the old settings.
 pub fn map(
     master: &mut Master<'_>,
     request: &PdoRequest,
@@ -140,8 +140,8 @@ fn change_settings(mut session: Session<'_, '_>, old: Settings, wanted: Settings
     Ok(Changed { writes: change.session.writes, wanted: change.wanted, notes: change.notes })
 }
 
-/// What to store to keep the settings of a TPDO: only the communication settings, if the device has a group for them.
-/// Some devices set custom COB-IDs back if everything is stored.
+/// Plans how to store the settings of a TPDO: as communication settings, if the device has a group for them. Some devices
+/// reset custom COB-IDs if everything is stored.
 fn store_plan(master: &mut Master<'_>, node: &Node, number: TpdoNumber) -> Result<store::StorePlan, Failure> {
     if node.model.as_deref().is_some_and(|model| !is_stored(model, number)) {
         return Err(Failure::at(node.id, PdoFailure::NotStored { number }));
@@ -152,7 +152,7 @@ fn store_plan(master: &mut Master<'_>, node: &Node, number: TpdoNumber) -> Resul
     }
 }
 
-/// Whether a device stores the settings of a TPDO. True if its description says nothing about stored objects.
+/// Whether a device stores the settings of a TPDO. True if its description does not mark stored objects.
 fn is_stored(model: &Model, number: TpdoNumber) -> bool {
     let objects = &model.description.objects;
     let is_known = objects.iter().any(|entry| entry.stored.is_some());
@@ -161,7 +161,7 @@ fn is_stored(model: &Model, number: TpdoNumber) -> bool {
     !is_known || own.all(|entry| entry.stored.is_some() || !entry.access.is_writable())
 }
 
-/// Checks what can be known before anything is written.
+/// Runs the checks that are possible before the first write.
 fn check(session: &mut Session<'_, '_>, old: &Settings, wanted: &Settings) -> Result<(), Failure> {
     let (number, node) = (old.number, session.node);
     if old.mapping != wanted.mapping && has_fixed_mapping(node, number) {
@@ -178,7 +178,7 @@ fn check(session: &mut Session<'_, '_>, old: &Settings, wanted: &Settings) -> Re
     Ok(())
 }
 
-/// Whether the description says that the mapping cannot be written. The access types of EDS files are less reliable and
+/// Whether the mapping is read-only according to the description. The access types of EDS files are not reliable, so they
 /// are not used.
 fn has_fixed_mapping(node: &Node, number: TpdoNumber) -> bool {
     let described = node.model.as_ref().filter(|model| !model.description.objects.is_empty());

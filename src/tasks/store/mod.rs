@@ -272,16 +272,16 @@ fn custom_cob_ids(master: &mut Master<'_>, device: &Node) -> Result<Vec<(ObjectI
 
 /// Sends the signature of a command once.
 pub(super) fn send(master: &mut Master<'_>, device: &Node, verb: Verb, group: Group) -> Result<(), Failure> {
-    use node::Error as Cannot;
+    use node::Error as NodeError;
     let (progress, watch) = (&mut |_| {}, &mut |_: &Received| {});
-    let mut options = WriteOptions { at_least: STORE_TIMEOUT, ..WriteOptions::new(progress, watch) };
+    let mut options = WriteOptions { min_timeout: STORE_TIMEOUT, ..WriteOptions::new(progress, watch) };
     let object = verb.object(group);
     let error = match write_with(master, device, object, verb.signature().as_bytes(), &mut options) {
         Ok(_) => return Ok(()),
         Err(error) => error,
     };
-    let may_have_acted = matches!(error, Cannot::Unknown(_) | Cannot::Bus(_) | Cannot::Interrupted);
-    let is_silent = matches!(&error, Cannot::Unknown(SdoError { failure: SdoFailure::NoAnswer { .. }, .. }));
+    let may_have_acted = matches!(error, NodeError::Unknown(_) | NodeError::Bus(_) | NodeError::Interrupted);
+    let is_silent = matches!(&error, NodeError::Unknown(SdoError { failure: SdoFailure::NoAnswer { .. }, .. }));
     let failure = Failure::from(error);
     if !may_have_acted {
         return Err(failure);

@@ -161,7 +161,11 @@ fn another_device_under_the_new_node_id() {
     bus.attach(Newcomer { awake: false });
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::Unexpected);
-    assert!(done.failure().1.contains("another device answers there: 0x1:0x2:0x3:4"), "{}", done.failure().1);
+    assert!(
+        done.failure().1.contains("another device answers under the new node-ID: 0x1:0x2:0x3:4"),
+        "{}",
+        done.failure().1
+    );
 }
 
 #[test]

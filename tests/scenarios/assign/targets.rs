@@ -129,7 +129,7 @@ fn node_id_of_a_stopped_node_with_heartbeat_is_taken() {
     master.settle();
     drop(master);
     let done = run(&mut bus, "1", &id(7));
-    assert!(done.failure().1.contains("a node sends heartbeats there"), "{:?}", done.failure());
+    assert!(done.failure().1.contains("(a node sends heartbeats)"), "{:?}", done.failure());
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Which values were due after a SYNC, and did not arrive.
+//! Counts the values that were due after a SYNC and did not arrive.
 
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;

@@ -29,7 +29,7 @@ struct Recent {
     node: NodeId,
     emergency: Emergency,
     reported: Mono,
-    /// Identical ones received since then.
+    /// The number of identical emergencies since then.
     count: u64,
 }
 
@@ -161,7 +161,7 @@ mod tests {
         let mut reported = Vec::new();
         for step in 0..1000 {
             let now = at(step * 2);
-            // Two alternating ones are no less of a flood.
+            // Two alternating emergencies are limited as well.
             let emergency = if step % 2 == 0 { one } else { other };
             if emergencies.is_new(node, emergency, now) {
                 reported.push(0);

@@ -49,11 +49,11 @@ impl Recording<'_> {
             self.emergency(node, emergency, at, observer);
         } else if let Some((node, life)) = Life::parse(frame) {
             if let Some((node, length)) = Life::odd_length(frame) {
-                self.odd_heartbeat(node, length, at, observer);
+                self.wrong_heartbeat_length(node, length, at, observer);
             }
             self.life(node, life, at, master, observer);
         } else if let Some((node, length)) = Life::odd_length(frame) {
-            self.odd_heartbeat(node, length, at, observer);
+            self.wrong_heartbeat_length(node, length, at, observer);
         } else if let Some(node) = writes_setup(frame, &self.nodes) {
             self.request_reread(node, RereadReason::Written, at.mono, master);
         } else if !frame.is_remote() && self.nodes.iter().any(|node| node.sync == frame.id()) {
@@ -81,9 +81,9 @@ impl Recording<'_> {
         observer.event(&LogEvent::Emergency(node, emergency, self.emergencies.meaning(node, emergency)), at);
     }
 
-    /// Reports once that the heartbeats of a node have not one byte.
-    fn odd_heartbeat(&mut self, node: NodeId, length: usize, at: Stamp, observer: &mut dyn Observer) {
-        if self.liveness.has(node) && self.odd_heartbeats.insert(node) {
+    /// Reports once that the heartbeats of a node have a wrong length.
+    fn wrong_heartbeat_length(&mut self, node: NodeId, length: usize, at: Stamp, observer: &mut dyn Observer) {
+        if self.liveness.has(node) && self.heartbeat_length_reported.insert(node) {
             observer.event(&LogEvent::HeartbeatLength(node, length), at);
         }
     }
@@ -151,8 +151,8 @@ impl Recording<'_> {
         }
     }
 
-    /// The setup of a node is uncertain: it is read again, and until then its frames make no rows. A passive recording
-    /// cannot read.
+    /// Requests that the setup of a node is read again. Until then its frames make no rows. A passive recording cannot
+    /// read.
     fn request_reread(&mut self, node: NodeId, why: RereadReason, now: Mono, master: &mut Master<'_>) {
         let is_recorded = self.listener.is_none() && self.nodes.iter().any(|known| known.id == node);
         if !is_recorded || !self.rereads.request(node, why, now, master) {
@@ -232,7 +232,7 @@ impl Recording<'_> {
 
     /// Continues with the current setup of a node.
     fn update(&mut self, reread: Reread, master: &mut Master<'_>, observer: &mut dyn Observer) -> Result<(), Error> {
-        let Reread { node, was_away, recorded_since } = reread;
+        let Reread { node, may_need_start, recorded_since } = reread;
         let (id, at) = (node.id, master.bus().now());
         let Some(place) = self.nodes.iter().position(|known| known.id == id) else { return Ok(()) };
         let changes = changes(&self.nodes[place], &node);
@@ -260,7 +260,7 @@ impl Recording<'_> {
         self.nodes[place] = node;
         self.due.set_up(&self.nodes, &self.decoder);
         master.listen(&self.filters())?;
-        if was_away {
+        if may_need_start {
             self.states.start_again(id, master);
         }
         if !changes.is_empty() {

@@ -115,7 +115,7 @@ impl Liveness {
     }
 }
 
-/// Whether none of a node's valid TPDOs is due at any time: no event timer, and no SYNC that causes it.
+/// Whether a node sends its TPDOs only on change: none has an event timer, and none is sent on every SYNC.
 fn sends_on_change(node: &Node, mode: Mode) -> bool {
     let mut valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).peekable();
     let is_due = |transmission, event_timer_ms: Option<u16>| match transmission {
