@@ -89,7 +89,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l passive -d 'Send nothing: list the nodes that send something within 3 s (or --timeout) (or --timeout)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l passive -d 'Send nothing: list the nodes that send something within 3 s (or --timeout)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s q -l quiet -d 'Print less on stderr'
@@ -112,7 +112,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l passive -d 'Send nothing: list the nodes that send something within 3 s (or --timeout) (or --timeout)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l passive -d 'Send nothing: list the nodes that send something within 3 s (or --timeout)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s q -l quiet -d 'Print less on stderr'
