@@ -45,7 +45,7 @@ fn check(bench: &Bench, nodes: &str, expression: &str) -> super::Done {
 /// The lines of `read` with one blank between the words, and without the remark about the missing status.
 fn values(done: super::Done) -> Vec<String> {
     let done = done.exit(0);
-    let words = |line: &str| line.replace("(tells no status)", "").split_whitespace().collect::<Vec<_>>().join(" ");
+    let words = |line: &str| line.replace("(no status)", "").split_whitespace().collect::<Vec<_>>().join(" ");
     done.stdout.lines().map(words).collect()
 }
 
@@ -179,6 +179,7 @@ fn described_signals_have_their_own_scale_and_status() {
     assert_eq!(values(bench.run("--device own.toml read 5")), ["5 flow 12.50 l/h overload-high"]);
     let log = bench.run("--device own.toml log 5 --sync 100ms --count 1").exit(0);
     assert_eq!(rows(&log.stdout, 1), ["flow,12.50,l/h,"]);
-    check(&bench, "--device own.toml 5", "flow < 20 l/h").exit(1);
+    check(&bench, "--device own.toml 5", "flow < 20 l/h").exit(0);
+    check(&bench, "--device own.toml 5", "flow > 20 l/h").exit(1);
     bench.run("--device own.toml unit 5 flow bar").exit(4);
 }
