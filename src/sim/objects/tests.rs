@@ -35,6 +35,11 @@ const DEVICE: &str = r#"
         default = "$NODEID+0x40000180"
         stored = "comm"
         [[object]]
+        at = "0x1A00:0"
+        name = "tpdo1-mapping"
+        type = "u8"
+        access = "ro"
+        [[object]]
         at = "0x6131:1"
         name = "unit"
         type = "u32"
