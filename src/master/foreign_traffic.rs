@@ -25,6 +25,8 @@ pub(super) struct ForeignTraffic {
     seen: bool,
     /// A request of another master was received.
     requested: bool,
+    /// The node answered it.
+    answered: bool,
     /// A segmented or block transfer was seen.
     in_segments: bool,
     /// A block transfer was seen.
@@ -72,7 +74,9 @@ impl ForeignTraffic {
     pub(super) fn record(&mut self, frame: &Frame, now: Mono) {
         let Some(kind) = FrameKind::of(frame) else { return };
         self.seen = true;
-        self.requested |= frame.id().sdo_request_node().is_some();
+        let is_request = frame.id().sdo_request_node().is_some();
+        self.answered |= self.requested && !is_request;
+        self.requested |= is_request;
         self.in_blocks |= kind == FrameKind::Blocks;
         self.in_segments |= matches!(kind, FrameKind::Segments | FrameKind::Blocks);
         if let Some(until) = &mut self.back_off_until {
@@ -88,6 +92,11 @@ impl ForeignTraffic {
     /// Whether another master certainly uses the channel.
     pub(super) fn is_requested(self) -> bool {
         self.requested
+    }
+
+    /// Whether the node answers another master, so that it is not silent.
+    pub(super) fn is_served(self) -> bool {
+        self.answered
     }
 
     /// Whether segments can no longer be assigned to our transfer.

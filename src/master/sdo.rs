@@ -2,18 +2,19 @@
 //!
 //! A late answer never becomes the result of a later request: see [`StaleRequest`].
 
+mod receive;
+
 use super::Timing;
-use super::active::{Active, Verdict};
+use super::active::Active;
 use super::clues::Clues;
 use super::request::{Answer, Operation, Request, SdoError, SdoFailure, Ticket};
 use super::second_answer::{Answers, OnTwoDevices, SecondAnswer};
 use super::send::Outgoing;
-use super::transfer::Blocks;
 use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
-use crate::canopen::sdo::{AbortCode, Progress, TransferError, proves_60};
+use crate::canopen::sdo::{AbortCode, TransferError, proves_60};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
@@ -39,14 +40,14 @@ struct Node {
 /// How late an answer may come. CiA 301 gives no limit; storing takes the longest.
 const STALE_LIFETIME: Duration = Duration::from_secs(10);
 
-/// The inaccuracy when a send time is compared with a receive time.
-const CLOCK_TOLERANCE: Duration = Duration::from_millis(5);
+/// The results of the transfers that have ended.
+type Finished = VecDeque<(Ticket, Result<Answer, SdoError>)>;
 
 /// The client side of all SDO channels.
 #[derive(Debug, Default)]
 pub(super) struct SdoClient {
     nodes: BTreeMap<NodeId, Node>,
-    finished: VecDeque<(Ticket, Result<Answer, SdoError>)>,
+    finished: Finished,
     next_ticket: u64,
     /// The earliest deadline, or an earlier moment. It avoids a search through all nodes for each frame.
     due: Option<Mono>,
@@ -189,150 +190,18 @@ impl SdoClient {
             self.clues.elsewhere(&received.frame, received.at.mono);
             return false;
         };
-        let is_stale = self.nodes.get(&number).is_some_and(|node| node.has_stale(&received.frame));
-        let is_ours = self.on_frame_of(number, received, timing, outgoing);
+        let Some(node) = self.nodes.get_mut(&number) else { return false };
+        let is_stale = node.has_stale(&received.frame);
+        let is_ours = node.on_frame(received, timing, outgoing, &mut self.finished);
         if is_ours {
             self.clues.answered(number);
         } else if !is_stale {
             self.clues.on_channel(number, &received.frame, received.at.mono);
         }
-        if let Some(node) = self.nodes.get_mut(&number) {
-            node.accept_60 |= is_ours && proves_60(&received.frame);
-            self.due = earlier(self.due, node.active.as_ref().and_then(|active| active.deadline));
-            self.can_start |= node.active.is_none() && !node.waiting.is_empty();
-        }
+        node.accept_60 |= is_ours && proves_60(&received.frame);
+        self.due = earlier(self.due, node.active.as_ref().and_then(|active| active.deadline));
+        self.can_start |= node.active.is_none() && !node.waiting.is_empty();
         is_ours
-    }
-
-    fn on_frame_of(&mut self, number: NodeId, received: &Received, timing: &Timing, outgoing: &mut Outgoing) -> bool {
-        let id = received.frame.id();
-        let Some(node) = self.nodes.get_mut(&number) else { return false };
-        let at = received.at.mono;
-        let is_request = id.sdo_request_node().is_some();
-        if is_request {
-            node.answers.on_foreign_request(at);
-        }
-        let Some(active) = &mut node.active else {
-            if !is_request && !node.has_stale(&received.frame) {
-                node.answers.on_unexpected(&received.frame, at);
-            }
-            node.remove_stale(&received.frame);
-            return false;
-        };
-        let mut out = Vec::new();
-        let operation = active.request.operation();
-        let in_segments = active.machine.has_begun() && !active.machine.is_in_blocks();
-        let asked_at = active.asked_at.filter(|_| !active.machine.has_begun() && !active.is_repeated);
-        if !active.is_repeated && node.answers.is_repetition(&received.frame, operation, in_segments, at) {
-            node.answers.on_unexpected(&received.frame, at);
-            return true;
-        }
-        let progress = match active.asked_at {
-            Some(asked_at) if at + CLOCK_TOLERANCE >= asked_at && !active.is_answered_before_sent(&received.frame) => {
-                active.machine.on_frame(&received.frame, &mut out)
-            }
-            _ => Progress::NotOurs,
-        };
-        let result = match progress {
-            Progress::NotOurs => {
-                if is_request {
-                    active.record_request(&received.frame);
-                } else if node.answers.on_unexpected(&received.frame, at) {
-                    node.remove_stale(&received.frame);
-                    return false;
-                }
-                if !active.record_foreign(node.accept_60, received, timing, outgoing) {
-                    let error = active.error(active.disturbance());
-                    self.finished.push_back((active.ticket, Err(error)));
-                    outgoing.drop_ticket(active.ticket);
-                    node.active = None;
-                }
-                node.remove_stale(&received.frame);
-                return false;
-            }
-            Progress::Continue if out.is_empty() => {
-                // A segment of a block: each segment has its own time-out.
-                node.answers.on_answer(received.frame, operation, asked_at, at);
-                if active.unsent == 0 {
-                    active.deadline = Some(received.at.mono + active.timeout(timing));
-                }
-                return true;
-            }
-            Progress::Continue => {
-                node.answers.on_answer(received.frame, operation, asked_at, at);
-                if active.request.blocks == Blocks::WhenLarge && active.machine.is_worth_blocks() {
-                    active.restart_in_blocks(node.accept_60, &mut out);
-                }
-                active.enqueue(out, outgoing);
-                return true;
-            }
-            Progress::Done(_) if active.ambiguous => Err(active.error(SdoFailure::Ambiguous)),
-            Progress::Done(uploaded) if active.is_suspect(uploaded.as_ref()) => {
-                if active.back_off(node.accept_60, at, timing, outgoing) {
-                    return true;
-                }
-                Err(active.error(active.disturbance()))
-            }
-            Progress::Done(uploaded) => match active.judge(uploaded.as_ref(), node.accept_60) {
-                Verdict::Accepted => Ok(Answer { uploaded, at: received.at, way: active.way() }),
-                Verdict::Again => {
-                    node.answers.on_answer(received.frame, operation, asked_at, at);
-                    out.push(active.machine.request());
-                    active.enqueue(out, outgoing);
-                    return true;
-                }
-                Verdict::WrongLength => {
-                    let (announced, delivered) = uploaded.map_or((None, 0), |read| (read.announced, read.bytes.len()));
-                    Err(active.error(SdoFailure::WrongLength { announced, delivered, frame: received.frame }))
-                }
-            },
-            Progress::Failed(error) if active.foreign.explains(error) => {
-                if active.back_off(node.accept_60, at, timing, outgoing) {
-                    return true;
-                }
-                // An abort would end the foreign transfer.
-                out.clear();
-                Err(active.error(active.disturbance()))
-            }
-            Progress::Failed(error) => {
-                if active.lacks_block_transfer(error) {
-                    node.answers.on_repeated(active.request.object);
-                    active.request.fall_back();
-                    *active = Active::new(active.ticket, active.request.clone(), node.accept_60, timing);
-                    out.push(active.machine.request());
-                    active.enqueue(out, outgoing);
-                    return true;
-                }
-                if active.restart(error, node.accept_60, &mut out, outgoing) {
-                    node.answers.on_repeated(active.request.object);
-                    return true;
-                }
-                Err(active.error(match error {
-                    TransferError::Aborted(code) => SdoFailure::Refused(code),
-                    TransferError::Violation(..) if node.answers.finding().is_some() => active.disturbance(),
-                    TransferError::Violation(violation, frame) => SdoFailure::Violation(violation, frame),
-                    TransferError::NoAnswer => SdoFailure::Cancelled,
-                }))
-            }
-        };
-        for frame in out {
-            outgoing.push(frame, None);
-        }
-        node.answers.on_answer(received.frame, operation, asked_at, at);
-        node.is_written |= operation == Operation::Write && result.is_ok();
-        if let Some(active) = node.active.take() {
-            outgoing.drop_ticket(active.ticket);
-            match active.deferred {
-                // Any answer, also an abort, proves that all older requests were answered. Answers to retries of the
-                // barrier read come before the answer to the deferred request.
-                Some(deferred) => {
-                    node.stale.clear();
-                    node.waiting.push_front(deferred);
-                }
-                None => self.finished.push_back((active.ticket, result)),
-            }
-        }
-        true
     }
 
     /// Handles the transfers whose deadline has passed.
@@ -357,8 +226,8 @@ impl SdoClient {
                 continue;
             }
             let has_begun = active.machine.has_begun();
-            let explained = has_begun && active.foreign.explains(TransferError::NoAnswer);
-            if explained && active.back_off(node.accept_60, now, timing, outgoing) {
+            let is_explained = has_begun && active.foreign.explains(TransferError::NoAnswer);
+            if is_explained && active.back_off(node.accept_60, now, timing, outgoing) {
                 continue;
             }
             let mut out = Vec::new();
@@ -385,18 +254,18 @@ impl SdoClient {
                 }
             }
             let Some(mut active) = node.active.take() else { continue };
-            for frame in out {
-                outgoing.push(frame, None);
-            }
+            out.into_iter().for_each(|frame| outgoing.push(frame, None));
             if !has_begun && active.request.repeatable && active.request.falls_back() {
                 // Some servers do not answer an unknown request at all.
                 active.request.fall_back();
                 node.waiting.push_front((active.ticket, active.request));
                 continue;
             }
-            let waited = active.timeout(timing);
             let clue = self.clues.end(active.request.node);
-            let mut error = active.error(SdoFailure::NoAnswer { waited, started: has_begun, clue });
+            let mut error = active.error(match active.request.operation() {
+                Operation::Read if active.foreign.is_served() => active.disturbance(),
+                _ => SdoFailure::NoAnswer { waited: active.timeout(timing), started: has_begun, clue },
+            });
             // The error names the deferred request, except a write that was never sent.
             let was_sent = |request: &Request| request.operation() == Operation::Read || request.refused_blocks;
             if let Some((_, request)) = active.deferred.as_ref().filter(|(_, request)| was_sent(request)) {

@@ -119,9 +119,10 @@ impl Answers {
     }
 
     /// Whether this frame repeats the latest one and answers nothing: a segment whose successor is expected, or an
-    /// answer to the previous request, which was of another kind.
+    /// answer to the previous request, which was of another kind. An abort has the same form for both kinds.
     pub(super) fn is_repetition(&self, frame: &Frame, operation: Operation, is_in_segments: bool, at: Mono) -> bool {
-        let is_other = self.initial.is_some_and(|(_, previous)| previous != operation);
+        let is_abort = frame.data().first() == Some(&0x80);
+        let is_other = !is_abort && self.initial.is_some_and(|(_, previous)| previous != operation);
         self.latest == Some(*frame) && (is_in_segments || is_other) && !self.may_be_foreign(at)
     }
 
@@ -258,6 +259,10 @@ mod tests {
         assert!(!log.is_repetition(&frame(acknowledge), Operation::Write, false, ms(11)));
         assert!(!log.is_repetition(&frame("585#6017100100000000"), Operation::Read, false, ms(11)));
         assert!(log.is_repetition(&frame(acknowledge), Operation::Write, true, ms(11)));
+        // A read and a write of a missing object have the same answer.
+        let missing = "585#80FF5F0000000206";
+        let log = after(&[(missing, Operation::Read)]);
+        assert!(!log.is_repetition(&frame(missing), Operation::Write, false, ms(11)));
     }
 
     #[test]

@@ -7,8 +7,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::lss::Service;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::sdo::Violation;
-use crate::master::SecondAnswer;
-use crate::tasks::failure::{BusError, Clue, ExpressionError, LssError, Operation, SdoError, SdoFailure};
+use crate::tasks::failure::{BusError, Clue, ExpressionError, LssError, Operation, SdoError, SdoFailure, SecondAnswer};
 use std::path::Path;
 use std::time::Duration;
 
