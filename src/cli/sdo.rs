@@ -258,9 +258,16 @@ impl WriteArgs {
                 ObjectArg::Address(object) => node.entry(*object),
                 ObjectArg::Name(name) => node.entry_by_name(name),
             };
-            let is_signature =
-                entry.as_ref().is_some_and(|entry| names::signature(node, entry.object, value).is_some());
-            if let Some(data_type) = self.data_type.or(entry.map(|entry| entry.data_type)).filter(|_| !is_signature) {
+            if let Some(data_type) = self.data_type.or(entry.as_ref().map(|entry| entry.data_type)) {
+                // A description that is not known yet may explain the word.
+                let may_be_word = |object: ObjectId| {
+                    let is_open = !node.is_identified && object.index >= 0x2000;
+                    is_open && value.starts_with(char::is_alphabetic)
+                        || names::word(node, object, data_type, value).is_some()
+                };
+                if entry.is_some_and(|entry| may_be_word(entry.object)) {
+                    continue;
+                }
                 check(data_type, value).map_err(|error| ErrorMessage::usage(format!("{object}: {error}")))?;
             }
         }

@@ -186,22 +186,26 @@ pub fn type_for(master: &mut Master<'_>, node: &mut Node, object: ObjectId, text
 /// # Errors
 /// [`Error::Value`] if it does not fit.
 pub fn encode(node: &Node, object: ObjectId, data_type: DataType, text: &str) -> Result<Vec<u8>, Error> {
-    let is_integer = matches!(data_type, DataType::Unsigned(_) | DataType::Integer(_));
-    if let Some(signature) = signature(node, object, text).filter(|_| is_integer) {
-        return Ok(signature);
+    let encoded = data_type.encode_text(text);
+    encoded.or_else(|error| word(node, object, data_type, text).ok_or(Error::Value { node: node.id, object, error }))
+}
+
+/// The bytes for a word instead of a number: the signature of the object, or one of the numbers that its description
+/// explains.
+pub fn word(node: &Node, object: ObjectId, data_type: DataType, text: &str) -> Option<Vec<u8>> {
+    if !matches!(data_type, DataType::Unsigned(_) | DataType::Integer(_)) {
+        return None;
     }
     let explained = || {
-        let values = &node.described(object).filter(|_| is_integer)?.values;
-        let mut alike = values.iter().filter(|(_, word)| word.eq_ignore_ascii_case(text));
+        let mut alike = node.described(object)?.values.iter().filter(|(_, word)| word.eq_ignore_ascii_case(text));
         let only = alike.next().filter(|_| alike.next().is_none())?.0;
         data_type.encode_text(&only.to_string()).ok()
     };
-    let encoded = data_type.encode_text(text);
-    encoded.or_else(|error| explained().ok_or(Error::Value { node: node.id, object, error }))
+    signature(node, object, text).or_else(explained)
 }
 
 /// The bytes of the signature of an object, if `text` is its word: `save`, `load`, `zero`.
-pub fn signature(node: &Node, object: ObjectId, text: &str) -> Option<Vec<u8>> {
+fn signature(node: &Node, object: ObjectId, text: &str) -> Option<Vec<u8>> {
     let standard = match object.index {
         0x1010 if object.sub > 0 => Some(Signature::Save),
         0x1011 if object.sub > 0 => Some(Signature::Load),

@@ -87,7 +87,13 @@ pub fn encode(
         Some(data_type) => data_type,
         None => names::type_for(master, node, object, text)?,
     };
-    Ok((names::encode(node, object, data_type, text)?, data_type))
+    let encoded = names::encode(node, object, data_type, text);
+    if encoded.is_err() && !node.is_identified {
+        // The description may explain the word.
+        find_form(master, node)?;
+        return Ok((names::encode(node, object, data_type, text)?, data_type));
+    }
+    Ok((encoded?, data_type))
 }
 
 /// Finds out which form of a write the node accepts: reads its identity, if its description was not looked for yet.

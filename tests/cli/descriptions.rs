@@ -221,7 +221,7 @@ fn description_of_another_vendor_is_used_only_if_its_types_are_those_of_cia_404(
     let bench = Bench::described("[[device]]\nkind = \"other.toml\"\nnode = 5\n");
     for (file, fitting) in [(other.clone(), &["mh4", "hydac"][..]), (other.replace("0x00820194", "0x00820191"), &[])] {
         fs::write(bench.path("other.toml"), file).expect("written");
-        for device in ["mh4", "hydac", "dps", "mc1609"] {
+        for device in ["mh4", "hydac", "dps"] {
             let line = format!("--device {device} log 5 --sync 100ms --count 2");
             if fitting.contains(&device) {
                 let done = bench.run(&line).exit(0);
