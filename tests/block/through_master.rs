@@ -387,7 +387,7 @@ fn two_devices_are_transferred_in_parallel() {
     };
     let results = master.transfer(vec![write(5), write(6), Request::read(node(5), SETTING)], &mut |_| {}).unwrap();
     assert!(results.iter().all(Result::is_ok), "{results:?}");
-    let read = |number| Request::read(node(number), DOMAIN).blocks(Blocks::Only);
+    let read = |number| Request::read(node(number), DOMAIN).blocks(Blocks::Only).up_to(4096);
     let results = master.transfer(vec![read(5), read(6)], &mut |_| {}).unwrap();
     for result in results {
         assert_eq!(bytes(result), data);
