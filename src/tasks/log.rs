@@ -214,6 +214,9 @@ const FIRST_SAMPLE_TIMEOUT: Duration = Duration::from_secs(5);
 /// The interval of [`Observer::tick`].
 const TICK: Duration = Duration::from_millis(100);
 
+/// How much longer than the recording the reading of the setup may take.
+const SETUP_TIMEOUT: Duration = Duration::from_secs(10);
+
 /// Records until the duration, the count, Ctrl-C or the observer ends the recording.
 ///
 /// # Errors
@@ -227,7 +230,7 @@ pub fn log(
         return record_passively(master, options, observer);
     }
     master.listen_to(&options.nodes)?;
-    master.limit_transfers(options.duration);
+    master.limit_transfers(options.duration.map(|duration| duration.saturating_add(SETUP_TIMEOUT)));
     let surveyed = survey(master, options, observer);
     master.limit_transfers(None);
     let (nodes, failed) = surveyed?;

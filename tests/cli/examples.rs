@@ -44,13 +44,16 @@ pub(super) fn words(line: &str) -> Vec<String> {
     words
 }
 
+fn without_redirection(example: &str) -> &str {
+    if example.contains('\'') { example } else { example.split(" > ").next().unwrap_or_default() }
+}
+
 #[test]
 fn every_example_is_valid() {
     let examples = examples();
     assert!(examples.len() >= 15, "{examples:?}");
     for example in examples {
-        let words =
-            words(if example.contains('\'') { &example } else { example.split(" > ").next().unwrap_or_default() });
+        let words = words(without_redirection(&example));
         if let Err(error) = Cli::try_parse_from(words) {
             panic!("{example}: {error}");
         }
@@ -66,7 +69,7 @@ fn every_example_on_the_simulated_bus_works() {
     }
     let run = |example: &str| {
         let bench = Bench::real("mh4@1");
-        let words = words(example.split(" > ").next().unwrap_or_default());
+        let words = words(without_redirection(example));
         let words: Vec<&str> = words.iter().skip(1).map(String::as_str).collect();
         let done = bench.finish(&mut bench.command(&words)).exit(0);
         assert!(!done.stdout.is_empty() || !bench.files().is_empty() || example.contains(" sdo write "), "{example}");

@@ -75,9 +75,9 @@ fn wide_rows_of_polling_and_as_json() {
 
 #[test]
 fn late_answer_is_in_the_row_of_its_poll() {
-    // The second device answers after one and a half cycles.
+    // The second device answers after one and a half cycles: it is asked for its error register and its value.
     let bench = Bench::described(
-        "[[device]]\nkind = \"dps\"\nnode = 1\n[[device]]\nkind = \"dps\"\nnode = 2\nlatency = \"150ms\"\n",
+        "[[device]]\nkind = \"dps\"\nnode = 1\n[[device]]\nkind = \"dps\"\nnode = 2\nlatency = \"75ms\"\n",
     );
     let done = bench.run("log 1,2 pressure --poll 100ms --count 6 --layout wide");
     let rows = cells(&done.exit(0).stdout);
