@@ -43,7 +43,7 @@ pub(super) fn read_known<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<O
 /// Reads objects that a device may lack. `None` for each that it does not answer properly: one such object affects no
 /// other.
 ///
-/// If a node is silent twice in a row, the rest of its objects is `None` as well, and the error is returned beside.
+/// After a silent sub-index, the other sub-indices of its object are not read. If a node is silent twice in a row, the rest of its objects is `None` as well, and the error is returned beside.
 ///
 /// # Errors
 /// What stops everything.
@@ -69,6 +69,7 @@ pub(super) fn ask_optional<A: Ask>(
             .map(|(&(node, _), _)| node)
             .collect();
         let mut rest = Vec::new();
+        let mut unanswered = BTreeSet::new();
         for (at, result) in open.into_iter().zip(results) {
             match result {
                 Ok(answer) => answers[at] = Some(answer),
@@ -76,7 +77,9 @@ pub(super) fn ask_optional<A: Ask>(
                     // The others were not asked after a silent one.
                     SdoFailure::Cancelled => rest.push(at),
                     SdoFailure::NoAnswer { started: false, .. }
-                        if !answering.contains(&error.node) && !silent.insert(error.node) =>
+                        if unanswered.insert((error.node, error.object.index))
+                            && !answering.contains(&error.node)
+                            && !silent.insert(error.node) =>
                     {
                         dead = dead.or(Some(error));
                     }
@@ -88,6 +91,7 @@ pub(super) fn ask_optional<A: Ask>(
                 },
             }
         }
+        rest.retain(|&at| !unanswered.contains(&(objects[at].0, objects[at].1.index)));
         let is_stuck = rest.len() == asked.len() && repeated.len() == before;
         open = if is_stuck || dead.is_some() { Vec::new() } else { rest };
     }

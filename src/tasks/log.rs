@@ -24,7 +24,7 @@ use crate::bus::{Fault, Filters, ReceiveBuffer, Stamp, TimestampSource};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
-use crate::master::{Error, Master};
+use crate::master::{Error, Master, Request, SdoError, SdoFailure};
 use crate::measure::decode::Wanted;
 use crate::measure::expression::evaluator::Evaluator;
 use crate::measure::sample::{Sample, Source};
@@ -291,7 +291,10 @@ fn survey(
     let (mut nodes, mut failed) = (Vec::new(), Vec::new());
     for result in survey_each(master, &options.nodes, &options.overrides)? {
         match result {
-            Ok(node) => nodes.push(node),
+            Ok(node) => match compare_values(master, &node)? {
+                Ok(()) => nodes.push(node),
+                Err(error) => failed.push(Failure::from(error)),
+            },
             Err(error) => failed.push(Failure::from(error)),
         }
     }
@@ -301,6 +304,22 @@ fn survey(
         None => {}
     }
     Ok((nodes, failed))
+}
+
+/// If the answers of a node arrive twice, compares its mapped values: two devices of one type may differ only in these.
+fn compare_values(master: &mut Master<'_>, node: &Node) -> Result<Result<(), SdoError>, Error> {
+    if !master.second_answers().iter().any(|&(twice, _)| twice == node.id) {
+        return Ok(Ok(()));
+    }
+    let entries = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).flat_map(|tpdo| &tpdo.mapping);
+    let requests: Vec<Request> = entries.map(|entry| Request::read(node.id, entry.object)).collect();
+    for result in master.transfer(requests, &mut |_| {})? {
+        // A value that cannot be read shows nothing.
+        if let Err(error @ SdoError { failure: SdoFailure::TwoDevices(_), .. }) = result {
+            return Ok(Err(error));
+        }
+    }
+    Ok(Ok(()))
 }
 
 fn record_passively(

@@ -130,7 +130,7 @@ case("nmt reset 5", out="pre-operational|boot-up")(
     type("DeafAfterReset", (DeafAfterBoot,), {"__doc__": DeafAfterBoot.__doc__}))
 
 
-@case("read 5", 3, err="-t 2s")
+@case("read 5", out="1.25 bar")
 @case("read 5 -t 2s", out="1.25 bar")
 class SlowThird(Device):
     """Every third answer comes after 0.9 s; the name has more than seven bytes."""
@@ -194,7 +194,8 @@ class Block(Device):
                 return
 
 
-@case("sdo read 5 0x1021 --type d --output {dir}/f --force", 6, err="--block never")
+@case("sdo read 5 0x1021 --type d --output {dir}/f --force --block always", 6, err="--block never")
+@case("sdo read 5 0x1021 --type d --output {dir}/f --force")
 @case("sdo read 5 0x1021 --type d --output {dir}/f --force --block never")
 class CrcOfThePadding(Block):
     """The CRC includes the padding of the last segment."""

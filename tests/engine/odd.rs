@@ -234,7 +234,7 @@ fn oddity(random: &mut Random) -> Oddity {
         Mute::NotSent,
     ];
     match random.within(0..=10) {
-        0 => Oddity::Silent(*random.pick(&[0x1008, 0x1009, 0x100a])),
+        0 => Oddity::Silent(*random.pick(&[0x1008, 0x1009, 0x100a, 0x1018])),
         1 => Oddity::WrongToggle,
         2 => Oddity::Twice,
         3 => Oddity::IndexZero,
