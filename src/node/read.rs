@@ -102,7 +102,7 @@ pub(super) fn ask_optional<A: Ask>(
 ///
 /// # Errors
 /// A node that is silent twice in a row, and what stops everything.
-pub(super) fn read_optional<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Option<Value>>, A::Stop> {
+pub fn read_optional<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<Option<Value>>, A::Stop> {
     let objects: Vec<(NodeId, ObjectId)> = items.iter().map(|&(node, object, _)| (node, object)).collect();
     let (answers, dead) = ask_optional(master, &objects)?;
     if let Some(error) = dead {

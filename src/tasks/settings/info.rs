@@ -2,7 +2,7 @@
 
 use super::errors::{Errors, read as read_errors};
 use super::limits::Limit;
-use super::{Quantity, SettingsFailure, page, read_each};
+use super::{Quantity, SettingsFailure, page};
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::Value;
@@ -12,6 +12,7 @@ use crate::master::Master;
 use crate::measure::layout::Signal;
 use crate::measure::sample::Sample;
 use crate::node::Node;
+use crate::node::read::read_optional;
 use crate::node::state;
 use crate::tasks::failure::Cause;
 use crate::tasks::read::{requests, sample, targets};
@@ -167,7 +168,7 @@ impl Selection {
         }
     }
 
-    /// Reads the objects that the node can have.
+    /// Reads the objects that the node can have. One that is not answered affects no other.
     fn read(&self, master: &mut Master<'_>, node: &Node) -> Result<BTreeMap<ObjectId, Value>, Failure> {
         let all: BTreeSet<ObjectId> = [HARDWARE, SOFTWARE]
             .into_iter()
@@ -181,7 +182,8 @@ impl Selection {
             .filter(|&object| node.may_have(object))
             .collect();
         let all: Vec<ObjectId> = all.into_iter().collect();
-        let values = read_each(master, node, &all)?;
+        let items: Vec<_> = all.iter().map(|&object| (node.id, object, node.data_type(object))).collect();
+        let values = read_optional(master, &items)?;
         Ok(all.into_iter().zip(values).filter_map(|(object, value)| Some((object, value?))).collect())
     }
 }
