@@ -41,7 +41,7 @@ pub(super) fn rows(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
         let time = if late { "" } else { cells[0] };
         let rest = match spec.oddity_of(cells[1]) {
             _ if refuses => [cells[1], cells[6]].join(","),
-            Some(Oddity::Stranger | Oddity::Silent(0x1018)) => [cells[1], cells[6]].join(","),
+            Some(Oddity::Stranger | Oddity::Silent(0x1008 | 0x1018)) => [cells[1], cells[6]].join(","),
             // A device without name may not be recognised: its signals then have the names of the profile.
             Some(Oddity::Silent(_) | Oddity::WrongToggle) => [cells[1], cells[3], cells[4], cells[6]].join(","),
             _ => cells[1..].join(","),
