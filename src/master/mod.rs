@@ -148,7 +148,10 @@ impl<'bus> Master<'bus> {
     /// The bus rejects the filters.
     pub fn listen(&mut self, filters: &Filters) -> Result<(), Error> {
         self.filters = filters.clone();
-        Ok(if self.receives_all { () } else { self.bus.listen(filters)? })
+        if !self.receives_all {
+            self.bus.listen(filters)?;
+        }
+        Ok(())
     }
 
     /// Receives only the SDO channels and the heartbeats of these nodes. On a busy bus, other frames cost time and may

@@ -40,6 +40,9 @@ pub(super) fn read_known<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<O
         .collect()
 }
 
+/// The answers, and why a node that does not answer at all failed.
+type OptionalAnswers = (Vec<Option<Answer>>, Option<SdoError>);
+
 /// Reads objects that a device may lack. `None` for each that it does not answer properly: one such object affects no
 /// other.
 ///
@@ -47,10 +50,7 @@ pub(super) fn read_known<A: Ask>(master: &mut A, items: &[Item]) -> Result<Vec<O
 ///
 /// # Errors
 /// What stops everything.
-pub(super) fn ask_optional<A: Ask>(
-    master: &mut A,
-    objects: &[(NodeId, ObjectId)],
-) -> Result<(Vec<Option<Answer>>, Option<SdoError>), A::Stop> {
+pub(super) fn ask_optional<A: Ask>(master: &mut A, objects: &[(NodeId, ObjectId)]) -> Result<OptionalAnswers, A::Stop> {
     let mut answers: Vec<Option<Answer>> = objects.iter().map(|_| None).collect();
     let mut open: Vec<usize> = (0..objects.len()).collect();
     let (mut silent, mut dead): (BTreeSet<NodeId>, _) = (BTreeSet::new(), None);

@@ -125,7 +125,7 @@ impl Apply {
             });
             let record = ConfigRecord {
                 time,
-                bus: bus,
+                bus,
                 file: self.words.last().cloned().unwrap_or_default(),
                 done: applied.collect(),
                 failed: failures.iter().flatten().map(|failure| ErrorMessage::of(failure).message).collect(),

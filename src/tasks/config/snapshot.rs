@@ -176,7 +176,7 @@ fn read_objects(master: &mut Master<'_>, node: &Node, objects: &[(ObjectId, Data
     let answers = master.transfer(requests, &mut |_| {})?;
     let (mut values, mut unreadable) = (BTreeMap::new(), Vec::new());
     for (&(object, data_type), answer) in objects.iter().zip(answers) {
-        let checked = answer.and_then(|answer| {
+        let checked = answer.map(|answer| {
             let fits = data_type.width().is_none() || answer.value(node.id, object, Some(data_type)).is_ok();
             let mut bytes = answer.uploaded.map(|uploaded| uploaded.bytes).unwrap_or_default();
             if let Some(width) = data_type.width().filter(|_| fits) {
@@ -186,7 +186,7 @@ fn read_objects(master: &mut Master<'_>, node: &Node, objects: &[(ObjectId, Data
                 let end = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
                 bytes.truncate(end);
             }
-            Ok(bytes)
+            bytes
         });
         match checked {
             Ok(bytes) => {
