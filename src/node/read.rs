@@ -98,7 +98,7 @@ pub(super) fn ask_optional<A: Ask>(master: &mut A, objects: &[(NodeId, ObjectId)
     Ok((answers, dead))
 }
 
-/// The values of [`ask_optional`]; `None` also if the bytes do not fit the type.
+/// The values of `ask_optional`; `None` also if the bytes do not fit the type.
 ///
 /// # Errors
 /// A node that is silent twice in a row, and what stops everything.

@@ -245,7 +245,7 @@ pub struct SignalEntry {
     pub channel: u8,
     /// The object that is read by SDO if no PDO contains the signal.
     pub value: ObjectId,
-    /// The type of the value, if no [[object]] states it.
+    /// The type of the value, if no `[[object]]` states it.
     pub data_type: Option<DataType>,
     /// The same quantity at other indices than x130h: D-20-9's 2090h.
     pub also: Vec<ObjectId>,
