@@ -219,6 +219,12 @@ impl Active {
         }
     }
 
+    /// How long the request was repeated beyond its usual number of times.
+    pub(super) fn overtime(&self, now: Mono, timing: &Timing) -> Duration {
+        let usual = self.timeout(timing) * (1 + timing.retries);
+        self.asked_at.map_or(Duration::ZERO, |asked_at| now.since(asked_at).saturating_sub(usual))
+    }
+
     pub(super) fn timeout(&self, timing: &Timing) -> Duration {
         self.request.timeout.unwrap_or(timing.timeout)
     }

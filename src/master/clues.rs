@@ -11,6 +11,9 @@ use std::time::Duration;
 /// Requests without an answer are repeated for this time after a boot-up message.
 const START_TIME: Duration = Duration::from_secs(5);
 
+/// How long requests are repeated without success in all. A bus with random traffic has boot-up messages of many nodes.
+const WASTE_LIMIT: Duration = Duration::from_secs(10);
+
 /// What was received from a node that did not answer a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clue {
@@ -29,6 +32,8 @@ pub(super) struct Clues {
     answered: BTreeSet<NodeId>,
     /// When the nodes sent their boot-up messages.
     booted: BTreeMap<NodeId, Mono>,
+    /// How long requests were repeated after a boot-up message without success.
+    wasted: Duration,
     /// The object of the request that waits for the first frame of its answer, and what came instead.
     open: BTreeMap<NodeId, (ObjectId, Option<Frame>)>,
     /// Nodes whose request was repeated. Their answers may have another COB-ID.
@@ -46,9 +51,17 @@ impl Clues {
         self.repeated.insert(node);
     }
 
+    /// Requests were repeated for this time after a boot-up message, without an answer.
+    pub(super) fn on_wasted(&mut self, time: Duration) {
+        self.wasted += time;
+    }
+
     /// Whether a node started a short time ago: some devices do not answer for 2 to 3 s after their boot-up message.
-    pub(super) fn is_starting(&self, node: NodeId, now: Mono) -> bool {
-        self.booted.get(&node).is_some_and(|&booted| now.since(booted) < START_TIME)
+    /// `asked_at` is when the request was sent first: further boot-up messages do not extend its time.
+    pub(super) fn is_starting(&self, node: NodeId, asked_at: Option<Mono>, now: Mono) -> bool {
+        let is_recent = |moment: Mono| now.since(moment) < START_TIME;
+        let has_started = self.booted.get(&node).copied().is_some_and(is_recent);
+        has_started && asked_at.is_none_or(is_recent) && self.wasted < WASTE_LIMIT
     }
 
     /// Whether frames with other COB-IDs than those of the nodes are wanted.

@@ -243,7 +243,7 @@ impl SdoClient {
                 node.stale.push(StaleRequest { object: active.request.object, until: now + STALE_LIFETIME });
                 node.answers.on_repeated(active.request.object);
                 let may_repeat = active.request.repeatable && timing.retries > 0;
-                let is_starting = may_repeat && self.clues.is_starting(active.request.node, now);
+                let is_starting = may_repeat && self.clues.is_starting(active.request.node, active.asked_at, now);
                 if active.attempts_left > 0 || is_starting {
                     active.is_repeated = true;
                     active.attempts_left = active.attempts_left.saturating_sub(1);
@@ -261,6 +261,7 @@ impl SdoClient {
                 node.waiting.push_front((active.ticket, active.request));
                 continue;
             }
+            self.clues.on_wasted(active.overtime(now, timing));
             let clue = self.clues.end(active.request.node);
             let mut error = active.error(match active.request.operation() {
                 Operation::Read if active.foreign.is_served() => active.disturbance(),

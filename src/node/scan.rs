@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
+pub(super) const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
 
 /// The bits on the wire of a full transmit queue of 10 frames, each with its answer.
 const FULL_QUEUE_BITS: u64 = 10 * 2 * 135;

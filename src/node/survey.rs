@@ -7,6 +7,7 @@ mod background;
 mod ranges;
 
 use super::read::{Item, ask_optional, read_known, read_optional, read_values};
+use super::scan::DEVICE_TYPE;
 use super::{Identity, Node, signals};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -15,7 +16,7 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::catalog::{Model, Traits, recognise, to_ask};
 use crate::device::quirk::Quirk;
 use crate::device::unit::Unit;
-use crate::master::{Answer, Error, Master, Request, SdoError};
+use crate::master::{Answer, Error, Master, Request, SdoError, SdoFailure};
 use crate::measure::layout::{PROCESS_VALUES, Tpdo};
 pub use background::BackgroundSurvey;
 pub use ranges::narrow_values;
@@ -82,7 +83,7 @@ fn identities<A: Ask>(
     ];
     let items: Vec<Item> =
         nodes.iter().flat_map(|&node| objects.map(|(object, data_type)| (node, object, data_type))).collect();
-    let device_types: Vec<Item> = nodes.iter().map(|&node| (node, ObjectId::new(0x1000, 0), U32)).collect();
+    let device_types: Vec<Item> = nodes.iter().map(|&node| (node, DEVICE_TYPE, U32)).collect();
     let device_types = read_known(master, &device_types)?;
     let values = read_optional(master, &items)?;
     let mut identities: Vec<Identity> = values
@@ -420,7 +421,7 @@ pub fn identify_each(
 /// Reads nodes in parallel.
 type ReadNodes<'a> = &'a mut dyn FnMut(&mut Master<'_>, &[NodeId]) -> Result<Vec<Node>, Error>;
 
-/// Reads all nodes in parallel; if one of them fails, each alone.
+/// Reads all nodes in parallel; if one of them fails, each alone. Nodes that no longer answer fail together.
 fn each(master: &mut Master<'_>, nodes: &[NodeId], read: ReadNodes<'_>) -> Result<Vec<Result<Node, SdoError>>, Error> {
     match read(master, nodes) {
         Ok(all) => return Ok(all.into_iter().map(Ok).collect()),
@@ -428,9 +429,13 @@ fn each(master: &mut Master<'_>, nodes: &[NodeId], read: ReadNodes<'_>) -> Resul
         Err(Error::Sdo(_)) => {}
         Err(error) => return Err(error),
     }
+    let requests = nodes.iter().map(|&node| Request::read(node, DEVICE_TYPE)).collect();
     let mut results = Vec::new();
-    for node in nodes {
-        results.extend(each(master, &[*node], read)?);
+    for (&node, answer) in nodes.iter().zip(master.transfer(requests, &mut |_| {})?) {
+        match answer {
+            Err(error) if matches!(error.failure, SdoFailure::NoAnswer { .. }) => results.push(Err(error)),
+            _ => results.extend(each(master, &[node], read)?),
+        }
     }
     Ok(results)
 }

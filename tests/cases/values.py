@@ -35,7 +35,7 @@ class FloatOfTheMaker(Device):
         self.map(0x23000320)
 
 
-@case(TWO, rows=2, out=(",-1234,", ",-77,"), never="64302|65459")
+@case(TWO, rows=2, out=(",-12.34,deg,", ",-0.77,deg,"), never="64302|65459")
 @case("check 5 '0x6020:0 > 0'", 1, out="FAIL")
 class Inclinometer(Device):
     """CiA 410: two slopes below zero."""
