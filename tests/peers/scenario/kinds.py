@@ -37,6 +37,13 @@ def description(kind):
 
 
 @functools.cache
+def model(kind):
+    """What only the simulator knows of a device kind."""
+    with open(os.path.join(HERE, "../../src/sim/models", f"{kind}.toml"), "rb") as file:
+        return tomllib.load(file)
+
+
+@functools.cache
 def objects(kind):
     """All objects of a device kind, by (index, sub)."""
     found = {}

@@ -135,7 +135,7 @@ def hold_still(scenario, share=None):
     """Makes measured values constant, so that a read can be repeated. With `share`, near zero."""
     for device in scenario.devices:
         device["overload"] = None
-        for channel in kinds.description(device["kind"])["sim"]["channel"]:
+        for channel in kinds.model(device["kind"])["channel"]:
             still = {"channel": channel["channel"], "amplitude": 0.0, "noise": 0.0}
             if share is not None:
                 still["base"] = share * (channel["end"] - channel["start"])
