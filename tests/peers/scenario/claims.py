@@ -131,7 +131,7 @@ def autozero(scenario, run, foreign):
 
 
 def ends(kind, number):
-    channel = next(c for c in kinds.description(kind)["sim"]["channel"] if c["channel"] == number)
+    channel = next(c for c in kinds.model(kind)["channel"] if c["channel"] == number)
     return channel["start"], channel["end"]
 
 

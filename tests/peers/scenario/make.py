@@ -231,7 +231,7 @@ def command(rng, scenario):
     if name == "check":
         hold_still(scenario)
         signal = kinds.signals(kind)[0]
-        base = next(c["base"] for c in kinds.description(kind)["sim"]["channel"] if c["channel"] == signal["channel"])
+        base = next(c["base"] for c in kinds.model(kind)["channel"] if c["channel"] == signal["channel"])
         holds = rng.random() < 0.5
         limit = round(base * rng.choice((1.2, 1.5) if holds else (0.5, 0.8)), 2)
         how = rng.choice(([], [], ["--for", "500ms", "--poll", "50ms"], ["--for", "500ms"], ["--for", "500ms", "--sync", "20ms"]))
