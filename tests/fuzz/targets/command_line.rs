@@ -4,7 +4,7 @@
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::lss::{LssAddress, LssRange};
 use cangauge::canopen::object::ObjectId;
-use cangauge::cli::args::{BusSpec, Duration, InterfaceName, Nodes, ObjectArg, Override, Rate, SignalArg};
+use cangauge::cli::args::{BitRate, BusSpec, Duration, InterfaceName, Nodes, ObjectArg, Override, SignalArg};
 use cangauge::cli::parse::parse;
 use cangauge::tasks::lss::Target;
 use libfuzzer_sys::fuzz_target;
@@ -43,7 +43,7 @@ fn values(word: &str) {
     if let Ok(Duration(duration)) = word.parse() {
         assert!(!duration.is_zero());
     }
-    if let Ok(Rate(rate)) = word.parse() {
+    if let Ok(BitRate(rate)) = word.parse() {
         assert!((1_000..=1_000_000).contains(&rate));
     }
     if let Ok(address) = word.parse::<LssAddress>() {
