@@ -44,6 +44,8 @@ pub(super) fn rows(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
             Some(Oddity::Stranger | Oddity::Silent(0x1008 | 0x1018)) => [cells[1], cells[6]].join(","),
             // A device without name may not be recognised: its signals then have the names of the profile.
             Some(Oddity::Silent(_) | Oddity::WrongToggle) => [cells[1], cells[3], cells[4], cells[6]].join(","),
+            // The same if a fault affects the read of its name.
+            _ if !spec.is_clean() => [cells[1], cells[3], cells[4], cells[6]].join(","),
             _ => cells[1..].join(","),
         };
         format!("{time},{rest}")
