@@ -1282,7 +1282,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__config__subcmd__apply)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --store --reset --dry-run --exact --address --with-calibration --rollback --table --record --state-home --home --help --version"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --store --reset --dry-run --exact --address --with-calibration --rollback --table --record --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -1345,14 +1345,6 @@ _cangauge() {
                     return 0
                     ;;
                 --record)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
-                --state-home)
-                    COMPREPLY=($(compgen -f "${cur}"))
-                    return 0
-                    ;;
-                --home)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;

@@ -1250,8 +1250,6 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l table -d 'Set many devices, one row each: vendor, product, serial, node (with --address), and columns that fill in "{column}" in the file. A device that is not in the table is not changed' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l record -d 'Write a record: when, which devices, before, after, how it was verified; HTML if the name ends with .html, else JSON' -r -F
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l state-home -r -F
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l home -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s q -l quiet -d 'Print less on stderr'

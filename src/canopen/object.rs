@@ -19,6 +19,9 @@ pub struct ObjectId {
 pub struct ObjectIdError(String);
 
 impl ObjectId {
+    /// The device type (1000h), which every device has (CiA 301, 7.5.2.1).
+    pub const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
+
     /// The object at `index` and `sub`.
     pub const fn new(index: u16, sub: u8) -> ObjectId {
         ObjectId { index, sub }

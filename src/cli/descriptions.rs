@@ -145,7 +145,7 @@ fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[N
 
 /// Whether the device has the profile (1000h) of a description, as far as both are known.
 fn has_profile_of(master: &mut Master<'_>, node: NodeId, model: &Model) -> anyhow::Result<bool> {
-    let object = ObjectId::new(0x1000, 0);
+    let object = ObjectId::DEVICE_TYPE;
     let described = model.dictionary.get(object).and_then(|entry| entry.default_bytes(node));
     let described = described.and_then(|bytes| DataType::Unsigned(4).decode(&bytes).ok());
     let found = read_values(master, &[(node, object, DataType::Unsigned(4))]).or_fail()?.pop().and_then(Result::ok);

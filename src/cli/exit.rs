@@ -180,7 +180,7 @@ pub fn report(cli: &Cli, error: &anyhow::Error) -> u8 {
     decides.or(messages.first().map(|message| message.kind)).map_or(0, code)
 }
 
-/// What there is to print: nothing if only the output pipe was closed.
+/// The messages to print: none if only the output pipe was closed.
 fn messages(error: &anyhow::Error) -> Vec<ErrorMessage> {
     if error.is::<ClosedPipe>() {
         return Vec::new();

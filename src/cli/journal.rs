@@ -8,7 +8,7 @@ use crate::bus::file::lock;
 use crate::canopen::id::NodeId;
 use crate::tasks::journal::{Journal, JournalError, TemporaryWrite};
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -64,18 +64,7 @@ impl FileJournal {
     }
 
     fn create(&mut self, path: &Path, write: &TemporaryWrite) -> io::Result<()> {
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder)?;
-        }
-        let mut file = File::options().append(true).create(true).open(path)?;
-        lock(&file).map_err(|_| io::Error::from(io::ErrorKind::ResourceBusy))?;
-        file.set_len(0)?;
-        file.write_all(text(write, &self.bus).as_bytes())?;
-        file.sync_all()?;
-        if let Some(folder) = path.parent().and_then(|folder| File::open(folder).ok()) {
-            // Some file systems cannot sync a folder.
-            let _ = folder.sync_all();
-        }
+        let file = write_synced(path, File::options().append(true).create(true), text(write, &self.bus).as_bytes())?;
         self.own.insert(path.to_owned(), file);
         Ok(())
     }
@@ -97,8 +86,28 @@ impl Journal for FileJournal {
     }
 }
 
+/// Writes a file, whatever it contained. When this returns, the file and its name are on the disk. The file is locked
+/// until it is closed.
+///
+/// # Errors
+/// The file cannot be written, or another process has locked it.
+pub(super) fn write_synced(path: &Path, options: &OpenOptions, text: &[u8]) -> io::Result<File> {
+    let folder = path.parent().unwrap_or(path);
+    fs::create_dir_all(folder)?;
+    let mut file = options.open(path)?;
+    lock(&file).map_err(|_| io::Error::from(io::ErrorKind::ResourceBusy))?;
+    file.set_len(0)?;
+    file.write_all(text)?;
+    file.sync_all()?;
+    if let Ok(folder) = File::open(folder) {
+        // Some file systems cannot sync a folder.
+        let _ = folder.sync_all();
+    }
+    Ok(file)
+}
+
 /// The folder for the state of programs (XDG base directories). `None` if the environment names none.
-fn folder() -> Option<PathBuf> {
+pub(super) fn folder() -> Option<PathBuf> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let state = absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")))?;
     Some(state.join("cangauge"))

@@ -203,7 +203,7 @@ pub enum SdoFailure {
     #[error("refused by the device ({0})")]
     Refused(AbortCode),
     /// The device did not answer in time.
-    #[error("no answer within {}{}{}", format_duration(*.waited), if *.started { " in the middle of the transfer" } else { "" }, told(.clue))]
+    #[error("no answer within {}{}{}", format_duration(*.waited), if *.started { " in the middle of the transfer" } else { "" }, received(.clue))]
     NoAnswer {
         /// The longest wait for one answer.
         waited: Duration,
@@ -268,7 +268,7 @@ fn two_devices(answers: Option<&SecondAnswer>) -> String {
 }
 
 /// What was received instead of an answer.
-fn told(clue: &Clue) -> String {
+fn received(clue: &Clue) -> String {
     let heard = clue.frame.map(|frame| format!("; heard {frame}")).unwrap_or_default();
     let state = clue.state.map(|state| format!("; its heartbeat says {state}")).unwrap_or_default();
     format!("{heard}{state}")

@@ -345,8 +345,8 @@ impl Node {
     fn barrier(&self, object: ObjectId) -> ObjectId {
         let is_fresh =
             |other: &ObjectId| *other != object && !self.stale.iter().any(|request| request.object == *other);
-        let fallback = if object == DEVICE_TYPE { ERROR_REGISTER } else { DEVICE_TYPE };
-        [DEVICE_TYPE, ERROR_REGISTER, IDENTITY].into_iter().find(is_fresh).unwrap_or(fallback)
+        let fallback = if object == ObjectId::DEVICE_TYPE { ERROR_REGISTER } else { ObjectId::DEVICE_TYPE };
+        [ObjectId::DEVICE_TYPE, ERROR_REGISTER, IDENTITY].into_iter().find(is_fresh).unwrap_or(fallback)
     }
 
     /// Why transfers with this node are refused; `None` if they are not.
@@ -375,6 +375,5 @@ impl Node {
     }
 }
 
-const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
 const ERROR_REGISTER: ObjectId = ObjectId::new(0x1001, 0);
 const IDENTITY: ObjectId = ObjectId::new(0x1018, 0);

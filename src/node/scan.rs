@@ -12,8 +12,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-pub(super) const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
-
 /// The bits on the wire of a full transmit queue of 10 frames, each with its answer.
 const FULL_QUEUE_BITS: u64 = 10 * 2 * 135;
 
@@ -133,7 +131,7 @@ fn ask(
 ) -> Result<(), Error> {
     let mut open: BTreeMap<Ticket, NodeId> = BTreeMap::new();
     for &node in nodes {
-        open.insert(master.start(Request::read(node, DEVICE_TYPE).once().within(timeout)), node);
+        open.insert(master.start(Request::read(node, ObjectId::DEVICE_TYPE).once().within(timeout)), node);
     }
     let begin = master.now();
     let mut until = begin + REPEAT_INTERVAL;

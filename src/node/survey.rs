@@ -7,7 +7,6 @@ mod background;
 mod ranges;
 
 use super::read::{Item, ask_optional, read_known, read_optional, read_values};
-use super::scan::DEVICE_TYPE;
 use super::{Identity, Node, signals};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -83,7 +82,7 @@ fn identities<A: Ask>(
     ];
     let items: Vec<Item> =
         nodes.iter().flat_map(|&node| objects.map(|(object, data_type)| (node, object, data_type))).collect();
-    let device_types: Vec<Item> = nodes.iter().map(|&node| (node, DEVICE_TYPE, U32)).collect();
+    let device_types: Vec<Item> = nodes.iter().map(|&node| (node, ObjectId::DEVICE_TYPE, U32)).collect();
     let device_types = read_known(master, &device_types)?;
     let values = read_optional(master, &items)?;
     let mut identities: Vec<Identity> = values
@@ -429,7 +428,7 @@ fn each(master: &mut Master<'_>, nodes: &[NodeId], read: ReadNodes<'_>) -> Resul
         Err(Error::Sdo(_)) => {}
         Err(error) => return Err(error),
     }
-    let requests = nodes.iter().map(|&node| Request::read(node, DEVICE_TYPE)).collect();
+    let requests = nodes.iter().map(|&node| Request::read(node, ObjectId::DEVICE_TYPE)).collect();
     let mut results = Vec::new();
     for (&node, answer) in nodes.iter().zip(master.transfer(requests, &mut |_| {})?) {
         match answer {

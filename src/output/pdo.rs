@@ -1,7 +1,7 @@
 //! TPDOs: their settings, and the values that they carry.
 
 use super::failure::pdo::entry;
-use super::report::{Cell, Column, Report};
+use super::report::{Cell, Column, Report, joined};
 use super::{notes, text};
 use crate::bus::Stamp;
 use crate::bus::time::format_duration;
@@ -12,19 +12,21 @@ use crate::tasks::pdo::{MapReport, MappedItem, TpdoReport};
 use std::io::{self, Write};
 use std::time::Duration;
 
+const TPDO_COLUMNS: [Column; 10] = [
+    Column::new("node").data_only(),
+    Column::new("pdo").right(),
+    Column::new("cob_id").heading("COB-ID"),
+    Column::new("valid").data_only(),
+    Column::new("rtr").data_only(),
+    Column::new("transmission").heading("SENT"),
+    Column::new("event_timer_ms").heading("TIMER").right(),
+    Column::new("inhibit_us").heading("INHIBIT").right(),
+    Column::new("mapping").json_only(),
+    Column::new("mapping").not_json(),
+];
+
 impl Report for TpdoReport {
-    const COLUMNS: &'static [Column] = &[
-        Column::new("node").data_only(),
-        Column::new("pdo").right(),
-        Column::new("cob_id").heading("COB-ID"),
-        Column::new("valid").data_only(),
-        Column::new("rtr").data_only(),
-        Column::new("transmission").heading("SENT"),
-        Column::new("event_timer_ms").heading("TIMER").right(),
-        Column::new("inhibit_us").heading("INHIBIT").right(),
-        Column::new("mapping").json_only(),
-        Column::new("mapping").not_json(),
-    ];
+    const COLUMNS: &'static [Column] = &TPDO_COLUMNS;
 
     fn cells(&self) -> Vec<Cell> {
         let settings = &self.settings;
@@ -52,23 +54,11 @@ impl Report for TpdoReport {
     }
 }
 
-/// The columns of [`TpdoReport`], and the change.
 impl Report for MapReport {
-    const COLUMNS: &'static [Column] = &[
-        Column::new("node").data_only(),
-        Column::new("pdo").right(),
-        Column::new("cob_id").heading("COB-ID"),
-        Column::new("valid").data_only(),
-        Column::new("rtr").data_only(),
-        Column::new("transmission").heading("SENT"),
-        Column::new("event_timer_ms").heading("TIMER").right(),
-        Column::new("inhibit_us").heading("INHIBIT").right(),
-        Column::new("mapping").json_only(),
-        Column::new("mapping").not_json(),
-        Column::new("writes").json_only(),
-        Column::new("stored").json_only(),
-        Column::new("notes").json_only(),
-    ];
+    const COLUMNS: &'static [Column] = &joined::<10, 3, 13>(
+        TPDO_COLUMNS,
+        [Column::new("writes").json_only(), Column::new("stored").json_only(), Column::new("notes").json_only()],
+    );
 
     fn cells(&self) -> Vec<Cell> {
         let mut cells = self.shown.cells();

@@ -74,6 +74,20 @@ pub struct Column {
     nested: &'static [Column],
 }
 
+/// The columns of a report that extends another one. `SUM` is `N + M`.
+pub const fn joined<const N: usize, const M: usize, const SUM: usize>(
+    first: [Column; N],
+    then: [Column; M],
+) -> [Column; SUM] {
+    let mut all = [first[0]; SUM];
+    let mut at = 0;
+    while at < SUM {
+        all[at] = if at < N { first[at] } else { then[at - N] };
+        at += 1;
+    }
+    all
+}
+
 impl Column {
     /// A column of this name in JSON, CSV and the table. The table shows the name in capital letters.
     pub const fn new(name: &'static str) -> Column {

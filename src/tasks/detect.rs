@@ -26,9 +26,6 @@ const ENOUGH_FRAMES: u32 = 3;
 /// After this many errors without a valid frame, a bit rate is given up.
 const ENOUGH_ERRORS: u32 = 50;
 
-/// The device type, which every device has.
-const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
-
 /// The most bits that a request occupies on the bus, with bit stuffing.
 const REQUEST_BITS: u64 = 135;
 
@@ -199,8 +196,9 @@ fn ask_all(bus: &mut dyn Bus, bit_rate: u32, each: Duration) -> Result<Tried, Er
         return Ok(tried);
     }
     let mut master = Master::new(bus, Timing { timeout: each, retries: 0 });
-    let mut pending: BTreeSet<Ticket> =
-        NodeId::all().map(|node| master.start(Request::read(node, DEVICE_TYPE).once().within(each))).collect();
+    let mut pending: BTreeSet<Ticket> = NodeId::all()
+        .map(|node| master.start(Request::read(node, ObjectId::DEVICE_TYPE).once().within(each)))
+        .collect();
     // On a slow bus the requests alone take longer than the answers.
     let requests = u64::try_from(pending.len()).unwrap_or(0);
     let on_the_wire = REQUEST_BITS * requests * 1_000_000 / u64::from(bit_rate.max(1));

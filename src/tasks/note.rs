@@ -70,11 +70,11 @@ pub enum StateEffect {
 pub struct Note {
     /// The node that it concerns.
     pub node: Option<NodeId>,
-    /// What there is to report.
+    /// The fact.
     pub fact: Fact,
 }
 
-/// What there is to report.
+/// A fact about a success that is not its result.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fact {
     /// The node keeps the new values only until it loses power or is reset, unless they are stored.

@@ -1,6 +1,6 @@
 //! `cangauge config apply`.
 
-use super::journal::{FileJournal, Folder, latest};
+use super::journal::{FileJournal, latest};
 use super::{Failures, described, document, mistakes, nodes_and_file, parse};
 use crate::bus::Wall;
 use crate::bus::claim::Claim;
@@ -66,8 +66,6 @@ pub(super) struct Apply {
     /// JSON
     #[arg(long, value_name = "FILE", conflicts_with = "dry_run")]
     record: Option<PathBuf>,
-    #[command(flatten)]
-    folder: Folder,
 }
 
 /// One device to set.
@@ -255,11 +253,11 @@ impl Apply {
         let node = job.node;
         master.listen_to(&[node]).map_err(|error| one(error.into()))?;
         let snapshot = read(master, node, overrides, job.document.as_ref()).map_err(one)?;
-        let mut journal = FileJournal::new(&self.folder, master.bus().name(), &snapshot, global);
+        let mut journal = FileJournal::new(master.bus().name(), &snapshot, global);
         let (file, document) = match &job.document {
             Some(document) => (job.label.clone(), document.clone()),
             None => {
-                let (file, text) = latest(&self.folder, master.bus().name(), &snapshot).map_err(one)?;
+                let (file, text) = latest(master.bus().name(), &snapshot).map_err(one)?;
                 let unreadable = || Failure::at(node, ConfigFailure::Journal { reason: file.clone() });
                 let document = parse(&file, &text).map_err(|_| one(unreadable()))?;
                 (file, document)

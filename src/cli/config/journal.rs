@@ -5,32 +5,14 @@
 
 use super::apply::text_of;
 use crate::cli::Global;
+use crate::cli::journal::{folder, write_synced};
 use crate::tasks::Failure;
 use crate::tasks::config::{ConfigFailure, Journal, Snapshot};
-use clap::Args;
 use std::fs::{self, File};
-use std::io::Write;
 use std::path::PathBuf;
 
-/// Where the journal is.
-#[derive(Clone, Debug, Args)]
-pub(super) struct Folder {
-    #[arg(long, env = "XDG_STATE_HOME", hide = true, hide_env = true)]
-    state_home: Option<PathBuf>,
-    #[arg(long, env = "HOME", hide = true, hide_env = true)]
-    home: Option<PathBuf>,
-}
-
-impl Folder {
-    fn path(&self) -> Option<PathBuf> {
-        let state = self.state_home.clone().filter(|path| path.is_absolute());
-        let state = state.or_else(|| Some(self.home.as_ref()?.join(".local/state")));
-        Some(state?.join("cangauge"))
-    }
-}
-
 /// The file of a device: bus, vendor, product and serial number; without a serial number the node-ID.
-fn file(folder: &Folder, bus: &str, snapshot: &Snapshot) -> Option<PathBuf> {
+fn file(bus: &str, snapshot: &Snapshot) -> Option<PathBuf> {
     let identity = &snapshot.node.identity;
     let code = |number: Option<u32>| number.map_or_else(|| "-".to_owned(), |number| format!("{number:X}"));
     let specimen = match identity.serial.filter(|serial| *serial != 0) {
@@ -39,7 +21,7 @@ fn file(folder: &Folder, bus: &str, snapshot: &Snapshot) -> Option<PathBuf> {
     };
     let bus: String = bus.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
     let name = format!("{bus}_{}_{}_{specimen}.toml", code(identity.vendor), code(identity.product));
-    Some(folder.path()?.join(name))
+    Some(folder()?.join(name))
 }
 
 /// The journal of one device.
@@ -49,8 +31,8 @@ pub(super) struct FileJournal<'a> {
 }
 
 impl<'a> FileJournal<'a> {
-    pub(super) fn new(folder: &Folder, bus: &str, snapshot: &Snapshot, global: &'a Global) -> FileJournal<'a> {
-        FileJournal { path: file(folder, bus, snapshot), global }
+    pub(super) fn new(bus: &str, snapshot: &Snapshot, global: &'a Global) -> FileJournal<'a> {
+        FileJournal { path: file(bus, snapshot), global }
     }
 }
 
@@ -66,13 +48,8 @@ impl Journal for FileJournal<'_> {
         if path.exists() {
             return Ok(());
         }
-        let write = || {
-            fs::create_dir_all(path.parent().unwrap_or(path))?;
-            let mut file = File::create_new(path)?;
-            file.write_all(&text_of(before))?;
-            file.sync_all()
-        };
-        write().map_err(|error| {
+        let mut options = File::options();
+        write_synced(path, options.write(true).create_new(true), &text_of(before)).map(drop).map_err(|error| {
             let reason = format!("{}: {error}", path.display());
             Failure::at(before.node.id, ConfigFailure::Journal { reason })
         })
@@ -90,8 +67,8 @@ impl Journal for FileJournal<'_> {
 ///
 /// # Errors
 /// [`ConfigFailure::NoJournal`].
-pub(super) fn latest(folder: &Folder, bus: &str, snapshot: &Snapshot) -> Result<(String, String), Failure> {
-    let path = file(folder, bus, snapshot);
+pub(super) fn latest(bus: &str, snapshot: &Snapshot) -> Result<(String, String), Failure> {
+    let path = file(bus, snapshot);
     let text = path.as_ref().and_then(|path| fs::read_to_string(path).ok());
     match path.zip(text) {
         Some((path, text)) => Ok((path.display().to_string(), text)),

@@ -116,17 +116,12 @@ pub(in crate::output) fn effect(node: &str, effect: &ConfigEffect) -> NoteText {
         (false, true) => format!("written: {}", written.join(", ")),
         (false, false) => format!("written: {}; not written: {missing}", written.join(", ")),
     };
-    let told = NoteText::new("applied-in-part", message);
-    match written.is_empty() {
-        true => told,
-        false => told.command(
-            "continue",
-            format!(
-                "cangauge config apply {node} {}; go back: cangauge config apply {node} --rollback",
-                effect.arguments
-            ),
-        ),
+    let note = NoteText::new("applied-in-part", message);
+    if written.is_empty() {
+        return note;
     }
+    let apply = format!("cangauge config apply {node}");
+    note.command("continue", format!("{apply} {}; go back: {apply} --rollback", effect.arguments))
 }
 
 /// The text for a note.

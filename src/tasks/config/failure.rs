@@ -73,7 +73,7 @@ pub struct ConfigEffect {
     pub arguments: String,
 }
 
-/// What there is to report about settings that were applied.
+/// A fact about settings that were applied.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ConfigFact {
     /// Keys of sections that were ignored.

@@ -79,7 +79,7 @@ fn ranges(node: &Node) -> Vec<Places> {
     all
 }
 
-/// The objects that tell kind, range and dates.
+/// The objects that contain kind, measuring range and dates.
 pub(super) fn objects(node: &Node) -> Vec<ObjectId> {
     let mut objects: Vec<ObjectId> =
         ranges(node).into_iter().flat_map(|places| [places.start, Some(places.end), places.unit]).flatten().collect();

@@ -9,7 +9,7 @@ use crate::tasks::Failure;
 /// A mistake with its place.
 #[derive(Clone, Debug)]
 pub struct Mistake {
-    /// Where it is.
+    /// The place in the file.
     pub place: Place,
     /// The key; empty for a mistake of the syntax.
     pub key: String,

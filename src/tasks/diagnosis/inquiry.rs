@@ -14,9 +14,6 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The first question to a node: whether it answers at all.
-const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
-
 /// All questions are answered or given up within this time: two attempts of an SDO request with a long time-out.
 const INQUIRY_LIMIT: Duration = Duration::from_secs(20);
 
@@ -46,7 +43,7 @@ impl Findings {
 
 /// The objects to read of a node, to find out why these TPDOs are not sent.
 pub fn questions(node: &Node, carries: &dyn Fn(&Tpdo) -> bool) -> Vec<ObjectId> {
-    let mut objects = vec![DEVICE_TYPE];
+    let mut objects = vec![ObjectId::DEVICE_TYPE];
     let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
     for tpdo in valid.filter(|tpdo| tpdo.mapping.is_empty() || carries(tpdo)) {
         if tpdo.mapping.is_empty() {
@@ -63,7 +60,7 @@ pub fn questions(node: &Node, carries: &dyn Fn(&Tpdo) -> bool) -> Vec<ObjectId> 
             objects.extend(values().filter_map(|value| interrupt_enable(node, value)));
         }
     }
-    objects.retain(|&object| object == DEVICE_TYPE || node.may_have(object));
+    objects.retain(|&object| object == ObjectId::DEVICE_TYPE || node.may_have(object));
     let mut seen = std::collections::BTreeSet::new();
     objects.retain(|&object| seen.insert(object));
     objects

@@ -14,7 +14,6 @@ use crate::tasks::Failure;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
 const IDENTITY: u16 = 0x1018;
 
 /// How often an identity is read. The answers of two devices can merge on the wire once, but not each time.
@@ -184,7 +183,7 @@ pub(super) fn taken(master: &mut Master<'_>, node: NodeId) -> Result<Option<Take
     let timeout = master.timing().timeout.min(LISTEN_TIME / 3);
     let start = master.now();
     // Two requests: one of them or its answer may be lost.
-    let requests = [(); 2].map(|()| Request::read(node, DEVICE_TYPE).once().within(timeout));
+    let requests = [(); 2].map(|()| Request::read(node, ObjectId::DEVICE_TYPE).once().within(timeout));
     let tickets = requests.map(|request| master.start(request));
     let mut open = tickets.len();
     let on_event = |event: Happening, open: &mut usize| match event {

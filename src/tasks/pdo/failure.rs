@@ -270,7 +270,7 @@ pub struct Incomplete {
     pub was_operational: bool,
 }
 
-/// What there is to report about a TPDO.
+/// A fact about a TPDO that was set.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PdoFact {
     /// The TPDO already had the requested settings: nothing was written.

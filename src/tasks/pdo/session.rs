@@ -12,8 +12,6 @@ use crate::node::{self, Node, Repeat, WriteOptions};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-const DEVICE_TYPE: ObjectId = ObjectId::new(0x1000, 0);
-
 /// The exchanges of one change with a node.
 pub(super) struct Session<'a, 'bus> {
     pub(super) master: &'a mut Master<'bus>,
@@ -78,7 +76,7 @@ impl<'a, 'bus> Session<'a, 'bus> {
 
     /// Reads another object after a cancelled exchange: after its answer, no older answer can arrive.
     pub(super) fn discard_late_answers(&mut self) -> Result<(), StepError> {
-        match self.exchange(DEVICE_TYPE)? {
+        match self.exchange(ObjectId::DEVICE_TYPE)? {
             Ok(_) | Err(SdoError { failure: SdoFailure::Refused(_), .. }) => Ok(()),
             Err(error) => Err(error.into()),
         }

@@ -295,7 +295,7 @@ pub(super) fn send(master: &mut Master<'_>, device: &Node, verb: Verb, group: Gr
 
 /// Whether the device answers another request; `None` if that cannot be found out.
 fn answers(master: &mut Master<'_>, device: &Node) -> Option<bool> {
-    let answer = master.read(device.id, ObjectId::new(0x1000, 0), DataType::Unsigned(4)).ok()?;
+    let answer = master.read(device.id, ObjectId::DEVICE_TYPE, DataType::Unsigned(4)).ok()?;
     Some(!matches!(answer, Err(SdoError { failure: SdoFailure::NoAnswer { .. }, .. })))
 }
 
