@@ -171,6 +171,7 @@ impl SdoClient {
             let mut out = Vec::new();
             if let Some(mut active) = node.active.take() {
                 active.machine.abort(AbortCode::TIMEOUT, &mut out);
+                node.answers.on_repeated(active.request.object);
                 outgoing.drop_ticket(active.ticket);
                 node.waiting.push_front(active.deferred.unwrap_or((active.ticket, active.request)));
             }
@@ -327,6 +328,8 @@ impl SdoClient {
         for node in self.nodes.values_mut() {
             if let Some(mut active) = node.active.take() {
                 active.machine.abort(AbortCode::TIMEOUT, out);
+                // Its answer may still arrive.
+                node.answers.on_repeated(active.request.object);
             }
             node.waiting.clear();
         }

@@ -59,10 +59,8 @@ pub(super) struct Answers {
     initial: Option<(Frame, Operation)>,
     /// The latest frame that was used.
     latest: Option<Frame>,
-    /// Whether `initial` may be a late repetition of an earlier answer.
-    is_ambiguous: bool,
-    /// Earlier values of `initial`.
-    history: VecDeque<Frame>,
+    /// The values of `initial`, the latest one last.
+    history: VecDeque<(Frame, Operation)>,
     /// Objects whose request was repeated or dropped. More than one answer may come.
     repeated: BTreeSet<ObjectId>,
     foreign_until: Option<Mono>,
@@ -108,9 +106,8 @@ impl Answers {
         let Some(asked_at) = asked_at else { return };
         // The time for a second answer to the previous request is over.
         self.is_single |= self.initial.is_some() && self.wait_until.is_none_or(|until| until <= at);
-        self.is_ambiguous = self.history.contains(&frame);
         self.initial = Some((frame, operation));
-        self.history.push_back(frame);
+        self.history.push_back((frame, operation));
         if self.history.len() > HISTORY {
             self.history.pop_front();
         }
@@ -132,20 +129,31 @@ impl Answers {
 
     /// A frame that answers nothing. Whether it is a second answer.
     pub(super) fn on_unexpected(&mut self, frame: &Frame, at: Mono) -> bool {
-        let Some((initial, operation)) = self.initial else { return false };
         let object = multiplexer(frame);
         if self.may_be_foreign(at) || object.is_some_and(|object| self.repeated.contains(&object)) {
             return false;
         }
-        if self.latest == Some(*frame) || self.history.contains(frame) {
+        if self.latest == Some(*frame) || self.count(frame) > 0 {
             self.finding.get_or_insert(SecondAnswer { first: *frame, second: *frame });
             return true;
         }
-        let is_second = object.is_some() && object == multiplexer(&initial) && answers(frame, operation, &initial);
-        if is_second && !self.is_ambiguous && self.differing().is_none() {
-            self.finding = Some(SecondAnswer { first: initial, second: *frame });
+        // The second answer of a slow device may arrive after the answer to a later request.
+        let is_same = |answer: &Frame, operation| multiplexer(answer) == object && answers(frame, operation, answer);
+        let mut earlier = self.history.iter().rev().map(|&(answer, operation)| (answer, operation));
+        let Some((first, _)) = earlier.find(|&(answer, operation)| object.is_some() && is_same(&answer, operation))
+        else {
+            return false;
+        };
+        // An answer that arrived before may be a late one to an earlier request.
+        if self.count(&first) == 1 && self.differing().is_none() {
+            self.finding = Some(SecondAnswer { first, second: *frame });
         }
-        is_second
+        true
+    }
+
+    /// How often this answer is in the history.
+    fn count(&self, frame: &Frame) -> usize {
+        self.history.iter().filter(|(answer, _)| answer == frame).count()
     }
 
     /// Until when a second answer may arrive; `None` if the node is known to be single.
@@ -234,6 +242,15 @@ mod tests {
         let mut log = after(&[(SERIAL, Operation::Read), (SERIAL, Operation::Read)]);
         assert!(log.on_unexpected(&frame(OTHER_SERIAL), ms(21)));
         assert_eq!(log.differing(), None);
+    }
+
+    #[test]
+    fn a_second_answer_after_a_later_one_shows_two_devices() {
+        for (second, expected) in [(OTHER_SERIAL, true), ("585#4318100399880000", false)] {
+            let mut log = after(&[(SERIAL, Operation::Read), ("585#4F01100000000000", Operation::Read)]);
+            log.on_unexpected(&frame(second), ms(21));
+            assert_eq!(log.differing().is_some(), expected, "{second}");
+        }
     }
 
     #[test]

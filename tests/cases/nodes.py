@@ -71,6 +71,7 @@ class Twins(Pair):
         return device
 
 
+@case("log 5 --sync 100ms --count 4", 6, err="two devices|bridge", never="ok,")
 @case("sdo read 5 0x6130:1 --type r32", 6, err="two devices|bridge")
 class TwinsOfOneIdentity(Pair):
     """Two devices with one node-ID and equal identities; their values differ."""

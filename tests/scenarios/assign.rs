@@ -8,7 +8,7 @@ mod targets;
 
 use cangauge::bus::memory::MemoryBus;
 use cangauge::canopen::id::NodeId;
-use cangauge::master::{Master, Timing};
+use cangauge::master::{Master, OnTwoDevices, Timing};
 use cangauge::node::Overrides;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::output::notes;
@@ -83,6 +83,7 @@ fn run(bus: &mut MemoryBus, target: &str, wanted: &Wanted) -> Done {
     };
     let mut notes = Vec::new();
     let mut master = Master::new(bus, Timing::default());
+    master.set_on_two_devices(OnTwoDevices::RefuseWrites);
     let result = assign(&mut master, &job, &mut |note| notes.push(note));
     master.settle();
     // The last frames arrive.

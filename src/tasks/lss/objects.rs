@@ -10,7 +10,7 @@ use crate::bus::Received;
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::device::assign::{AssignEntry, AssignObject};
-use crate::master::{Error, Master, Request};
+use crate::master::{Error, Master, OnTwoDevices, Request};
 use crate::node::write::write_with;
 use crate::node::{self, Node, WriteOptions};
 use crate::tasks::Failure;
@@ -32,6 +32,8 @@ pub(super) fn by_objects(
     progress: &mut Progress,
 ) -> Result<(), Failure> {
     let Some(id) = device.node else { return Err(device.failure(LssCause::ObjectsOutOfReach)) };
+    // Both of two devices with this node-ID would be changed.
+    master.set_on_two_devices(OnTwoDevices::RefuseWrites);
     let node = device.as_node(id);
     let object = |object, setting| object_for(device, object, setting);
     let new_id = match progress.id {

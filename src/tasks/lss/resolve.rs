@@ -9,7 +9,7 @@ use super::sole::sole_device;
 use super::{Notify, Target, Via, nodes};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::LssAddress;
-use crate::master::{LssError, Master};
+use crate::master::{LssError, Master, OnTwoDevices};
 use crate::tasks::Failure;
 
 /// Finds the device of a target. Nothing is changed, and the configuration state is left again. `force` is for
@@ -57,6 +57,8 @@ fn by_address(
     descriptions: &Descriptions<'_>,
     notify: Notify<'_>,
 ) -> Result<LssDevice, Failure> {
+    // LSS reaches one of two devices with one node-ID, so this target is the way to separate them.
+    master.set_on_two_devices(OnTwoDevices::Report);
     let mut device = LssDevice::with_address(address);
     // A device that requires another NMT state does not answer LSS here. SDO may show it.
     let by_lss = inquire_node_id(master, &device)?;
