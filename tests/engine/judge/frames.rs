@@ -63,8 +63,13 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, vio
     for (at, frame) in sent {
         let allowed = match frame.id() {
             // A SYNC with the COB-ID that the device reported.
-            id if id != CanId::Standard(0) && syncs && spec.falsifies_data() && frame.data().is_empty() => {
-                !frame.is_remote()
+            id if id != CanId::Standard(0)
+                && syncs
+                && spec.falsifies_data()
+                && frame.data().is_empty()
+                && !frame.is_remote() =>
+            {
+                true
             }
             CanId::Standard(0) => match (&spec.command, frame.data()) {
                 (Command::Nmt { what, nodes, all }, &[specifier, node]) => {
