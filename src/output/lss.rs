@@ -55,7 +55,7 @@ impl Report for Inquired {
         cells
     }
 
-    /// `0x47:0x1:0x10007:10001  node 1`.
+    /// `0x47:0x1:0x1:10001  node 1`.
     fn text(reports: &[Self], out: &mut dyn Write) -> io::Result<()> {
         for inquired in reports {
             let node = inquired.node.map(|node| match node {

@@ -207,8 +207,23 @@ impl Channels {
         true
     }
 
+    /// A limit that exists in several types is one quantity: after a write, the others follow. So do the integers
+    /// after a change of their decimal digits.
+    pub(super) fn share(&self, objects: &mut Objects, written: ObjectId) {
+        for channel in &self.list {
+            let is_kept = channel.follows.iter().any(|(object, _)| *object == written);
+            if let Some(value) = channel.pv(objects, written).filter(|_| is_kept) {
+                channel.put_pv(objects, real_form(written), value);
+            }
+            if is_kept || [channel.signal.digits, channel.signal.unit].contains(&Some(written)) {
+                channel.align(objects, Some(written));
+            }
+        }
+    }
+
     /// Restarts every filter: the device has started.
-    pub(super) fn begin(&mut self, objects: &Objects, time: Duration) {
+    pub(super) fn begin(&mut self, objects: &mut Objects, time: Duration) {
+        self.list.iter().for_each(|channel| channel.align(objects, None));
         self.list.iter_mut().for_each(|channel| channel.filter.begin(objects, &channel.quantity, time));
     }
 
@@ -377,12 +392,30 @@ impl Channel {
         })
     }
 
+    /// Derives the integer forms of every limit from the REAL32 form, except that of `exact`.
+    fn align(&self, objects: &mut Objects, exact: Option<ObjectId>) {
+        for (object, _) in self.follows.iter().filter(|(object, _)| Some(*object) != exact) {
+            let Some((own, real)) = self.pv(objects, *object).zip(self.pv(objects, real_form(*object))) else {
+                continue;
+            };
+            // A REAL32 has fewer digits than an INTEGER32.
+            if (own - real).abs() > real.abs() * f64::from(f32::EPSILON) {
+                self.put_pv(objects, *object, real);
+            }
+        }
+    }
+
     fn put_pv(&self, objects: &mut Objects, object: ObjectId, value: f64) {
         if let Some(data_type) = objects.spec(object).map(|spec| spec.data_type) {
             let bytes = number::to_bytes(self.scaled(objects, data_type, value), data_type);
             objects.put(object, bytes);
         }
     }
+}
+
+/// The REAL32 form of an object of CiA 404.
+fn real_form(object: ObjectId) -> ObjectId {
+    ObjectId::new(0x6000 | object.index & 0x0fff, object.sub)
 }
 
 /// 6150h: bit 0 invalid, bit 1 positive, bit 2 negative overload.

@@ -23,6 +23,9 @@ pub struct SimData {
     /// Whether a repeating average covers the samples since the last PDO, instead of 61A1h samples.
     #[serde(default)]
     pub mean_until_pdo: bool,
+    /// Whether a new node-ID resets the COB-IDs of EMCY and TPDOs to the predefined connection set.
+    #[serde(default)]
+    pub cob_ids_follow_node_id: bool,
     /// How far outside of the measuring range an overload begins, in percent of the range.
     #[serde(default)]
     pub overload_percent: f64,

@@ -31,10 +31,13 @@ const RECONNECT: Duration = Duration::from_millis(10);
 
 const COB_ID_SYNC: ObjectId = ObjectId::new(0x1005, 0);
 const GUARD_TIME: ObjectId = ObjectId::new(0x100c, 0);
+const LIFE_TIME_FACTOR: ObjectId = ObjectId::new(0x100d, 0);
 const HEARTBEAT_TIME: ObjectId = ObjectId::new(0x1017, 0);
 const NMT_STARTUP: ObjectId = ObjectId::new(0x1f80, 0);
 /// Emergency code for a SYNC of unexpected length (CiA 301).
 const SYNC_LENGTH: u16 = 0x8240;
+/// Emergency code for a failure of life guarding (CiA 301).
+const GUARDING_FAILED: u16 = 0x8130;
 
 /// The operating phase of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +67,8 @@ pub struct Device {
     heartbeat: Option<Mono>,
     /// Toggle bit of the next guarding answer.
     toggle: bool,
+    /// The last guarding request: the first one arms life guarding.
+    guarded: Option<Mono>,
     /// The next time at which an overload may begin or end.
     next_overload_change: Option<Mono>,
     /// Channels that are overloaded, with the direction.
@@ -95,7 +100,7 @@ impl Device {
             objects.preset(*object, bytes);
         }
         let channels = Channels::new(&setup, &objects);
-        let tpdos = Tpdo::all(&objects);
+        let tpdos = Tpdo::all(&objects, description.pdo);
         let answers_60 = description.quirks.contains(&Quirk::UploadAnswered60);
         let sdo = SdoServer::new(description.sdo.clone(), answers_60);
         let emergencies = Emergencies::new(description);
@@ -113,6 +118,7 @@ impl Device {
             phase: Phase::Off,
             heartbeat: None,
             toggle: false,
+            guarded: None,
             next_overload_change: None,
             overloaded: BTreeMap::new(),
             delayed: VecDeque::new(),
@@ -181,7 +187,7 @@ impl Device {
         let by_other = other.is_some_and(|other| self.memory.objects.number(other.object) == other.auto);
         let starts = self.setup.start || by_other || startup & 0b1100 == 0b1000;
         self.enter(if starts { State::Operational } else { State::PreOperational }, now);
-        self.memory.channels.begin(&self.memory.objects, now.since_start());
+        self.memory.channels.begin(&mut self.memory.objects, now.since_start());
         self.memory.emergencies.publish(&mut self.memory.objects);
         self.update_overloads(now);
         self.send_emergencies(now, out);
@@ -232,6 +238,7 @@ impl Device {
         self.sdo.forget();
         self.tpdos.iter_mut().for_each(Tpdo::stop);
         self.heartbeat = None;
+        self.guarded = None;
         self.next_overload_change = None;
         self.memory.emergencies.drop_waiting();
     }
@@ -239,7 +246,10 @@ impl Device {
     /// Loads the stored values, under the node-ID that is now active.
     fn restart(&mut self, area: Area) {
         let Memory { node, settings, objects, .. } = &mut self.memory;
-        *node = settings.active.node.unwrap_or(NodeId::MIN);
+        let before = std::mem::replace(node, settings.active.node.unwrap_or(NodeId::MIN));
+        if self.setup.sim.cob_ids_follow_node_id && before != *node {
+            objects.forget_cob_ids();
+        }
         objects.reset(area, *node);
         settings.show(objects);
         self.lss.reset();
@@ -263,13 +273,44 @@ impl Device {
     }
 
     /// Answers node guarding, if the device supports it and has no heartbeat.
-    fn guard(&mut self, state: State, out: &mut Outbox) {
+    fn guard(&mut self, state: State, now: Mono, out: &mut Outbox) {
         if !self.memory.objects.has(GUARD_TIME) || self.heartbeat_period().is_some() {
             return;
         }
         let toggle = if self.toggle { 0x80 } else { 0x00 };
         out.send(Frame::byte(CanId::heartbeat(self.memory.node), state.code() | toggle));
         self.toggle = !self.toggle;
+        self.guarded = Some(now);
+        self.memory.emergencies.clear(&mut self.memory.objects, GUARDING_FAILED, 0);
+        self.send_emergencies(now, out);
+    }
+
+    /// When life guarding fails: no request for the guard time multiplied by the life time factor.
+    fn life_end(&self) -> Option<Mono> {
+        let guarded = self.guarded.filter(|_| self.heartbeat.is_none())?;
+        let objects = &self.memory.objects;
+        let life_time = objects.number(GUARD_TIME) * objects.number(LIFE_TIME_FACTOR);
+        (life_time > 0).then(|| guarded + Duration::from_millis(life_time.into()))
+    }
+
+    /// A device that is not guarded any more leaves OPERATIONAL (CiA 301, 1029h); the next request arms it again.
+    fn end_guarding(&mut self, now: Mono) {
+        self.guarded = None;
+        if self.memory.emergencies.knows(GUARDING_FAILED) {
+            self.memory.emergencies.raise(&mut self.memory.objects, GUARDING_FAILED, 0, 0);
+        }
+        if self.is_operational() {
+            self.enter(State::PreOperational, now);
+        }
+    }
+
+    /// Answers a remote request for a TPDO.
+    fn answer_remote(&mut self, id: CanId, now: Mono, out: &mut Outbox) {
+        for index in 0..self.tpdos.len() {
+            if self.is_operational() && self.tpdos[index].answers(&self.memory.objects, id) {
+                self.transmit(index, Cause::Requested, now, out);
+            }
+        }
     }
 
     fn serve(&mut self, request: [u8; 8], now: Mono, out: &mut Outbox) {

@@ -77,10 +77,12 @@ impl Memory {
                 if !self.channels.change_unit(&mut self.objects, object, Unit(code)) {
                     return Err(Abort::VALUE);
                 }
+                self.channels.share(&mut self.objects, object);
             }
             None if self.objects.asks_for_default(object, bytes) => self.objects.put_default(object, self.node),
             None => {
                 self.objects.put(object, bytes.to_vec());
+                self.channels.share(&mut self.objects, object);
                 self.channels.refilter(&mut self.objects, object, time);
             }
         }
@@ -123,8 +125,9 @@ impl Dictionary for Access<'_> {
             return self.finish(object, bytes);
         }
         let pdo = || tpdo::check(objects, self.memory.remap, self.pre_operational, object, bytes);
-        // A mapping that is impossible has its own abort code, so it is checked before the limits.
-        if (0x1a00..0x1c00).contains(&object.index) && object.sub > 0 {
+        // An impossible mapping or identifier has its own abort code, so it is checked before the limits.
+        let is_mapping = (0x1a00..0x1c00).contains(&object.index) && object.sub > 0;
+        if is_mapping || matches!(object.index, tpdo::COB_ID_SYNC | tpdo::COB_ID_EMCY) {
             objects.check_length(object, bytes)?;
             pdo()?;
             objects.check_write(object, bytes)?;

@@ -276,6 +276,11 @@ impl Objects {
         }
     }
 
+    /// Deletes the stored COB-IDs: after the next reset, they are those of the predefined connection set.
+    pub(super) fn forget_cob_ids(&mut self) {
+        self.saved.retain(|object, _| !is_cob_id(*object));
+    }
+
     fn is_kept(&self, group: Group, object: ObjectId, spec: &Spec) -> bool {
         if self.marked {
             return spec.group.is_some_and(|entry| group.reaches(entry));

@@ -8,14 +8,20 @@ use super::objects::Objects;
 use crate::bus::time::Mono;
 use crate::canopen::id::CanId;
 use crate::canopen::object::ObjectId;
-use crate::device::description::Remap;
+use crate::device::description::{PdoStyle, Remap};
 use std::time::Duration;
+
+pub(super) const COB_ID_SYNC: u16 = 0x1005;
+pub(super) const COB_ID_EMCY: u16 = 0x1014;
+/// The period of SYNC: a device that has it can produce SYNC.
+const SYNC_PERIOD: ObjectId = ObjectId::new(0x1006, 0);
 
 /// One TPDO.
 #[derive(Clone, Debug)]
 pub(super) struct Tpdo {
     /// 0 for 1800h and 1A00h.
     number: u16,
+    style: PdoStyle,
     /// SYNCs since the last transmission.
     syncs: u8,
     /// The last transmission, for "if changed".
@@ -51,17 +57,21 @@ pub(super) enum Cause {
     Due,
     /// A SYNC, if the values have changed.
     IfChanged,
+    /// A remote request: the count of SYNCs goes on.
+    Requested,
 }
 
 impl Tpdo {
     /// The TPDOs that a device describes.
-    pub(super) fn all(objects: &Objects) -> Vec<Tpdo> {
-        (0..512).filter(|number| objects.has_index(0x1800 + number)).map(Tpdo::new).collect()
+    pub(super) fn all(objects: &Objects, style: PdoStyle) -> Vec<Tpdo> {
+        let numbers = (0..512).filter(|number| objects.has_index(0x1800 + number));
+        numbers.map(|number| Tpdo::new(number, style)).collect()
     }
 
-    fn new(number: u16) -> Tpdo {
+    fn new(number: u16, style: PdoStyle) -> Tpdo {
         Tpdo {
             number,
+            style,
             syncs: 0,
             sent: None,
             sent_at: None,
@@ -82,7 +92,8 @@ impl Tpdo {
 
     fn event_timer(&self, objects: &Objects) -> Option<Duration> {
         let milliseconds = objects.number(self.communication(5));
-        (milliseconds > 0 && self.is_event_driven(objects)).then(|| Duration::from_millis(milliseconds.into()))
+        let is_used = u8::try_from(self.kind(objects)).is_ok_and(|kind| self.style.uses_timer(kind));
+        (milliseconds > 0 && is_used).then(|| Duration::from_millis(milliseconds.into()))
     }
 
     fn is_event_driven(&self, objects: &Objects) -> bool {
@@ -94,6 +105,12 @@ impl Tpdo {
         let cob_id = objects.number(self.communication(1));
         let id = u16::try_from(cob_id & 0x7ff).ok()?;
         if is_valid(cob_id) { CanId::standard(id) } else { None }
+    }
+
+    /// Whether it answers remote requests with this identifier.
+    pub(super) fn answers(&self, objects: &Objects, id: CanId) -> bool {
+        let refuses = objects.number(self.communication(1)) & 0x4000_0000 != 0;
+        !refuses && self.cob_id(objects) == Some(id)
     }
 
     /// The present mapping.
@@ -110,7 +127,7 @@ impl Tpdo {
 
     /// Restarts: the node is OPERATIONAL, or a parameter was written. This sends nothing.
     pub(super) fn start(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
-        *self = Tpdo::new(self.number);
+        *self = Tpdo::new(self.number, self.style);
         self.timer = self.event_timer(objects).map(|period| now + period);
         self.watch(objects, channels, now);
     }
@@ -128,7 +145,7 @@ impl Tpdo {
 
     /// Stops: the node has left OPERATIONAL.
     pub(super) fn stop(&mut self) {
-        *self = Tpdo::new(self.number);
+        *self = Tpdo::new(self.number, self.style);
     }
 
     fn plan_look(&mut self, objects: &Objects, channels: &mut Channels, now: Mono) {
@@ -189,7 +206,9 @@ impl Tpdo {
         }
         self.sent = Some(data.to_vec());
         self.sent_at = Some(now);
-        self.syncs = 0;
+        if cause != Cause::Requested {
+            self.syncs = 0;
+        }
         for watch in &mut self.watches {
             watch.reference = channels.number(objects, watch.object, now.since_start()).unwrap_or(watch.reference);
         }
@@ -246,7 +265,7 @@ fn mapped(entry: u32) -> (ObjectId, u32) {
     (ObjectId::new(u16::from_le_bytes([low, high]), sub), bits.into())
 }
 
-/// Checks a write to the parameters of a TPDO; `None` if the object is not one of them.
+/// Checks a write to the parameters of a TPDO, or to the COB-ID of SYNC or EMCY.
 pub(super) fn check(
     objects: &Objects,
     remap: Remap,
@@ -256,22 +275,37 @@ pub(super) fn check(
 ) -> Result<(), Abort> {
     let number = bytes.iter().rev().fold(0u32, |number, byte| number << 8 | u32::from(*byte));
     match object.index {
+        // Bit 30: the device produces SYNC.
+        COB_ID_SYNC if number & 0x4000_0000 != 0 && !objects.has(SYNC_PERIOD) => Err(Abort::VALUE),
+        COB_ID_SYNC => check_identifier(number),
+        COB_ID_EMCY if is_valid(number) => check_identifier(number),
         0x1800..=0x19ff => check_communication(objects, object, number),
         0x1a00..=0x1bff => check_mapping(objects, remap, pre_operational, object, number),
         _ => Ok(()),
     }
 }
 
+/// 29-bit identifiers are not supported; bits 11 to 28 belong to them.
+fn is_extended(cob_id: u32) -> bool {
+    cob_id & 0x3fff_f800 != 0
+}
+
+/// Whether CiA 301 allows the identifier of a COB-ID.
+fn check_identifier(cob_id: u32) -> Result<(), Abort> {
+    let id = CanId::Standard(u16::try_from(cob_id & 0x7ff).unwrap_or(0));
+    if is_extended(cob_id) || id.is_restricted() { Err(Abort::VALUE) } else { Ok(()) }
+}
+
 fn check_communication(objects: &Objects, object: ObjectId, number: u32) -> Result<(), Abort> {
     let old = objects.number(object.with_sub(1));
     match object.sub {
         1 => {
-            let id = CanId::Standard(u16::try_from(number & 0x7ff).unwrap_or(0));
-            // 29-bit identifiers are not supported; bits 11 to 28 belong to them.
-            let misplaced = number & 0x3fff_f800 != 0;
             let moved = is_valid(old) && is_valid(number) && old & 0x7ff != number & 0x7ff;
-            if misplaced || moved || (is_valid(number) && id.is_restricted()) {
+            if is_extended(number) || moved {
                 return Err(Abort::VALUE);
+            }
+            if is_valid(number) {
+                check_identifier(number)?;
             }
         }
         2 if (241..=253).contains(&number) => return Err(Abort::VALUE),

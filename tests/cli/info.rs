@@ -22,7 +22,7 @@ fn page_of_an_mh4() {
     let page = bench.run("info 5").exit(0).stdout;
     for line in [
         "node 5: WIKA MH-4-CAN",
-        "  revision     0x00010007 1.7",
+        "  revision     0x00000001 0.1",
         "  bit rate                 250 kbit/s",
         "  state                    pre-operational (heartbeat)",
         "  monitoring               heartbeat every 1000 ms",

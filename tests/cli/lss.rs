@@ -162,7 +162,7 @@ fn set_id_prints_steps_and_result() {
     );
     let done = Bench::of(ALL).run("lss set-id 1 12 -f json").prints(
         "{\"target\":\"1\",\"old\":1,\"new\":12,\"stored\":true,\"confirmed\":\"boot-up\",\"vendor\":71,\"vendor_name\":\"WIKA\",\
-         \"product\":1,\"revision\":65543,\"serial\":10001,\"device\":\"mh4\",\"bit_rate\":null,\"table_index\":null,\
+         \"product\":1,\"revision\":1,\"serial\":10001,\"device\":\"mh4\",\"bit_rate\":null,\"table_index\":null,\
          \"retimed\":false,\"stale\":[],\"notes\":[]}\n",
     );
     assert_eq!(done.json()[0]["new"], 12);
@@ -215,7 +215,7 @@ fn scan_inquire_and_identify() {
         done.stdout,
         "NODE  VENDOR     PRODUCT     REVISION    SERIAL  DEVICE\n   \
             5  Honeywell  0x00443150  0x00010000   20002  dps\n   \
-            -  WIKA       0x00000001  0x00010007      77  -\n"
+            -  WIKA       0x00000001  0x00000001      77  -\n"
     );
     let done = bench.run("lss scan -f json").exit(0);
     assert_eq!(done.json()[1]["node"], serde_json::Value::Null);
@@ -233,9 +233,9 @@ fn scan_inquire_and_identify() {
         Bench::described(&format!("{hides}[[device]]\nkind = \"mh4\"\nserial = 20\n")).run("lss scan -f json").exit(0);
     assert_eq!((done.json().len(), done.json()[0]["serial"].clone()), (1, 10.into()), "{}", done.stdout);
     assert!(done.stderr.contains("there may be more devices"), "{}", done.stderr);
-    Bench::of(ALL).run("lss inquire 1").prints("0x47:0x1:0x10007:10001  node 1\n");
+    Bench::of(ALL).run("lss inquire 1").prints("0x47:0x1:0x1:10001  node 1\n");
     Bench::of(ALL).run("lss inquire 1 -f json").prints(
-        "{\"target\":\"1\",\"node\":1,\"unconfigured\":false,\"vendor\":71,\"vendor_name\":\"WIKA\",\"product\":1,\"revision\":65543,\"serial\":10001}\n",
+        "{\"target\":\"1\",\"node\":1,\"unconfigured\":false,\"vendor\":71,\"vendor_name\":\"WIKA\",\"product\":1,\"revision\":1,\"serial\":10001}\n",
     );
     Bench::of(ALL).run("lss identify 71:1:0-0xFFFFFFFF:10000-10002").prints("yes\n");
     let done = Bench::of(ALL).run("lss identify 71:1:0-0xFFFFFFFF:10002-10009").exit(3);

@@ -7,7 +7,7 @@ use serde_json::json;
 fn table_lists_every_node() {
     let done = Bench::of(ALL).run("scan").prints(
         "NODE  STATE  DEVICE  NAME      VENDOR     PRODUCT     REVISION    SERIAL\n\
-         \u{20}  1  -      mh4     MH-4-CAN  WIKA       0x00000001  0x00010007   10001\n\
+         \u{20}  1  -      mh4     MH-4-CAN  WIKA       0x00000001  0x00000001   10001\n\
          \u{20}  2  -      d20     D2X9      WIKA       0x00000001  0x00010001   30003\n\
          \u{20}  3  -      mc1609  -         HBM        0x00001609  0x00020001   40003\n\
          \u{20}127  -      dps     DPS       Honeywell  0x00443150  0x00010000   20002\n",
@@ -56,7 +56,7 @@ fn unknown_fields_are_null_in_json() {
 fn csv() {
     Bench::of("mh4@5").run("scan 5 -f csv").prints(
         "node,state,device,name,vendor,vendor_name,product,revision,serial\n\
-         5,,mh4,MH-4-CAN,71,WIKA,1,65543,10001\n",
+         5,,mh4,MH-4-CAN,71,WIKA,1,1,10001\n",
     );
 }
 

@@ -119,6 +119,36 @@ fn node_guarded_by_another_master_is_not_guarded() {
     }
 }
 
+/// The first guarding request arms life guarding: the device then reports 8130h when the requests end.
+#[test]
+fn life_guarding_is_not_armed() {
+    for kind in ["d20", "mc1609"] {
+        let bench = format!(
+            "clock = 'virtual'\n[[device]]\nkind = '{kind}'\nnode = 5\nset = {{ \"0x100C\" = 100, \"0x100D\" = 3 }}\n"
+        );
+        let mut bus = Bench::from_toml(&bench, Path::new("")).unwrap().open().unwrap();
+        let mut master = Master::new(&mut bus, Timing::default());
+        states(&mut master, &[node()]).unwrap();
+        command(&mut master, NmtCommand::Start, &[node()], false).unwrap();
+        assert_eq!(guarding_failures(&mut bus), 0, "{kind}");
+        bus.send(&"705#R1".parse().unwrap()).unwrap();
+        assert_eq!(guarding_failures(&mut bus), 1, "{kind}: a request does arm it");
+    }
+}
+
+/// The emergencies 8130h within two seconds.
+fn guarding_failures(bus: &mut MemoryBus) -> usize {
+    let until = bus.now().mono + Duration::from_secs(2);
+    let mut failures = 0;
+    loop {
+        match bus.receive(until).unwrap() {
+            Event::Frame(received) => failures += usize::from(received.frame.to_string().starts_with("085#3081")),
+            Event::Timeout => return failures,
+            _ => {}
+        }
+    }
+}
+
 /// Counts the remote frames that are sent.
 struct Counting {
     bus: MemoryBus,

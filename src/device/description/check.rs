@@ -277,7 +277,7 @@ fn assign(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>)
         if has_place == (entry.way == AssignKind::Lss) {
             table.mistake("way", "way: \"objects\" needs node_id or bit_rate, and \"lss\" has neither");
         }
-        // Objects that only other documents mention are marked as unverified and are not described.
+        // Objects that only other documents mention are marked as unverified and may be missing.
         for (key, place) in places.filter(|_| !entry.unverified) {
             known.require(table, key, place.object);
             if let Some(object) = description.object(place.object).filter(|it| it.data_type != place.data_type) {

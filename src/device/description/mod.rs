@@ -218,12 +218,19 @@ pub enum SizeIndication {
 }
 
 /// How PDOs are configured.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct PdoStyle {
     /// What has to be done before the mapping can be changed.
     pub remap: Remap,
-    /// The transmission type for cyclic transmission by the event timer, 254 or 255; `None` means 254.
+    /// The transmission type that uses the event timer, 254 or 255; `None` means that both use it.
     pub timer: Option<u8>,
+}
+
+impl PdoStyle {
+    /// Whether a TPDO of this transmission type is sent by the event timer.
+    pub fn uses_timer(&self, transmission: u8) -> bool {
+        matches!(transmission, 254 | 255) && self.timer.is_none_or(|timer| timer == transmission)
+    }
 }
 
 /// What has to be done before a mapping can be changed.

@@ -125,3 +125,33 @@ fn extremes_cover_the_values_read() {
     assert_eq!(real(&channels.read(&objects, id("2020:1"), last).expect("shown")), now);
     assert_eq!(real(&channels.read(&objects, id("2021:1"), last).expect("shown")), now);
 }
+
+#[test]
+fn limit_in_several_types_is_one_quantity() {
+    let (mut objects, channels) = still("mh4", 5.0, &[]);
+    let mut write = |written: &str, bytes: &[u8]| {
+        objects.put(id(written), bytes.to_vec());
+        channels.share(&mut objects, id(written));
+        ["6135:1", "7135:1", "9135:1"].map(|object| objects.real(id(object)).expect("a number"))
+    };
+    assert_eq!(write("6135:1", &7.5f32.to_le_bytes()), [7.5, 7500.0, 7500.0]);
+    assert_eq!(write("7135:1", &6000i16.to_le_bytes()), [6.0, 6000.0, 6000.0]);
+    // Too large for an INTEGER16; the number written stays exact.
+    assert_eq!(write("9135:1", &16_777_217i32.to_le_bytes())[1..], [32767.0, 16_777_217.0]);
+    assert_eq!(write("6135:1", &9.5f32.to_le_bytes()), [9.5, 9500.0, 9500.0]);
+    assert_eq!(write("6132:1", &[1]), [9.5, 95.0, 95.0], "decimal digits");
+    let delta = |objects: &Objects| ["6133:2", "7133:2", "9133:2"].map(|object| objects.real(id(object)));
+    objects.put(id("7133:2"), 100i16.to_le_bytes().to_vec());
+    channels.share(&mut objects, id("7133:2"));
+    assert_eq!(delta(&objects), [Some(10.0), Some(100.0), Some(100.0)]);
+    assert_eq!(objects.real(id("6133:1")), Some(0.0), "the other channel keeps its own");
+}
+
+#[test]
+fn limit_that_was_stored_in_one_type_holds_in_all_after_the_start() {
+    let (mut objects, mut channels) = still("mh4", 5.0, &[]);
+    objects.preset(id("6135:1"), 4.25f32.to_le_bytes().to_vec());
+    channels.begin(&mut objects, AT);
+    assert_eq!(objects.real(id("7135:1")), Some(4250.0));
+    assert_eq!(objects.real(id("9135:1")), Some(4250.0));
+}

@@ -29,7 +29,9 @@ impl Station for Device {
             self.execute(command, now, out);
         } else if frame.is_remote() {
             if frame.id() == CanId::heartbeat(self.memory.node) {
-                self.guard(state, out);
+                self.guard(state, now, out);
+            } else {
+                self.answer_remote(frame.id(), now, out);
             }
         } else if self.is_sync(frame) {
             if state != State::Stopped {
@@ -63,6 +65,9 @@ impl Station for Device {
         {
             out.send(Frame::full(CanId::sdo_response(self.memory.node), abort));
         }
+        if self.life_end().is_some_and(|due| due <= now) {
+            self.end_guarding(now);
+        }
         if self.next_overload_change.is_some_and(|due| due <= now) {
             self.update_overloads(now);
         }
@@ -90,6 +95,7 @@ impl Station for Device {
                     }
                 };
                 add(self.sdo.deadline());
+                add(self.life_end());
                 add(self.next_overload_change);
                 add(self.memory.emergencies.next_wake());
                 add(self.delayed.front().map(|(due, _)| *due));

@@ -215,6 +215,40 @@ fn guarding_answers_toggle_if_guarding_is_supported() {
 }
 
 #[test]
+fn first_guarding_request_arms_life_guarding() {
+    for (kind, failed, answers) in [("d20", "0130", "22"), ("mc1609", "1130", "23")] {
+        let failed = format!("082#3081{}0000000000", &failed[..2]);
+        let mut bus = bus([constant(kind, 2, 5.0)]);
+        receive(&mut bus, ms(5));
+        // Guard time 100 ms, life time factor 3, without PDOs.
+        ask(&mut bus, &format!("602#{answers}0C100064000000").replace("#230C", "#2B0C"));
+        ask(&mut bus, &format!("602#{answers}0D100003000000").replace("#230D", "#2F0D"));
+        (0x1800..0x1804).for_each(|index: u16| {
+            let [low, high] = index.to_le_bytes();
+            ask(&mut bus, &format!("602#{answers}{low:02X}{high:02X}0182{:02X}0080", low + 1));
+        });
+        ask(&mut bus, "000#0102");
+        assert_eq!(receive(&mut bus, ms(2000)), Vec::<String>::new(), "{kind}: not armed");
+        assert_eq!(ask(&mut bus, "702#R1"), ["702#05"]);
+        let before = bus.now().mono.since_start().as_millis();
+        let received = timed(&mut bus, ms(5000));
+        let [(at, frame)] = &received[..] else { panic!("{kind}: {received:?}") };
+        assert_eq!((frame, at - before), (&failed, 295), "{kind}: once, after the life time");
+        assert_eq!(state(&mut bus), Some(State::PreOperational), "{kind}");
+        play(&mut bus, &[("702#R1", "702#FF 082#0000000000000000")]);
+        // A request in time keeps it alive; a guard time of 0 disarms it.
+        for _ in 0..3 {
+            let until = bus.now().mono + Duration::from_millis(200);
+            assert_eq!(receive(&mut bus, until), Vec::<String>::new());
+            assert_eq!(ask(&mut bus, "702#R1").len(), 1);
+        }
+        ask(&mut bus, &format!("602#{answers}0D100000000000").replace("#230D", "#2F0D"));
+        let until = bus.now().mono + Duration::from_secs(2);
+        assert_eq!(receive(&mut bus, until), Vec::<String>::new(), "{kind}");
+    }
+}
+
+#[test]
 fn overload_sets_status_value_and_emergency() {
     let overload = |from, until, direction| {
         (1, Overload { from: Duration::from_millis(from), until: Duration::from_millis(until), direction })

@@ -75,6 +75,37 @@ fn mh4_store_all_resets_the_cob_ids() {
     }
 }
 
+/// MC1609, 2.3: "After changing the Node-ID the COB-IDs of EMCY, SDO, TPDO1 … will be adjusted". The MH-4 keeps its own.
+#[test]
+fn new_node_id_resets_the_cob_ids_of_the_mc1609() {
+    for (kind, tpdo, emcy) in
+        [("mc1609", "430018018C010000", "431410008C000000"), ("mh4", "43001801AA010040", "431410008C000000")]
+    {
+        let mut bus = bus([constant(kind, 5, 5.0)]);
+        ask(&mut bus, "605#23001801850100C0");
+        ask(&mut bus, "605#23001801AA010040");
+        ask(&mut bus, "605#2314100090000000");
+        assert_eq!(ask(&mut bus, if kind == "mh4" { "605#2310100273617665" } else { "605#2310100173617665" }).len(), 1);
+        // The same node-ID keeps them.
+        assert_eq!(reset(&mut bus, "000#8105"), ["705#00"]);
+        assert_eq!(ask(&mut bus, "605#4000180100000000"), ["585#43001801AA010040"], "{kind}");
+        play(
+            &mut bus,
+            &[
+                ("7E5#0401000000000000", "-"),
+                ("7E5#110C000000000000", "7E4#1100000000000000"),
+                ("7E5#1700000000000000", "7E4#1700000000000000"),
+                ("7E5#0400000000000000", "-"),
+            ],
+        );
+        assert_eq!(reset(&mut bus, "000#8105"), ["70C#00"]);
+        play(
+            &mut bus,
+            &[("60C#4000180100000000", &format!("58C#{tpdo}")), ("60C#4014100000000000", &format!("58C#{emcy}"))],
+        );
+    }
+}
+
 #[test]
 fn signed_node_id_is_active_after_store_and_reset() {
     let mut bus = bus([constant("mh4", 5, 5.0)]);
@@ -97,6 +128,19 @@ fn signed_node_id_is_active_after_store_and_reset() {
             ("603#4000180100000000", "583#4300180183010040"),
         ],
     );
+    // D-20-9: only the names of these objects are known; they act like those of the MH-4.
+    let mut d20 = self::bus([constant("d20", 2, 5.0)]);
+    play(
+        &mut d20,
+        &[
+            ("602#2220230009000000", "702#00 582#8020230020000008"),
+            ("602#2220230009736574", "582#6020230000000000"),
+            ("602#2221230002736574", "582#6021230000000000"),
+            ("602#2210100173617665", "582#6010100100000000"),
+        ],
+    );
+    assert_eq!(device(&mut d20).stored(), (Some(node(9)), Some(500_000)));
+    assert_eq!(reset(&mut d20, "000#8102"), Vec::<String>::new(), "it is at another bit rate");
 }
 
 #[test]

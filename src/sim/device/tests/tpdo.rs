@@ -142,18 +142,85 @@ fn every_nth_sync_and_if_changed() {
     }
 }
 
+/// MH-4, 2.3: 254 is the event timer. DPS, 10.4: 254 and 255 are the same. MC1609, 2.1.4: 255 is the event timer.
 #[test]
-fn event_timer_of_types_254_and_255() {
-    for kind in ["FE", "FF"] {
-        let mut bus = bus([constant("mh4", 5, 5.0)]);
-        ask(&mut bus, &format!("605#2F001802{kind}000000"));
-        play(&mut bus, &[("605#2B00180564000000", "585#6000180500000000"), ("000#0105", "-")]);
-        let received = timed(&mut bus, ms(1020));
-        assert_eq!(received.len(), 10, "{kind} {received:?}");
-        assert!(received.windows(2).all(|pair| pair[1].0 - pair[0].0 == 100), "{received:?}");
-        assert!(received.iter().all(|(_, frame)| frame == "185#0000A04000"));
+fn event_timer_belongs_to_the_transmission_types_of_the_manual() {
+    for (kind, transmission, sends) in
+        [("mh4", "FE", 10), ("mh4", "FF", 0), ("dps", "FE", 10), ("dps", "FF", 10), ("mc1609", "FF", 40)]
+    {
+        let mut bus = bus([constant(kind, 5, 5.0)]);
+        ask(&mut bus, &format!("605#22001802{transmission}000000"));
+        ask(&mut bus, "605#2200180564000000");
+        assert_eq!(ask(&mut bus, "000#0105"), Vec::<String>::new(), "{kind}");
+        let until = bus.now().mono + Duration::from_millis(1004);
+        let received = timed(&mut bus, until);
+        assert_eq!(received.len(), sends, "{kind} {transmission} {received:?}");
+        let ours: Vec<_> = received.iter().filter(|(_, frame)| frame.starts_with("185#")).collect();
+        assert!(ours.windows(2).all(|pair| pair[1].0 - pair[0].0 == 100), "{received:?}");
         assert_eq!(ask(&mut bus, "080#").len(), 0, "not on SYNC");
     }
+}
+
+#[test]
+fn remote_request_is_answered_if_bit_30_allows_it() {
+    let mut d20 = bus([constant("d20", 2, 5.0)]);
+    play(
+        &mut d20,
+        &[
+            ("182#R4", "702#00"),
+            // Every second SYNC: a remote request does not count as one.
+            ("602#2200180202000000", "582#6000180200000000"),
+            ("000#0102", "-"),
+            ("080#", "-"),
+            ("182#R4", "182#88130000"),
+            ("183#R4", "-"),
+            ("080#", "182#88130000"),
+            ("602#2200180182010040", "582#6000180100000000"),
+            ("182#R4", "-"),
+            ("602#2200180182010080", "582#6000180100000000"),
+            ("182#R4", "-"),
+        ],
+    );
+    let mut mc1609 = bus([constant("mc1609", 5, 25.0)]);
+    play(
+        &mut mc1609,
+        &[("000#0105", "705#00"), ("285#R8", "285#FA00FA00FA00FA00"), ("485#R8", "485#FA00FA00FA00FA00")],
+    );
+    // MH-4 and DPS set bit 30.
+    let mut others = bus([constant("mh4", 1, 5.0), constant("dps", 127, 5.0)]);
+    play(&mut others, &[("000#0100", "701#00 77F#00"), ("181#R5", "-"), ("1FF#R4", "-")]);
+    play(
+        &mut others,
+        &[("601#23001801810100C0", "581#6000180100000000"), ("601#2300180181010000", "581#6000180100000000")],
+    );
+    play(&mut others, &[("181#R5", "181#0000A04000")]);
+}
+
+/// CiA 301, table of restricted CAN-IDs.
+#[test]
+fn restricted_identifiers_of_sync_and_emergency_are_refused() {
+    let mut bus = bus([constant("mc1609", 5, 25.0), constant("mh4", 1, 5.0)]);
+    receive(&mut bus, ms(5));
+    for restricted in
+        [0u32, 1, 0x7f, 0x101, 0x180, 0x581, 0x5ff, 0x601, 0x67f, 0x6e0, 0x6ff, 0x701, 0x77f, 0x780, 0x7ff, 0x2000_0080]
+    {
+        let hex: String = restricted.to_le_bytes().iter().map(|byte| format!("{byte:02X}")).collect();
+        assert_eq!(ask(&mut bus, &format!("605#23051000{hex}")), ["585#8005100030000906"], "{restricted:X}");
+        assert_eq!(ask(&mut bus, &format!("605#23141000{hex}")), ["585#8014100030000906"], "{restricted:X}");
+        assert_eq!(ask(&mut bus, &format!("601#23051000{hex}")), ["581#8005100030000906"], "{restricted:X}");
+    }
+    play(
+        &mut bus,
+        &[
+            ("605#2305100081000000", "585#6005100000000000"),
+            ("605#2314100000010000", "585#6014100000000000"),
+            // An emergency that is switched off has no identifier.
+            ("605#2314100000000080", "585#6014100000000000"),
+            // No simulated device produces SYNC (bit 30).
+            ("605#2305100080000040", "585#8005100030000906"),
+            ("601#2305100080000040", "581#8005100030000906"),
+        ],
+    );
 }
 
 #[test]
