@@ -3,6 +3,7 @@
 use super::error::{Error, NameError};
 use super::{Node, survey};
 use crate::canopen::object::ObjectId;
+use crate::canopen::pdo::Transmission;
 use crate::canopen::value::{DataType, Value};
 use crate::device::description::{ObjectEntry, Signature};
 use crate::device::dictionary::{self, Entry};
@@ -114,6 +115,18 @@ impl Node {
     /// The signals that are channels of CiA 404: unit, filter, limits and autozero are objects of a channel.
     pub fn channels(&self) -> Vec<&Signal> {
         self.signals.iter().filter(|signal| signal.has_channel()).collect()
+    }
+
+    /// The event timer in ms by which a TPDO is sent; `None` if it is 0, or if this transmission type of the device does
+    /// not use it.
+    pub fn event_timer(&self, transmission: Option<Transmission>, event_timer_ms: Option<u16>) -> Option<u16> {
+        let uses = |code| self.model.as_ref().is_none_or(|model| model.description.pdo.uses_timer(code));
+        let is_used = match transmission {
+            Some(Transmission::Manufacturer) => uses(254),
+            Some(Transmission::Profile) => uses(255),
+            _ => true,
+        };
+        event_timer_ms.filter(|&timer| timer > 0 && is_used)
     }
 
     /// The signal with this name.

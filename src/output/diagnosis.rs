@@ -89,10 +89,12 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String
             format!("its analogue inputs are not sent on change ({object} is 0), and {number} has no event timer")
         }
         TpdoCause::NoTrigger(first, last) => format!(
-            "{number} has no event timer ({communication:04X}h:5 is 0), and delta and limits are 0 ({first} to {last})"
+            "no event timer sends {number} ({communication:04X}h:2 and :5), and delta and limits are 0 ({first} to {last})"
         ),
         TpdoCause::SendsOnChange => {
-            format!("{number} has no event timer ({communication:04X}h:5 is 0): its value does not change enough{also}")
+            format!(
+                "no event timer sends {number} ({communication:04X}h:2 and :5): its value does not change enough{also}"
+            )
         }
         TpdoCause::Due(timer) => not_sent(number, &format!("every {timer} ms ({communication:04X}h:5)"), running),
         TpdoCause::UnknownType => {

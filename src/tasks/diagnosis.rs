@@ -255,7 +255,7 @@ fn tpdo_cause(node: &Node, tpdo: &Tpdo, heard: &Heard, findings: &Findings, situ
 fn event_cause(node: &Node, tpdo: &Tpdo, findings: &Findings, waited: Duration) -> TpdoCause {
     let inhibit: Option<u16> = findings.small(tpdo.number.communication(3));
     let inhibit = inhibit.filter(|&inhibit| Duration::from_micros(100) * u32::from(inhibit) >= waited);
-    match tpdo.event_timer_ms.filter(|&timer| timer > 0) {
+    match node.event_timer(tpdo.transmission, tpdo.event_timer_ms) {
         Some(timer) if Duration::from_millis(timer.into()) >= waited => TpdoCause::SlowEventTimer(timer),
         Some(timer) => inhibit.map_or(TpdoCause::Due(timer), TpdoCause::InhibitTime),
         None => channel_off(node, tpdo, findings)

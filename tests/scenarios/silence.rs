@@ -185,12 +185,17 @@ fn each_cause_has_its_reason() {
         (
             "no trigger",
             Case::mh4(event),
-            "TPDO1 has no event timer (1800h:5 is 0), and delta and limits are 0 (0x6133:1 to 0x6135:1)",
+            "no event timer sends TPDO1 (1800h:2 and :5), and delta and limits are 0 (0x6133:1 to 0x6135:1)",
         ),
         (
             "steady value",
             Case::mh4(&format!("{event}, {ALIVE}, \"0x6133:1\" = 1000.0")),
-            "TPDO1 has no event timer (1800h:5 is 0): its value does not change enough",
+            "no event timer sends TPDO1 (1800h:2 and :5): its value does not change enough",
+        ),
+        (
+            "event timer of another transmission type",
+            Case::mh4(&format!("{event}, {ALIVE}, \"0x1800:5\" = 100, \"0x6133:1\" = 1000.0")),
+            "no event timer sends TPDO1 (1800h:2 and :5): its value does not change enough",
         ),
         (
             "steady value or not operational",
@@ -302,8 +307,8 @@ fn signal_without_values_has_its_reason_after_five_seconds_and_at_the_end() {
         Case { seconds: Some(7), ..Case::mh4("\"0x1801:2\" = 255, \"0x6134:2\" = 0.0, \"0x6135:2\" = 0.0").sync(100) };
     let (result, kept) = case.run();
     let report = result.expect("a recording");
-    let reason = "node 5: no measurements of temperature: TPDO2 has no event timer (1801h:5 is 0), and delta and limits \
-                  are 0 (0x6133:2 to 0x6135:2)";
+    let reason = "node 5: no measurements of temperature: no event timer sends TPDO2 (1801h:2 and :5), and delta and \
+                  limits are 0 (0x6133:2 to 0x6135:2)";
     assert!(report.rows > 0 && report.nothing.is_none());
     assert_eq!(remarks(&kept), [reason]);
     let at_end: Vec<String> = report.remarks.iter().map(cangauge::output::events::remark_text).collect();

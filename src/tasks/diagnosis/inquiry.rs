@@ -55,7 +55,7 @@ pub fn questions(node: &Node, carries: &dyn Fn(&Tpdo) -> bool) -> Vec<ObjectId> 
             continue;
         }
         objects.push(tpdo.number.communication(3));
-        if tpdo.event_timer_ms.is_none_or(|timer| timer == 0) {
+        if node.event_timer(tpdo.transmission, tpdo.event_timer_ms).is_none() {
             objects.extend(values().filter_map(|value| triggers(node, value)).flatten());
             objects.extend(values().filter_map(|value| interrupt_enable(node, value)));
         }

@@ -253,7 +253,10 @@ impl Change<'_, '_> {
         } else if event_timer_ms == Some(0) {
             self.note(PdoFact::OnlyOnChange { number });
         }
-        if transmission.needs_sync() && event_timer_ms != self.old.event_timer_ms {
+        let is_changed = event_timer_ms != self.old.event_timer_ms || transmission != self.old.transmission();
+        let is_unused =
+            event_timer_ms != Some(0) && self.session.node.event_timer(Some(transmission), event_timer_ms).is_none();
+        if transmission.needs_sync() && event_timer_ms != self.old.event_timer_ms || is_changed && is_unused {
             self.note(PdoFact::TimerUnused { transmission });
         }
     }

@@ -189,7 +189,7 @@ fn silent(node: &Node, signal: &Signal, values: &[(Limit, ObjectId, Quantity)]) 
     }
     let tpdos = node.tpdos.iter().filter(|tpdo| {
         let by_event = matches!(tpdo.transmission, Some(Transmission::Manufacturer | Transmission::Profile));
-        let no_timer = tpdo.event_timer_ms.unwrap_or(0) == 0;
+        let no_timer = node.event_timer(tpdo.transmission, tpdo.event_timer_ms).is_none();
         let carries = tpdo.mapping.iter().any(|entry| signal.is_value(entry.object));
         tpdo.cob_id.is_valid() && by_event && no_timer && carries
     });

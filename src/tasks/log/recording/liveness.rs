@@ -6,6 +6,7 @@ use crate::bus::Mono;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::Life;
 use crate::canopen::pdo::Transmission;
+use crate::measure::layout::Tpdo;
 use crate::node::Node;
 use crate::tasks::log::Mode;
 use std::collections::BTreeMap;
@@ -118,14 +119,14 @@ impl Liveness {
 /// Whether a node sends its TPDOs only on change: none has an event timer, and none is sent on every SYNC.
 fn sends_on_change(node: &Node, mode: Mode) -> bool {
     let mut valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).peekable();
-    let is_due = |transmission, event_timer_ms: Option<u16>| match transmission {
+    let is_due = |tpdo: &Tpdo| match tpdo.transmission {
         Some(Transmission::AcyclicSync) => false,
-        Some(Transmission::Manufacturer | Transmission::Profile) => event_timer_ms.is_some_and(|timer| timer > 0),
+        Some(Transmission::Manufacturer | Transmission::Profile) => {
+            node.event_timer(tpdo.transmission, tpdo.event_timer_ms).is_some()
+        }
         _ => true,
     };
-    !matches!(mode, Mode::Poll(_) | Mode::Passive)
-        && valid.peek().is_some()
-        && valid.all(|tpdo| !is_due(tpdo.transmission, tpdo.event_timer_ms))
+    !matches!(mode, Mode::Poll(_) | Mode::Passive) && valid.peek().is_some() && valid.all(|tpdo| !is_due(tpdo))
 }
 
 #[cfg(test)]
@@ -133,7 +134,6 @@ mod tests {
     use super::*;
     use crate::canopen::nmt::NmtState;
     use crate::canopen::pdo::{CobId, TpdoNumber};
-    use crate::measure::layout::Tpdo;
 
     fn at(milliseconds: u64) -> Mono {
         Mono::at(Duration::from_millis(milliseconds))
