@@ -66,7 +66,9 @@ impl Spec {
     }
 
     fn trouble(&mut self, random: &mut Random) {
-        if random.percent(60) {
+        if random.percent(15) {
+            self.faults = disturbed_wire(random);
+        } else if random.percent(60) {
             for _ in 0..random.within(1..=3) {
                 let fault = fault(random);
                 self.faults.push(fault);
@@ -157,6 +159,22 @@ fn fault(random: &mut Random) -> Fault {
         }
         _ => Fault::Lose(number + 1),
     }
+}
+
+/// A wire that loses, doubles, delays or changes 2 to 6 % of the frames.
+fn disturbed_wire(random: &mut Random) -> Vec<Fault> {
+    let (share, changes_bytes) = (random.within(2..=6), random.percent(30));
+    let mut faults = Vec::new();
+    for number in (0..400).filter(|_| random.percent(share)).collect::<Vec<u64>>() {
+        faults.push(match random.within(0..=4) {
+            0 => Fault::Lose(number),
+            1 => Fault::LoseSent(number),
+            2 => Fault::Duplicate(number),
+            3 if changes_bytes => Fault::Garble(number, usize::from(random.byte(0..=7)), 1 << random.byte(0..=7)),
+            _ => Fault::Delay(number, *random.pick(&[1, 5, 20])),
+        });
+    }
+    faults
 }
 
 fn device_fault(random: &mut Random) -> DeviceFault {

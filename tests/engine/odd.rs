@@ -3,7 +3,7 @@
 use crate::command::{Command, Expected, How, Measuring};
 use crate::kinds::model;
 use crate::random::Random;
-use crate::spec::Spec;
+use crate::spec::{DeviceSpec, Spec};
 use crate::station::write;
 use cangauge::bus::Mono;
 use cangauge::bus::memory::{Outbox, Station};
@@ -31,6 +31,10 @@ pub(crate) enum Oddity {
     Pdo(usize),
     /// It has neither a profile nor a known vendor: nothing states the types of its objects.
     Stranger,
+    /// TPDO1 contains its pressure as INTEGER16 with so many digits that it is clipped.
+    Clips,
+    /// Another device has the same node-ID.
+    Twin,
     /// It sends no TPDO.
     Mute(Mute),
 }
@@ -120,6 +124,7 @@ impl Oddity {
     pub(crate) fn power_on(self, device: &mut Device, now: Mono) -> bool {
         match (self, device.node()) {
             (Oddity::Mute(mute), Some(node)) => mute.set_up(device, now, node.get()),
+            (Oddity::Clips, Some(node)) => clip(device, now, node.get()),
             _ => true,
         }
     }
@@ -181,8 +186,28 @@ impl Oddity {
 
     /// Whether the program can use the device like one without the oddity.
     pub(crate) fn is_harmless(self) -> bool {
-        !matches!(self, Oddity::Stranger | Oddity::Mute(_) | Oddity::Pdo(0..=7))
+        !matches!(self, Oddity::Stranger | Oddity::Clips | Oddity::Twin | Oddity::Mute(_) | Oddity::Pdo(0..=7))
     }
+}
+
+/// Maps 7130h:1 with five decimal digits. Returns whether its value is then clipped.
+fn clip(device: &mut Device, now: Mono, node: u8) -> bool {
+    let number = |bytes: Vec<u8>| bytes.iter().rev().fold(0u32, |number, byte| number << 8 | u32::from(*byte));
+    let cob_id = device.value(ObjectId::new(0x1800, 1), now).map_or(0, number);
+    let writes = [
+        (0x1800, 1, cob_id | 0x8000_0000, 4),
+        (0x1a00, 0, 0, 1),
+        (0x1a00, 1, 0x7130_0110, 4),
+        (0x1a00, 0, 1, 1),
+        (0x1800, 2, 1, 1),
+        (0x1800, 1, cob_id, 4),
+        (0x6132, 1, 5, 1),
+    ];
+    for (index, sub, value, bytes) in writes {
+        device.receive(now, &write(node, index, sub, value, bytes), &mut Outbox::default());
+    }
+    let is_mapped = device.value(ObjectId::new(0x1a00, 1), now).map(number) == Some(0x7130_0110);
+    is_mapped && device.value(ObjectId::new(0x7130, 1), now) == Some(i16::MAX.to_le_bytes().to_vec())
 }
 
 fn is_tpdo(frame: &Frame) -> bool {
@@ -192,7 +217,7 @@ fn is_tpdo(frame: &Frame) -> bool {
 impl Spec {
     /// Makes one device odd, and chooses a command that meets the oddity.
     pub(crate) fn make_odd(&mut self, random: &mut Random) {
-        let fits = |device: &&mut crate::spec::DeviceSpec| {
+        let fits = |device: &&mut DeviceSpec| {
             device.node.is_some() && model(device.kind).dictionary.get(ObjectId::new(0x1800, 1)).is_some()
         };
         let Some(device) = self.devices.iter_mut().find(fits) else { return };
@@ -213,6 +238,15 @@ impl Spec {
             device.unsaved_heartbeat = None;
         }
         self.command = command(oddity, node, random);
+        let odd = self.devices.iter().position(|device| device.oddity.is_some()).expect("it was chosen");
+        if oddity == Oddity::Clips {
+            self.devices[odd].kind = "mh4";
+        }
+        if oddity == Oddity::Twin {
+            let kind = if random.percent(50) { self.devices[odd].kind } else { *random.pick(&["mh4", "dps", "d20"]) };
+            let serial = self.devices[odd].serial + 50;
+            self.devices.push(DeviceSpec { kind, serial, oddity: None, ..self.devices[odd].clone() });
+        }
     }
 }
 
@@ -233,7 +267,9 @@ fn oddity(random: &mut Random) -> Oddity {
         Mute::Multiplexed,
         Mute::NotSent,
     ];
-    match random.within(0..=10) {
+    match random.within(0..=13) {
+        11 => Oddity::Clips,
+        12 | 13 => Oddity::Twin,
         0 => Oddity::Silent(*random.pick(&[0x1008, 0x1009, 0x100a, 0x1018])),
         1 => Oddity::WrongToggle,
         2 => Oddity::Twice,
@@ -277,6 +313,33 @@ fn command(oddity: Oddity, node: u8, random: &mut Random) -> Command {
                     how: Measuring::Once,
                     excuse: false,
                 },
+            ],
+        ]
+        .concat(),
+        Oddity::Clips => vec![
+            log(Some(50), None),
+            Command::PdoWatch { nodes: vec![node], for_ms: 500 },
+            Command::Check {
+                nodes: vec![node],
+                expected: vec![Expected { signal: "pressure", low: -1e9, high: 1e9 }],
+                how: Measuring::Sync { ms: 50, for_ms: 500 },
+                excuse: false,
+            },
+        ],
+        Oddity::Twin => [
+            of_values.to_vec(),
+            vec![
+                Command::SdoRead { node, object: ObjectId::new(0x1018, 4), how },
+                Command::SdoWrite { node, object: heartbeat, bytes: vec![200, 0], how },
+                Command::Check {
+                    nodes: vec![node],
+                    expected: vec![Expected { signal: "pressure", low: -1e9, high: 1e9 }],
+                    how: Measuring::Once,
+                    excuse: false,
+                },
+                Command::Unit { node, signal: None, unit: 0x00ab_0000 },
+                Command::Store { node, group: 0, verify: false },
+                Command::Limits { node, lower: 0.0, upper: 5.0 },
             ],
         ]
         .concat(),

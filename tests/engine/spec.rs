@@ -207,12 +207,6 @@ impl Spec {
                 .all(|device| device.bit_rate.is_none() && device.latency_us < 20_000 && device.oddity.is_none())
     }
 
-    /// Whether a device with this node-ID is odd.
-    pub(crate) fn oddity_of(&self, node: &str) -> Option<Oddity> {
-        let device = self.devices.iter().find(|device| device.node.is_some_and(|id| id.to_string() == node));
-        device.and_then(|device| device.oddity)
-    }
-
     /// Whether all faults are between the program and the bus.
     pub(crate) fn is_clean_but_for_faults(&self) -> bool {
         Spec { faults: Vec::new(), interrupts: Vec::new(), kill: None, ..self.clone() }.is_clean()

@@ -6,6 +6,10 @@ use cangauge::output::failure::ErrorMessage;
 
 /// Compares the result with the oddity of the device.
 pub(super) fn odd(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
+    let twin = spec.devices.iter().find(|device| device.oddity == Some(Oddity::Twin));
+    if let Some(twin) = twin.filter(|_| spec.shares_node_ids()) {
+        twins(twin.node.unwrap_or_default(), run, violations);
+    }
     let odd = spec.devices.iter().find_map(|device| Some((device.node?, device.oddity?)));
     let Some((node, oddity)) = odd.filter(|_| !spec.shares_node_ids()) else { return };
     let has_it = run.bus.bus.inner().stations::<FaultyDevice>().all(|station| station.has_oddity);
@@ -17,6 +21,16 @@ pub(super) fn odd(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
         Oddity::Pdo(0..=7) => {
             if let Some(row) = run.observed.rows.first() {
                 violations.push(("odd: no value from a short TPDO", row.clone()));
+            }
+        }
+        Oddity::Clips => {
+            let is_clipped = |row: &&String| row.ends_with(",,bar,clipped,0xFF7F");
+            let of_node = |row: &&String| row.split(',').nth(1) == Some(node.to_string().as_str());
+            let wrong =
+                run.observed.rows.iter().filter(of_node).find(|row| row.ends_with("0xFF7F") && !is_clipped(row));
+            violations.extend(wrong.map(|row| ("odd: no value of a clipped integer", row.clone())));
+            if matches!(run.result, Ok(Claim::Satisfied)) {
+                violations.push(("odd: no value of a clipped integer", "the check is satisfied".to_owned()));
             }
         }
         Oddity::Stranger => {
@@ -33,6 +47,36 @@ pub(super) fn odd(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
     if oddity.is_harmless() {
         like_the_plain_device(spec, run, violations);
     }
+}
+
+/// Two devices with one node-ID: no value of either, and no write.
+fn twins(node: u8, run: &Run, violations: &mut Vec<Violation>) {
+    let has_value = |row: &&String| {
+        let cells: Vec<&str> = row.split(',').collect();
+        cells[1] == node.to_string() && !cells[3].is_empty()
+    };
+    let row = run.observed.rows.iter().find(has_value);
+    violations.extend(row.map(|row| ("odd: no value of two devices", row.clone())));
+    let answers = |object: ObjectId| {
+        let [low, high] = object.index.to_le_bytes();
+        let sent = run.bus.bus.inner().stations::<FaultyDevice>().flat_map(|station| &station.sent);
+        let frames =
+            sent.filter_map(|(_, frame)| frame.all_eight().filter(|_| frame.id().sdo_response_node().is_some()));
+        frames
+            .filter(|data| data[1..4] == [low, high, object.sub])
+            .map(|data| data[4..].to_vec())
+            .collect::<BTreeSet<_>>()
+    };
+    if let Ok(Claim::Values(values)) = &run.result {
+        let differs = values.iter().find(|(_, object, _)| answers(*object).len() > 1);
+        violations.extend(differs.map(|value| ("odd: no value of two devices", format!("{value:?}"))));
+    }
+    let is_write = |(_, frame): &(Mono, cangauge::canopen::frame::Frame)| {
+        frame.id().sdo_request_node().is_some_and(|to| to.get() == node)
+            && frame.data().first().is_some_and(|first| first >> 5 == 1)
+    };
+    let write = run.bus.all_sent().into_iter().find(is_write);
+    violations.extend(write.map(|(_, frame)| ("odd: no write to two devices", frame.to_string())));
 }
 
 /// The reason for the silence is the real one.

@@ -1,7 +1,6 @@
 //! Recorded values were sent, and actions are sent once.
 
 use super::*;
-use crate::odd::Oddity;
 
 /// The source of the rows of a command, and whether it records every value.
 fn recording(command: &Command) -> Option<(bool, bool)> {
@@ -34,43 +33,32 @@ pub(super) fn rows(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
         return;
     }
     let late = spec.faults.iter().any(|fault| matches!(fault, Fault::Delay(..)));
-    // A unit that could not be read is unknown, and so are the decimal digits.
-    let refuses = spec.device_faults().any(|device_fault| matches!(device_fault, DeviceFault::Refuse { .. }));
     let key = |row: &str| {
         let cells: Vec<&str> = row.split(',').collect();
         let time = if late { "" } else { cells[0] };
-        let rest = match spec.oddity_of(cells[1]) {
-            _ if refuses => [cells[1], cells[6]].join(","),
-            Some(Oddity::Stranger | Oddity::Silent(0x1008 | 0x1018)) => [cells[1], cells[6]].join(","),
-            // A device without name may not be recognised: its signals then have the names of the profile.
-            Some(Oddity::Silent(_) | Oddity::WrongToggle) => [cells[1], cells[3], cells[4], cells[6]].join(","),
-            // The same if a fault affects the read of its name.
-            _ if !spec.is_clean() => [cells[1], cells[3], cells[4], cells[6]].join(","),
-            _ => cells[1..].join(","),
-        };
-        format!("{time},{rest}")
+        if spec.is_clean() { format!("{time},{}", cells[1..].join(",")) } else { [time, cells[1], cells[6]].join(",") }
     };
-    let mut left: BTreeMap<String, usize> = BTreeMap::new();
-    run.truth.iter().for_each(|row| *left.entry(key(row)).or_default() += 1);
+    let mut left: BTreeMap<String, Vec<&String>> = BTreeMap::new();
+    run.truth.iter().for_each(|row| left.entry(key(row)).or_default().push(row));
     let mut twice = spec.faults.iter().filter(|fault| matches!(fault, Fault::Duplicate(_))).count() * 8;
     for row in &run.observed.rows {
         let was_sent = if left.contains_key(&key(row)) { key(row) } else { key(&without_overload(spec, row)) };
-        match left.get_mut(&was_sent) {
-            Some(count) if *count > 0 => *count -= 1,
-            Some(_) if twice > 0 => twice -= 1,
-            Some(_) => {
+        let Some(sent) = left.get_mut(&was_sent) else {
+            // If the unit is changed during the run, the simulator's record shows the new one at once.
+            let raw = row.rsplit(',').next().unwrap_or("");
+            let same = run.truth.iter().find(|other| other.rsplit(',').next() == Some(raw));
+            violations.push(("invents no row", format!("{row} (sent: {same:?})")));
+            return;
+        };
+        match sent.iter().position(|truth| agrees(spec, row, truth)) {
+            Some(place) => drop(sent.swap_remove(place)),
+            None if twice > 0 => twice -= 1,
+            None if sent.is_empty() => {
                 violations.push(("no value has two rows", row.clone()));
                 return;
             }
             None => {
-                // If the unit is changed during the run, the simulator's record shows the new one at once.
-                let raw = row.rsplit(',').next().unwrap_or("");
-                let same = run.truth.iter().find(|other| other.rsplit(',').next() == Some(raw));
-                // A device that a fault kept from being recognised: an impossible number is no value.
-                if !spec.is_clean() && same.is_some() && row.split(',').nth(3) == Some("") {
-                    continue;
-                }
-                violations.push(("invents no row", format!("{row} (sent: {same:?})")));
+                violations.push(("shows what was sent", format!("{row} (sent: {sent:?})")));
                 return;
             }
         }
@@ -89,6 +77,25 @@ pub(super) fn rows(spec: &Spec, run: &Run, violations: &mut Vec<Violation>) {
             violations.push(("loses no row", format!("{} rows of {sent}", run.observed.rows.len())));
         }
     }
+}
+
+/// Whether a row shows what was sent. A device that was not recognised has the names of its profile or its objects, and
+/// an unknown value or unit is empty.
+fn agrees(spec: &Spec, row: &str, truth: &str) -> bool {
+    let [row, truth] = [row, truth].map(|line| line.split(',').collect::<Vec<_>>());
+    let device = spec.devices.iter().find(|device| device.node.is_some_and(|node| node.to_string() == truth[1]));
+    let signal = device.and_then(|device| {
+        let signals = &crate::kinds::model(device.kind).description.signals;
+        signals.iter().find(|signal| signal.name == truth[2]).map(|signal| format!("ch{}", signal.channel))
+    });
+    let is_named =
+        row[2] == truth[2] || Some(row[2]) == signal.as_deref() || row[2].starts_with("0x") && row[3].is_empty();
+    let has_unit = row[4].is_empty() || row[4] == truth[4];
+    // Without a unit, the decimal digits may be unknown as well.
+    let refuses = spec.device_faults().any(|device_fault| matches!(device_fault, DeviceFault::Refuse { .. }));
+    let has_value = row[3].is_empty() || row[3] == truth[3] || refuses && row[4].is_empty();
+    let is_bad = truth[5].starts_with("overload") || truth[5] == "invalid";
+    is_named && has_unit && has_value && !(is_bad && row[5] == "ok")
 }
 
 /// The row without the status that shows a value outside the measuring range, if its device is overloaded. The
