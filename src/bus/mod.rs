@@ -11,6 +11,7 @@ pub mod file;
 pub mod interrupt;
 pub mod memory;
 pub mod owner;
+mod pcapng;
 #[cfg(unix)]
 mod poll;
 pub mod replay;

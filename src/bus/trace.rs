@@ -1,6 +1,6 @@
-//! A wrapper around a bus that writes each sent and received frame, in the format of `candump -L`.
+//! A wrapper around a bus that writes each sent and received frame, in the format of `candump -L` or for Wireshark.
 
-use super::{BitRateControl, Bus, BusError, Event, Mono, Received, Stamp, Wall, delegate_bus};
+use super::{BitRateControl, Bus, BusError, Event, Mono, Received, Stamp, Wall, delegate_bus, pcapng};
 use crate::canopen::frame::Frame;
 use std::io::{self, BufWriter, Write};
 use std::time::Duration;
@@ -9,7 +9,8 @@ use std::time::Duration;
 /// kill.
 const FLUSH_INTERVAL: Duration = Duration::from_secs(1);
 
-/// A bus that writes a trace, one line per frame: `(1436509052.249713) can0 044#2A366C2BBA`.
+/// A bus that writes a trace, one line per frame: `(1436509052.249713) can0 044#2A366C2BBA`. A file `*.pcapng` is written
+/// in that format.
 ///
 /// If writing fails, [`Bus::receive`] returns the error once, between two frames, and the trace ends. The bus keeps
 /// working, so that the caller can clean up.
@@ -17,6 +18,7 @@ pub struct Traced<B> {
     bus: B,
     name: String,
     file: String,
+    is_capture: bool,
     out: Option<BufWriter<Box<dyn Write>>>,
     /// The time of the oldest line in the buffer.
     buffered_since: Option<Mono>,
@@ -27,12 +29,23 @@ impl<B: Bus> Traced<B> {
     /// Writes the traffic of `bus` to `out`, which error messages call `file`.
     pub fn new(bus: B, out: Box<dyn Write>, file: &str) -> Traced<B> {
         let name = bus.name().to_owned();
-        Traced { bus, name, file: file.to_owned(), out: Some(BufWriter::new(out)), buffered_since: None, failed: None }
+        let is_capture = file.ends_with(".pcapng");
+        let (file, out) = (file.to_owned(), Some(BufWriter::new(out)));
+        let mut traced = Traced { bus, name, file, is_capture, out, buffered_since: None, failed: None };
+        if let (true, Some(out)) = (is_capture, &mut traced.out) {
+            let written = out.write_all(&pcapng::header(&traced.name));
+            traced.check(written);
+        }
+        traced
     }
 
-    fn line(&mut self, at: Stamp, frame: &Frame) {
+    fn line(&mut self, at: Stamp, frame: &Frame, is_sent: bool) {
         let Some(out) = &mut self.out else { return };
-        let written = write_line(out, at.wall, &self.name, frame);
+        let written = if self.is_capture {
+            out.write_all(&pcapng::packet(at.wall, frame, is_sent))
+        } else {
+            write_line(out, at.wall, &self.name, frame)
+        };
         let since = *self.buffered_since.get_or_insert(at.mono);
         self.check(written);
         if at.mono.since(since) >= FLUSH_INTERVAL {
@@ -83,7 +96,7 @@ impl<B: Bus> Bus for Traced<B> {
         // Read before sending: an answer may arrive before the clock is read afterwards.
         let at = self.bus.now();
         self.bus.send(frame)?;
-        self.line(at, frame);
+        self.line(at, frame, true);
         Ok(())
     }
 
@@ -98,7 +111,7 @@ impl<B: Bus> Bus for Traced<B> {
                 Event::Timeout if until < deadline => self.flush(),
                 event => {
                     if let Event::Frame(Received { frame, at }) = &event {
-                        self.line(*at, frame);
+                        self.line(*at, frame, false);
                     }
                     return Ok(event);
                 }
@@ -172,6 +185,17 @@ mod tests {
              (1436509052.249713) script 044#2A366C2BBA\n\
              (1436509052.300000) script 1FFFFFFF#R2\n"
         );
+        Ok(())
+    }
+
+    #[test]
+    fn name_of_the_file_chooses_the_form() -> Result<(), BusError> {
+        let disk = Disk::default();
+        let mut bus = Traced::new(Script::new(), Box::new(disk.clone()), "t.pcapng");
+        bus.send(&frame("080#"))?;
+        bus.finish()?;
+        let expected = [pcapng::header("script"), pcapng::packet(bus.now().wall, &frame("080#"), true)].concat();
+        assert_eq!(*disk.text.borrow(), expected);
         Ok(())
     }
 
