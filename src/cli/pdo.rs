@@ -242,7 +242,10 @@ impl WatchArgs {
         let (mut failed, mut node_failures) = (None, Vec::new());
         let mut rows = global.stream::<ReceivedTpdo>()?;
         let (asked, result) = global.with_claims(|master, claims| {
-            let nodes = open::nodes(master, global, &self.nodes)?;
+            let nodes = match &self.nodes {
+                Nodes::All if !master.bus().is_live() => NodeId::all().collect(),
+                nodes => open::nodes(master, global, nodes)?,
+            };
             let overrides = descriptions::overrides_on(master, global, &nodes)?;
             let mut claims = Some(std::mem::take(claims));
             let mut report = |event: &WatchEvent<'_>| {

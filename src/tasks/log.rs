@@ -36,7 +36,7 @@ use crate::tasks::Failure;
 pub use changes::{Change, TpdoChange};
 use checks::{check_wanted, refuse_second_sync, sync_share};
 pub use events::EventCounts;
-use passive::SetupListener;
+pub(super) use passive::SetupListener;
 use poll::Poll;
 pub use producer::SyncStatistics;
 use recording::Recording;

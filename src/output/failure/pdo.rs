@@ -81,8 +81,9 @@ fn unknown_name(name: &str, nearest: &[String], signals: &[String]) -> Words {
 
 fn nothing_received(nodes: &[NodeId]) -> Words {
     let all = nodes.iter().map(NodeId::to_string).collect::<Vec<_>>().join(",");
-    let first = nodes.first().map(NodeId::to_string).unwrap_or_default();
-    Words::new("no TPDO was received").hint(format!(
+    let words = Words::new("no TPDO was received");
+    let Some(first) = nodes.first() else { return words };
+    words.hint(format!(
         "check that the nodes are operational and that a node sends SYNC: cangauge pdo show {first}; \
          cangauge nmt start {all}"
     ))

@@ -19,7 +19,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Reads the setup of nodes from the SDO traffic of other masters.
-pub(super) struct SetupListener {
+pub(in crate::tasks) struct SetupListener {
     nodes: BTreeSet<NodeId>,
     overrides: Overrides,
     wanted: Vec<Wanted>,
@@ -27,11 +27,11 @@ pub(super) struct SetupListener {
     /// COB-IDs of the TPDOs that are decoded.
     decoded: BTreeSet<CanId>,
     /// Nodes that sent TPDOs whose mapping is unknown.
-    pub(super) not_understood: BTreeSet<NodeId>,
+    pub(in crate::tasks) not_understood: BTreeSet<NodeId>,
 }
 
 impl SetupListener {
-    pub(super) fn new(nodes: &[NodeId], overrides: &Overrides, wanted: &[Wanted]) -> SetupListener {
+    pub(in crate::tasks) fn new(nodes: &[NodeId], overrides: &Overrides, wanted: &[Wanted]) -> SetupListener {
         SetupListener {
             nodes: nodes.iter().copied().collect(),
             overrides: overrides.clone(),
@@ -43,14 +43,14 @@ impl SetupListener {
     }
 
     /// Decodes the nodes whose descriptions the user named.
-    pub(super) fn apply_overrides(&mut self, decoder: &mut Decoder) {
+    pub(in crate::tasks) fn apply_overrides(&mut self, decoder: &mut Decoder) {
         let nodes: Vec<NodeId> = self.overrides.keys().copied().filter(|node| self.nodes.contains(node)).collect();
         nodes.into_iter().for_each(|node| self.update(node, decoder));
     }
 
     /// Takes a frame. If it completes the setup of a TPDO, `decoder` decodes that TPDO from now on. Returns the recorded node
     /// if the frame contained information about it.
-    pub(super) fn take(&mut self, received: &Received, decoder: &mut Decoder) -> Option<NodeId> {
+    pub(in crate::tasks) fn take(&mut self, received: &Received, decoder: &mut Decoder) -> Option<NodeId> {
         let frame = &received.frame;
         if let Some((node, _)) = self.overheard.take(frame).filter(|(node, _)| self.nodes.contains(node)) {
             self.update(node, decoder);
@@ -66,7 +66,7 @@ impl SetupListener {
     }
 
     /// A node has restarted: it may have lost its setup. Its identity and the descriptions of the user stay valid.
-    pub(super) fn forget(&mut self, node: NodeId, decoder: &mut Decoder) {
+    pub(in crate::tasks) fn forget(&mut self, node: NodeId, decoder: &mut Decoder) {
         self.overheard.forget(node, is_setup);
         decoder.remove(node);
         self.decoded = decoder.can_ids().collect();
@@ -116,7 +116,7 @@ impl SetupListener {
     }
 
     /// What is known of a node. It contains only TPDOs with known COB-ID and complete mapping.
-    pub(super) fn known_node(&self, id: NodeId) -> Node {
+    pub(in crate::tasks) fn known_node(&self, id: NodeId) -> Node {
         let mut node = Node::new(id);
         node.identity = self.overheard.identity(id);
         node.model = self.named(id).cloned().or_else(|| self.overheard.recognise(id));

@@ -7,11 +7,13 @@ use crate::canopen::nmt::Life;
 use crate::canopen::pdo::TpdoNumber;
 use crate::master::{Error, Happening, Master};
 use crate::measure::decode::{Decoded, Decoder};
+use crate::measure::layout::Tpdo;
 use crate::measure::sample::{Sample, Source};
 use crate::node::Overrides;
 use crate::node::survey::survey_each;
 use crate::node::wait::{Policy, Until, Waiter, run};
 use crate::tasks::Failure;
+use crate::tasks::log::{LogFailure, SetupListener};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -55,7 +57,8 @@ pub enum WatchEvent<'a> {
 }
 
 /// Shows the TPDOs of the nodes until the time has passed, or until Ctrl-C or `on_event` ends it. Sends no NMT command.
-/// Returns the failures of the nodes whose mapping could not be read; the other nodes are shown.
+/// Returns the failures of the nodes whose mapping could not be read; the other nodes are shown. In a recording, the
+/// mapping comes from its SDO traffic or from a description that the user named.
 ///
 /// # Errors
 /// [`PdoFailure::NothingReceived`]; bus errors, and Ctrl-C before the first TPDO.
@@ -66,6 +69,14 @@ pub fn watch(
     duration: Option<Duration>,
     on_event: &mut dyn FnMut(&WatchEvent<'_>) -> ControlFlow<()>,
 ) -> Result<Vec<Failure>, Failure> {
+    let end_after = |start: Mono| duration.map_or(Mono::at(Duration::MAX), |duration| start + duration);
+    if !master.bus().is_live() {
+        let setup = SetupListener::new(nodes, overrides, &[]);
+        let mut watcher = Watcher::new(nodes.to_vec(), end_after(master.now()), on_event);
+        watcher.learn(setup, overrides);
+        run(master, Policy::Record, &mut watcher)?;
+        return Ok(Vec::new());
+    }
     master.listen_to(nodes)?;
     let (mut surveyed, mut failures) = (Vec::new(), Vec::new());
     for result in survey_each(master, nodes, overrides)? {
@@ -83,26 +94,23 @@ pub fn watch(
         }
     }
     let nodes: Vec<NodeId> = surveyed.iter().map(|node| node.id).collect();
-    let mut decoder = Decoder::default();
-    let mut numbers: BTreeMap<CanId, TpdoNumber> = BTreeMap::new();
-    for node in &surveyed {
-        decoder.add(node.layout(), &[]);
-        let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
-        numbers.extend(valid.map(|tpdo| (tpdo.cob_id.can_id(), tpdo.number)));
-    }
-    let ids = numbers.keys().copied().chain(nodes.iter().map(|&node| CanId::heartbeat(node)));
-    master.listen(&Filters::Only(ids.collect()))?;
     let start = master.now();
-    let end = duration.map_or(Mono::at(Duration::MAX), |duration| start + duration);
-    let next = end.min(start + FIRST_TPDO_TIMEOUT);
-    let samples = Vec::new();
-    let mut watcher = Watcher { nodes, decoder, numbers, samples, end, next, has_received: false, on_event };
+    let mut watcher = Watcher::new(nodes, end_after(start), on_event);
+    watcher.next = watcher.end.min(start + FIRST_TPDO_TIMEOUT);
+    for node in &surveyed {
+        watcher.decoder.add(node.layout(), &[]);
+        watcher.number(&node.tpdos);
+    }
+    let ids = watcher.numbers.keys().copied().chain(watcher.nodes.iter().map(|&node| CanId::heartbeat(node)));
+    master.listen(&Filters::Only(ids.collect()))?;
     run(master, Policy::Record, &mut watcher)?;
     Ok(failures)
 }
 
 struct Watcher<'a> {
     nodes: Vec<NodeId>,
+    /// Reads the mappings from a recording.
+    setup: Option<SetupListener>,
     decoder: Decoder,
     numbers: BTreeMap<CanId, TpdoNumber>,
     samples: Vec<Sample>,
@@ -113,9 +121,39 @@ struct Watcher<'a> {
     on_event: &'a mut dyn FnMut(&WatchEvent<'_>) -> ControlFlow<()>,
 }
 
-impl Watcher<'_> {
+impl<'a> Watcher<'a> {
+    fn new(
+        nodes: Vec<NodeId>,
+        end: Mono,
+        on_event: &'a mut dyn FnMut(&WatchEvent<'_>) -> ControlFlow<()>,
+    ) -> Watcher<'a> {
+        let (decoder, numbers, samples) = (Decoder::default(), BTreeMap::new(), Vec::new());
+        Watcher { nodes, setup: None, decoder, numbers, samples, end, next: end, has_received: false, on_event }
+    }
+
+    /// Keeps the numbers of TPDOs for their COB-IDs.
+    fn number(&mut self, tpdos: &[Tpdo]) {
+        let valid = tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
+        self.numbers.extend(valid.map(|tpdo| (tpdo.cob_id.can_id(), tpdo.number)));
+    }
+
+    /// Reads the mappings from the recording; first from the descriptions that the user named.
+    fn learn(&mut self, mut setup: SetupListener, overrides: &Overrides) {
+        setup.apply_overrides(&mut self.decoder);
+        overrides.keys().for_each(|&node| self.number(&setup.known_node(node).tpdos));
+        self.setup = Some(setup);
+    }
+
     fn on_frame(&mut self, received: &Received) -> ControlFlow<()> {
         let at = received.at;
+        if let Some(setup) = &mut self.setup {
+            if let Some(node) = setup.take(received, &mut self.decoder) {
+                let tpdos = setup.known_node(node).tpdos;
+                self.number(&tpdos);
+            } else if let Some((node, Life::BootUp)) = Life::parse(&received.frame) {
+                setup.forget(node, &mut self.decoder);
+            }
+        }
         self.samples.clear();
         let decoded = self.decoder.decode(received, &mut self.samples);
         match (decoded, self.numbers.get(&received.frame.id())) {
@@ -140,10 +178,15 @@ impl Watcher<'_> {
 
     /// The result at the end.
     fn result(&self) -> Result<ControlFlow<()>, Failure> {
-        match self.has_received {
-            true => Ok(ControlFlow::Break(())),
-            false => Err(Failure::general(PdoFailure::NothingReceived { nodes: self.nodes.clone() })),
+        if self.has_received {
+            return Ok(ControlFlow::Break(()));
         }
+        if let Some(&node) = self.setup.as_ref().and_then(|setup| setup.not_understood.first()) {
+            return Err(Failure::at(node, LogFailure::UnknownMapping));
+        }
+        // Nothing can be done for the nodes of a recording.
+        let nodes = if self.setup.is_some() { Vec::new() } else { self.nodes.clone() };
+        Err(Failure::general(PdoFailure::NothingReceived { nodes }))
     }
 }
 
