@@ -69,6 +69,7 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("clap", &["cli", "main"]),
     ("clap_complete", &["cli"]),
     ("csv", &["cli", "output"]),
+    ("flate2", &["bus"]),
     ("indicatif", &["output"]),
     ("libc", &["bus"]),
     ("serde_json", &["output"]),
@@ -98,7 +99,7 @@ const UNSAFE: &[(&str, usize, &str)] = &[
     ("bus/claim/holder.rs", 1, "SO_PEERCRED: std has no stable call for the credentials of a peer"),
     ("bus/interrupt.rs", 1, "sigaction: std cannot read the action of a signal"),
     ("bus/poll.rs", 2, "ppoll and poll: std cannot wait for a descriptor"),
-    ("bus/replay.rs", 2, "mktime and its zeroed argument: std knows no time zones"),
+    ("bus/replay/text.rs", 2, "mktime and its zeroed argument: std knows no time zones"),
     ("bus/socketcan/receive.rs", 3, "recvmmsg and its zeroed headers: no safe crate returns the drop counter"),
     ("bus/socketcan/socket.rs", 1, "SO_MEMINFO: neither socket2 nor the socketcan crate reads it"),
 ];

@@ -1,32 +1,40 @@
-//! Replays a candump recording as a bus.
+//! Replays a recording as a bus: a log of candump, Vector ASC, PEAK TRC, or CSV of python-can, also compressed by gzip.
 //!
-//! The time is that of the recording. It passes as fast as the program reads; nothing waits.
+//! The time is that of the recording. It passes as fast as the program reads, or in real time. Each format has a
+//! [`Parser`] that turns a line into a frame with its time. Order, broken lines and channels are handled here.
+
+mod asc;
+mod candump;
 
 mod error;
-mod line;
+mod format;
+mod lines;
+mod python_can;
 #[cfg(test)]
 mod tests;
+mod text;
+mod trc;
 
+use super::memory::Sleeper;
 use super::{BitRateControl, Bus, BusError, Event, Filters, Mono, Received, Stamp, TimestampSource, Wall};
 use crate::canopen::frame::Frame;
-pub use error::{FileFormat, RecordingError};
-use line::Line;
-use std::collections::VecDeque;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
-use std::time::Duration;
+pub use error::RecordingError;
+pub use format::{FileFormat, RecordingFormat};
+use lines::Lines;
+use std::borrow::Cow;
+use std::io;
+use std::mem;
+use std::time::{Duration, Instant};
+use text::FrameOrFault;
 
-/// The longest valid line in bytes.
-const MAX_LINE: u64 = 4096;
-
-/// Lines without any valid one, after which the file is not a recording.
+/// Lines that show no format, after which the file is not a recording.
 const MAX_UNKNOWN: u64 = 100;
-
-/// The first bytes of a file, which show its format, and the rest of their last line.
-const START_LENGTH: usize = 512;
 
 /// Lines that are read ahead to see whether times without a date increase.
 const LINES_AHEAD: usize = 1000;
+
+/// Channels of a recording that are named.
+const MAX_CHANNELS: usize = 16;
 
 /// Times before this moment (March 1973) have no date: they count from the start of the recording.
 const FIRST_DATE: Duration = Duration::from_secs(100_000_000);
@@ -37,14 +45,32 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(24 * 3600);
 /// A line may be earlier than the one before by this time: interrupts of two controllers are not in order.
 const DISORDER: Duration = Duration::from_millis(10);
 
-/// A mark that some editors write at the start of a UTF-8 file.
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+/// Reads the lines of one format.
+trait Parser {
+    /// Reads a line without the blanks around it.
+    fn line<'a>(&mut self, text: &'a str) -> Line<'a>;
+}
+
+/// One line of a recording.
+#[derive(Debug, PartialEq, Eq)]
+enum Line<'a> {
+    /// A frame or a fault, on this channel. The time counts from 1970, or from the start if there is no date.
+    Event(Wall, &'a str, FrameOrFault),
+    /// A frame without a time.
+    WithoutTime,
+    /// A header, another event, or a CAN FD frame, which CANopen does not use.
+    Ignored,
+    /// Something else.
+    Unknown,
+}
 
 /// Something to know about a recording that is replayed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReplayNote {
-    /// Lines that are not lines of a recording were skipped.
+    /// Lines that the format does not allow were skipped.
     Skipped {
+        /// The format.
+        format: RecordingFormat,
         /// How many.
         count: u64,
         /// The number of the first one, counted from 1.
@@ -67,16 +93,18 @@ pub enum ReplayNote {
     },
 }
 
-/// A candump recording as a bus that only receives.
+/// A recording as a bus that only receives.
 pub struct Replay {
     file: String,
-    lines: Box<dyn BufRead>,
-    /// Lines that were read ahead, with their numbers.
-    ahead: VecDeque<(u64, Vec<u8>)>,
-    /// Lines read from the file.
-    number: u64,
-    /// The interface in the recording.
-    interface: String,
+    lines: Lines,
+    /// The line that is being read.
+    buffer: Vec<u8>,
+    /// The format, once it is known.
+    format: Option<(RecordingFormat, Box<dyn Parser>)>,
+    /// The channel to replay; the only one if none is chosen.
+    channel: Option<String>,
+    /// The channels that frames came from.
+    channels: Vec<String>,
     /// The time of the last line that was read.
     last: Option<Stamp>,
     /// The time before the last step backwards, and the size of that step.
@@ -88,9 +116,9 @@ pub struct Replay {
     next: Option<(Stamp, Event)>,
     state: State,
     filters: Filters,
-    /// The first bytes of the file.
-    start: Vec<u8>,
-    /// Whether any line was valid.
+    /// When the replay in real time started, and how to wait.
+    pace: Option<(Instant, Box<dyn Sleeper>)>,
+    /// Whether any line was a frame.
     is_recording: bool,
     /// Skipped lines: their number, and the first one.
     skipped: Option<(u64, u64)>,
@@ -119,19 +147,32 @@ impl Replay {
     /// # Errors
     /// The file cannot be opened.
     pub fn open(file: &str, report: Report) -> io::Result<Replay> {
-        if file == "-" {
-            return Ok(Replay::new("standard input", Box::new(BufReader::new(io::stdin())), report));
-        }
-        Ok(Replay::new(file, Box::new(BufReader::with_capacity(1 << 16, File::open(file)?)), report))
+        let name = if file == "-" { "standard input" } else { file };
+        Ok(Replay::new(name, Lines::open(file)?, report))
     }
 
-    fn new(file: &str, lines: Box<dyn BufRead>, report: Report) -> Replay {
+    /// Replays only this channel. Without a channel, the recording must have only one.
+    #[must_use]
+    pub fn of_channel(mut self, channel: &str) -> Replay {
+        self.channel = Some(channel.to_owned());
+        self
+    }
+
+    /// Plays in real time. `sleeper` waits.
+    #[must_use]
+    pub fn in_real_time(mut self, sleeper: Box<dyn Sleeper>) -> Replay {
+        self.pace = Some((Instant::now(), sleeper));
+        self
+    }
+
+    fn new(file: &str, lines: Lines, report: Report) -> Replay {
         Replay {
             file: file.to_owned(),
             lines,
-            ahead: VecDeque::new(),
-            number: 0,
-            interface: String::new(),
+            buffer: Vec::new(),
+            format: None,
+            channel: None,
+            channels: Vec::new(),
             last: None,
             before_step: None,
             delivered: Stamp::default(),
@@ -139,7 +180,7 @@ impl Replay {
             next: None,
             state: State::Reading,
             filters: Filters::All,
-            start: Vec::new(),
+            pace: None,
             is_recording: false,
             skipped: None,
             cut_off: None,
@@ -196,76 +237,70 @@ impl Replay {
         BusError::File { what: format!("replay {}", self.file), source }
     }
 
-    /// Reads a line from the file, with its number. A line that is too long is cut.
-    fn read_line(&mut self) -> io::Result<Option<(u64, Vec<u8>)>> {
-        let mut line = Vec::new();
-        if (&mut self.lines).take(MAX_LINE).read_until(b'\n', &mut line)? == 0 {
-            return Ok(None);
-        }
-        while !line.ends_with(b"\n") {
-            let mut rest = Vec::new();
-            if (&mut self.lines).take(MAX_LINE).read_until(b'\n', &mut rest)? == 0 {
-                break;
-            }
-            if rest.ends_with(b"\n") {
-                line.push(b'\n');
-            }
-        }
-        self.number += 1;
-        if self.start.len() < START_LENGTH {
-            self.start.extend_from_slice(&line);
-        }
-        if self.number == 1 && line.starts_with(BYTE_ORDER_MARK) {
-            line.drain(..BYTE_ORDER_MARK.len());
-        }
-        Ok(Some((self.number, line)))
-    }
-
-    /// The next line: one that was read ahead, else one of the file.
-    fn next_line(&mut self) -> io::Result<Option<(u64, Vec<u8>)>> {
-        match self.ahead.pop_front() {
-            Some(line) => Ok(Some(line)),
-            None => self.read_line(),
-        }
-    }
-
     /// Reads the next event of the recording.
     fn fetch(&mut self) -> Result<(), BusError> {
-        while self.next.is_none() && self.state == State::Reading {
-            let Some((number, bytes)) = self.next_line().map_err(|source| self.failed(source))? else {
-                self.state = State::AtEnd;
-                return if self.is_recording { Ok(()) } else { Err(self.not_a_recording()) };
+        let mut bytes = mem::take(&mut self.buffer);
+        let mut result = Ok(());
+        while result.is_ok() && self.next.is_none() && self.state == State::Reading {
+            result = match self.lines.next(&mut bytes) {
+                Ok(Some(number)) => self.read(number, &bytes),
+                Ok(None) => self.end(),
+                Err(source) => Err(self.failed(source)),
             };
-            match line::parse(&String::from_utf8_lossy(&bytes), local_time) {
-                Line::Ignored => {}
-                Line::WithoutTime if !self.is_recording => {
-                    return Err(self.wrong(Some(number), RecordingError::NoTimes));
-                }
-                // The recording was stopped in the middle of its last line.
-                Line::WithoutTime | Line::Unknown if !bytes.ends_with(b"\n") && self.is_recording => {
-                    self.cut_off = Some(number);
-                }
-                Line::WithoutTime | Line::Unknown => {
-                    let (count, _) = self.skipped.get_or_insert((0, number));
-                    *count += 1;
-                    if !self.is_recording && *count >= MAX_UNKNOWN {
-                        return Err(self.not_a_recording());
-                    }
-                }
-                Line::Event(wall, interface, event) => self.take(number, wall, interface, event)?,
+        }
+        self.buffer = bytes;
+        result
+    }
+
+    fn read(&mut self, number: u64, bytes: &[u8]) -> Result<(), BusError> {
+        let text = text_of(bytes);
+        let text = text.trim();
+        let Some((format, parser)) = self.format_by(text)? else { return self.skip(number, bytes, text) };
+        // The last number of a decimal ASC may be cut off.
+        let is_complete = *format != RecordingFormat::Asc || bytes.ends_with(b"\n");
+        match parser.line(text) {
+            Line::Event(wall, channel, event) if wall <= Wall::LAST && is_complete => {
+                self.take(number, wall, channel, event)
+            }
+            Line::Ignored => Ok(()),
+            Line::WithoutTime if !self.is_recording => Err(self.wrong(Some(number), RecordingError::NoTimes)),
+            // RFC 3339 has no years beyond 9999.
+            Line::Event(..) | Line::WithoutTime | Line::Unknown => self.skip(number, bytes, text),
+        }
+    }
+
+    /// The format and its parser. `text` is a line that may show it.
+    fn format_by(&mut self, text: &str) -> Result<Option<&mut (RecordingFormat, Box<dyn Parser>)>, BusError> {
+        if self.format.is_none() {
+            if let Some(format) = FileFormat::of(&self.lines.start) {
+                return Err(self.wrong(None, RecordingError::OtherFormat(format)));
+            }
+            match RecordingFormat::of(text) {
+                None => return Ok(None),
+                Some(Ok(format)) => self.format = Some((format, format.parser())),
+                Some(Err(format)) => return Err(self.wrong(None, RecordingError::OtherFormat(format))),
             }
         }
-        Ok(())
+        Ok(self.format.as_mut())
+    }
+
+    /// Counts a line that is neither a frame nor a comment.
+    fn skip(&mut self, number: u64, bytes: &[u8], text: &str) -> Result<(), BusError> {
+        if text.is_empty() || text.starts_with(['#', ';']) || text.starts_with("//") {
+            return Ok(());
+        }
+        if !bytes.ends_with(b"\n") && self.is_recording {
+            // The recording was stopped in the middle of its last line.
+            self.cut_off = Some(number);
+            return Ok(());
+        }
+        let (count, _) = self.skipped.get_or_insert((0, number));
+        *count += 1;
+        if !self.is_recording && *count >= MAX_UNKNOWN { Err(self.not_a_recording()) } else { Ok(()) }
     }
 
     /// Takes an event of the recording.
-    fn take(
-        &mut self,
-        number: u64,
-        wall: Wall,
-        interface: String,
-        event: Result<Frame, super::Fault>,
-    ) -> Result<(), BusError> {
+    fn take(&mut self, number: u64, wall: Wall, channel: &str, event: FrameOrFault) -> Result<(), BusError> {
         if !self.is_recording {
             self.is_recording = true;
             if wall.since_epoch() < FIRST_DATE {
@@ -273,14 +308,19 @@ impl Replay {
                 self.has_no_date = true;
             }
         }
-        if self.interface.is_empty() {
-            self.interface = interface;
-        } else if self.interface != interface {
-            let error = RecordingError::SeveralInterfaces(interface, self.interface.clone());
-            return Err(self.wrong(Some(number), error));
+        if self.channels.last().is_none_or(|last| last != channel) && !self.channels.iter().any(|it| it == channel) {
+            if let (None, Some(first)) = (&self.channel, self.channels.first()) {
+                let error = RecordingError::SeveralChannels(first.clone(), channel.to_owned());
+                return Err(self.wrong(Some(number), error));
+            }
+            if self.channels.len() < MAX_CHANNELS {
+                self.channels.push(channel.to_owned());
+            }
         }
         let at = self.place(number, wall);
+        let is_wanted = self.channel.as_deref().is_none_or(|chosen| chosen == channel);
         self.next = match event {
+            _ if !is_wanted => None,
             Ok(frame) if !self.filters.wants(&frame) => None,
             Ok(frame) => Some((at, Event::Frame(Received { frame, at }))),
             Err(fault) => Some((at, Event::Fault(fault, at))),
@@ -288,18 +328,22 @@ impl Replay {
         Ok(())
     }
 
-    /// Reads further lines of a recording whose times have no date. If one of ten times or more is not later than the
+    /// Reads further lines of a candump log whose times have no date. If one of ten times or more is not later than the
     /// time before, they are intervals: the sum is not taken, since a low resolution looks the same.
     fn look_ahead(&mut self, first: u64, wall: Wall) -> Result<(), BusError> {
+        let Some((RecordingFormat::Candump, parser)) = &mut self.format else { return Ok(()) };
         let (mut last, mut steps, mut not_later) = (wall, 0, 0);
         for _ in 0..LINES_AHEAD {
-            let Some((number, bytes)) = self.read_line().map_err(|source| self.failed(source))? else { break };
-            if let Line::Event(wall, ..) = line::parse(&String::from_utf8_lossy(&bytes), local_time) {
+            let line = match self.lines.peek() {
+                Ok(Some(line)) => line,
+                Ok(None) => break,
+                Err(source) => return Err(self.failed(source)),
+            };
+            if let Line::Event(wall, ..) = parser.line(text_of(line).trim()) {
                 steps += 1;
                 not_later += u32::from(wall <= last);
                 last = wall;
             }
-            self.ahead.push_back((number, bytes));
         }
         if not_later > 0 && not_later * 10 >= steps {
             return Err(self.wrong(Some(first), RecordingError::Intervals));
@@ -307,28 +351,58 @@ impl Replay {
         Ok(())
     }
 
-    fn not_a_recording(&self) -> BusError {
-        let error = match FileFormat::of(&self.start) {
-            Some(format) => RecordingError::OtherFormat(format),
-            None if self.number == 0 || self.skipped.is_none() && self.start.trim_ascii().is_empty() => {
-                RecordingError::Empty
+    /// The last line was read.
+    fn end(&mut self) -> Result<(), BusError> {
+        self.state = State::AtEnd;
+        if !self.is_recording {
+            return Err(self.not_a_recording());
+        }
+        if self.lines.is_cut && self.cut_off.is_none() {
+            self.cut_off = Some(self.lines.count() + 1);
+        }
+        match &self.channel {
+            Some(chosen) if !self.channels.contains(chosen) => {
+                let channels = self.channels.iter().filter(|name| !name.is_empty()).cloned().collect();
+                Err(self.wrong(None, RecordingError::NoChannel { chosen: chosen.clone(), channels }))
             }
-            None => RecordingError::NotALog,
+            _ => Ok(()),
+        }
+    }
+
+    fn not_a_recording(&self) -> BusError {
+        let error = match &self.format {
+            _ if self.lines.is_cut => RecordingError::CutOff,
+            Some((format, _)) => RecordingError::NoFrames(*format),
+            None if self.skipped.is_none() => RecordingError::Empty,
+            None => RecordingError::UnknownFormat,
         };
         self.wrong(None, error)
     }
 }
 
+/// A line as text, without the escape sequences of `candump -c`.
+fn text_of(bytes: &[u8]) -> Cow<'_, str> {
+    let text = String::from_utf8_lossy(bytes);
+    if !text.contains('\x1b') {
+        return text;
+    }
+    let mut parts = text.split('\x1b');
+    let mut plain = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        plain.push_str(part.split_once('m').map_or(part, |(_, rest)| rest));
+    }
+    Cow::Owned(plain)
+}
+
 impl Drop for Replay {
     fn drop(&mut self) {
-        if !self.is_recording {
-            return;
-        }
+        let Some((format, _)) = self.format.as_ref().filter(|_| self.is_recording) else { return };
+        let format = *format;
         if self.has_no_date {
             (self.report)(&ReplayNote::NoDate);
         }
         if let Some((count, first)) = self.skipped {
-            (self.report)(&ReplayNote::Skipped { count, first });
+            (self.report)(&ReplayNote::Skipped { format, count, first });
         }
         if let Some(line) = self.cut_off {
             (self.report)(&ReplayNote::CutOff(line));
@@ -339,32 +413,11 @@ impl Drop for Replay {
     }
 }
 
-/// A date and time in the time zone of this machine as seconds since 1970.
-#[cfg(unix)]
-#[expect(unsafe_code, reason = "the standard library knows no time zones")]
-fn local_time([year, month, day, hour, minute, second]: [i32; 6]) -> Option<u64> {
-    // SAFETY: `tm` is a plain C structure for which zero is a valid value in every field.
-    let mut fields: libc::tm = unsafe { std::mem::zeroed() };
-    fields.tm_year = year.checked_sub(1900)?;
-    fields.tm_mon = month.checked_sub(1)?;
-    (fields.tm_mday, fields.tm_hour, fields.tm_min, fields.tm_sec) = (day, hour, minute, second);
-    fields.tm_isdst = -1;
-    // SAFETY: `mktime` reads and writes only the structure that it is given.
-    let seconds = unsafe { libc::mktime(&raw mut fields) };
-    u64::try_from(seconds).ok()
-}
-
-/// Time zones are unknown on this system.
-#[cfg(not(unix))]
-fn local_time(_: [i32; 6]) -> Option<u64> {
-    None
-}
-
 impl BitRateControl for Replay {}
 
 impl Bus for Replay {
     fn name(&self) -> &str {
-        if self.interface.is_empty() { &self.file } else { &self.interface }
+        self.channel.as_ref().or(self.channels.first()).filter(|name| !name.is_empty()).unwrap_or(&self.file)
     }
 
     fn timestamps(&self) -> TimestampSource {
@@ -395,6 +448,12 @@ impl Bus for Replay {
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
         self.fetch()?;
+        let due = self.next.as_ref().map_or(Mono::START, |(at, _)| at.mono).min(deadline);
+        if let Some((start, sleeper)) = &mut self.pace
+            && sleeper.sleep(due.since_start().saturating_sub(start.elapsed()))
+        {
+            return Ok(Event::Interrupted);
+        }
         if let Some((at, event)) = self.next.take_if(|(at, _)| at.mono <= deadline) {
             self.now = self.now.max(at.mono);
             self.delivered = at;

@@ -184,7 +184,7 @@ pub enum BusSpec {
     SocketCan(String),
     /// The simulated bus, with the text after `sim:`.
     Sim(Option<String>),
-    /// A candump log.
+    /// A recording: `FILE`, `FILE:CHANNEL`, or `-`.
     Replay(String),
 }
 

@@ -92,8 +92,9 @@ pub struct Cli {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
-    /// Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default:
-    /// the only CAN interface that is up]
+    /// Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK
+    /// TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that
+    /// is up]
     #[arg(short, long, global = true, env = "CANGAUGE_BUS", value_name = "BUS")]
     pub(crate) bus: Option<BusSpec>,
 
@@ -127,7 +128,16 @@ pub struct Global {
     #[arg(short, long, global = true, value_name = "FORM", default_value = "text")]
     pub(crate) format: Format,
 
-    /// Write every frame sent and received to FILE in candump -L format; - for stderr
+    /// Wait up to DUR if the CAN interface is missing or down
+    #[arg(long, global = true, value_name = "DUR")]
+    pub(crate) wait: Option<Duration>,
+
+    /// Play a recording (replay:) in real time
+    #[arg(long, global = true)]
+    pub(crate) pace: bool,
+
+    /// Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for
+    /// stderr
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) trace: Option<PathBuf>,
 

@@ -9,6 +9,7 @@ use crate::bus::claim::{Claim, ClaimError, Claims, IfHeld, Part};
 use crate::bus::interrupt::Interrupts;
 use crate::bus::memory::MemoryBus;
 use crate::bus::replay::{Replay, ReplayNote};
+use crate::bus::time::format_duration;
 use crate::bus::trace::Traced;
 use crate::bus::{Bus, BusError};
 use crate::canopen::id::NodeId;
@@ -23,6 +24,9 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 use std::time::Duration;
+
+/// The time between two attempts to open an interface.
+const WAIT_INTERVAL: Duration = Duration::from_millis(200);
 
 /// The longest wait for another program that uses the same nodes.
 const CLAIM_TIMEOUT: Duration = Duration::from_secs(10);
@@ -59,18 +63,13 @@ pub(super) fn claim(global: &Global, spec: &BusSpec) -> Result<Claims, Failure> 
 /// Opens this bus. With `even_down`, also an interface that is down.
 pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyhow::Result<Box<dyn Bus>> {
     let channels = channels(global)?;
+    if global.pace && !matches!(spec, BusSpec::Replay(_)) {
+        return Err(ErrorMessage::usage("--pace plays a recording: -b replay:FILE").into());
+    }
     let bus: Box<dyn Bus> = match spec {
         BusSpec::Sim(bench) => Box::new(simulated(bench.as_deref())?),
-        BusSpec::Replay(file) => {
-            let (console, name) = (global.console(), file.clone());
-            let report = move |note: &ReplayNote| match output::replay::note(&name, note) {
-                (text, true) => console.warn(&text),
-                (text, false) => console.note(&text),
-            };
-            let what = || format!("replay {file}");
-            Box::new(Replay::open(file, Box::new(report)).map_err(|source| FileError { what: what(), source })?)
-        }
-        BusSpec::SocketCan(name) => socketcan(name, even_down)?,
+        BusSpec::Replay(spec) => Box::new(recording(global, spec)?),
+        BusSpec::SocketCan(name) => within(global, || socketcan(name, even_down))?,
     };
     // After the bus: without one, an existing trace keeps its content. Nothing was sent yet.
     let bus: Box<dyn Bus> = match &global.trace {
@@ -111,8 +110,53 @@ fn trace_output(path: &Path) -> anyhow::Result<(Box<dyn Write>, String)> {
 }
 
 fn simulated(spec: Option<&str>) -> anyhow::Result<MemoryBus> {
-    let interrupts = Interrupts::new().map_err(|source| FileError { what: "watch for Ctrl-C".to_owned(), source })?;
+    let interrupts = interrupts()?;
     Ok(bench(spec.unwrap_or_default())?.open().map_err(bench_error)?.with_sleeper(Box::new(interrupts)))
+}
+
+fn interrupts() -> Result<Interrupts, FileError> {
+    Interrupts::new().map_err(|source| FileError { what: "watch for Ctrl-C".to_owned(), source })
+}
+
+/// Opens a recording: `FILE`, `FILE:CHANNEL`, or `-`.
+fn recording(global: &Global, spec: &str) -> anyhow::Result<Replay> {
+    let is_file = |name: &str| name == "-" || Path::new(name).exists();
+    // A file may have a colon in its name.
+    let chosen = spec.rsplit_once(':').filter(|(file, channel)| !is_file(spec) && is_file(file) && !channel.is_empty());
+    let (file, channel) = chosen.map_or((spec, None), |(file, channel)| (file, Some(channel)));
+    let (console, name) = (global.console(), file.to_owned());
+    let report = move |note: &ReplayNote| match output::replay::note(&name, note) {
+        (text, true) => console.warn(&text),
+        (text, false) => console.note(&text),
+    };
+    let failed = |source| FileError { what: format!("replay {file}"), source };
+    let mut bus = Replay::open(file, Box::new(report)).map_err(failed)?;
+    if let Some(channel) = channel {
+        bus = bus.of_channel(channel);
+    }
+    Ok(if global.pace { bus.in_real_time(Box::new(interrupts()?)) } else { bus })
+}
+
+/// Opens an interface, and waits as long as `--wait` allows if it is missing or down.
+fn within<T>(global: &Global, mut open: impl FnMut() -> Result<T, BusError>) -> anyhow::Result<T> {
+    let mut left = global.wait.map_or(Duration::ZERO, |wait| wait.0);
+    let mut interrupts = None;
+    loop {
+        match open() {
+            Err(error @ (BusError::NoInterface(_) | BusError::Down(_))) if !left.is_zero() => {
+                if interrupts.is_none() {
+                    global.console().note(&format!("{error}; waiting up to {}", format_duration(left)));
+                    interrupts = Some(self::interrupts()?);
+                }
+                let pause = left.min(WAIT_INTERVAL);
+                if interrupts.as_mut().is_some_and(|interrupts| interrupts.wait_for(pause)) {
+                    return Err(Failure::from(Error::Interrupted).into());
+                }
+                left -= pause;
+            }
+            opened => return Ok(opened.or_fail()?),
+        }
+    }
 }
 
 /// Reads a bench.
@@ -129,16 +173,15 @@ pub(super) fn bench_error(error: BenchError) -> anyhow::Error {
 }
 
 #[cfg(target_os = "linux")]
-fn socketcan(name: &str, even_down: bool) -> Result<Box<dyn Bus>, Failure> {
+fn socketcan(name: &str, even_down: bool) -> Result<Box<dyn Bus>, BusError> {
     use crate::bus::socketcan::SocketCan;
     let open = if even_down { SocketCan::open_even_down } else { SocketCan::open };
-    Ok(Box::new(open(name).or_fail()?))
+    Ok(Box::new(open(name)?))
 }
 
 #[cfg(not(target_os = "linux"))]
-fn socketcan(name: &str, _: bool) -> Result<Box<dyn Bus>, Failure> {
-    let error = BusError::Unsupported(format!("{name}: this system has no SocketCAN"));
-    Err(error).or_fail()
+fn socketcan(name: &str, _: bool) -> Result<Box<dyn Bus>, BusError> {
+    Err(BusError::Unsupported(format!("{name}: this system has no SocketCAN")))
 }
 
 #[cfg(target_os = "linux")]
@@ -194,4 +237,29 @@ pub(super) fn nodes(master: &mut Master<'_>, global: &Global, nodes: &Nodes) -> 
 pub(super) fn all(master: &mut Master<'_>, global: &Global) -> anyhow::Result<Vec<NodeId>> {
     let timing = global.timing(super::scan::SCAN_TIMEOUT);
     Ok(targets::all(master, timing.timeout, 1 + timing.retries).or_fail()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::Cli;
+    use clap::Parser;
+
+    #[test]
+    fn wait_ends_when_the_interface_is_up_or_the_time_is_over() {
+        let global = Cli::parse_from(["cangauge", "-q", "--wait", "250ms", "scan"]).global;
+        let mut attempts = 0;
+        let mut up_at = |attempt, error: fn(String) -> BusError| {
+            attempts = 0;
+            let opened = within(&global, || {
+                attempts += 1;
+                if attempts == attempt { Ok(()) } else { Err(error("can0".to_owned())) }
+            });
+            (opened.is_ok(), attempts)
+        };
+        assert_eq!(up_at(2, BusError::Down), (true, 2));
+        assert_eq!(up_at(2, BusError::NoInterface), (true, 2));
+        assert_eq!(up_at(9, BusError::Down), (false, 3), "at once, after 200 ms and after 250 ms");
+        assert_eq!(up_at(2, BusError::NotCan), (false, 1));
+    }
 }

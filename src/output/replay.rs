@@ -6,11 +6,12 @@ use crate::bus::time::format_duration;
 /// A note as text, and whether it is a warning.
 pub fn note(file: &str, note: &ReplayNote) -> (String, bool) {
     match note {
-        ReplayNote::Skipped { count: 1, first } => {
-            (format!("{file}: 1 line skipped: line {first} is not a line of a candump log"), true)
+        ReplayNote::Skipped { format, count: 1, first } => {
+            (format!("{file}: 1 line skipped: line {first} is not a line of {}", format.name()), true)
         }
-        ReplayNote::Skipped { count, first } => {
-            (format!("{file}: {count} lines skipped, line {first} first: they are not lines of a candump log"), true)
+        ReplayNote::Skipped { format, count, first } => {
+            let what = format!("they are not lines of {}", format.name());
+            (format!("{file}: {count} lines skipped, line {first} first: {what}"), true)
         }
         ReplayNote::CutOff(line) => {
             (format!("{file}: the file ends in the middle of line {line}, which was skipped"), true)

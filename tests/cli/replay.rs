@@ -95,7 +95,7 @@ fn commands_that_send_are_refused() {
     assert_eq!(
         done.stderr,
         "cangauge: the recording t.log can only receive\n\
-         hint: commands that only listen work on it: log, scan --passive, nmt watch\n"
+         hint: commands that only listen work on it: log, check, pdo watch, scan --passive, nmt watch\n"
     );
     replay(&bench, "t.log", "log 1 --sync 10ms")
         .refuses("a recording (replay:) is receive-only: --sync and --poll send");
@@ -221,17 +221,18 @@ fn files_that_are_no_recordings_are_named() {
     let bench = Bench::of("mh4@1");
     for (text, message) in [
         ("", "replay t.log: the file is empty"),
-        ("nonsense\n", "replay t.log: not a candump log"),
-        ("date Mon Jan 1 10:00:00 2024\n", "replay t.log: this is a Vector ASC file"),
-        (";$FILEVERSION=1.1\n", "replay t.log: this is a PEAK TRC file"),
+        ("nonsense\n", "replay t.log: not a recording in a known format"),
+        ("date Mon Jan 1 10:00:00 2024\n", "replay t.log: this is a Vector ASC file without frames"),
+        (";$FILEVERSION=1.1\n", "replay t.log: this is a PEAK TRC file without frames"),
     ] {
         let done = log_of(&bench, text).exit(8);
         assert!(done.stderr.starts_with(&format!("cangauge: {message}")), "{}", done.stderr);
     }
     for (bytes, hint) in [
         (&b"LOGG\x90\0\0\0"[..], "hint: convert it with python-can: "),
-        (b"UnFinMF 4.10    ", "hint: convert it with python-can: "),
-        (b"\x0a\x0d\x0d\x0a\x1c\0\0\0", "hint: "),
+        (b"UnFinMF 4.10    ", "hint: convert it with python-can (pip install 'python-can[mf4]'): "),
+        (b"SQLite format 3\0", "python3 -m can.logconvert t.log t.candump.log\n"),
+        (b"\x0a\x0d\x0d\x0a\x1c\0\0\0", "hint: convert it: tshark -r t.log "),
     ] {
         let done = log_of(&bench, bytes).exit(8);
         assert!(done.stderr.contains(hint) && done.stderr.contains("replay t.log: this is a"), "{}", done.stderr);
@@ -309,4 +310,76 @@ fn emergency_is_the_status_until_it_is_over() {
         let words = ["-b", "replay:t.log", "check", "127", "pressure < 1000", "--device", "dps"];
         bench.finish(&mut bench.command(&words)).exit(1);
     }
+}
+
+/// A recording of the test data: the same frames in the formats of several tools.
+fn recorded(name: &str) -> String {
+    format!("{}/tests/data/recordings/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn recordings_of_all_tools_give_the_same_rows() {
+    let bench = Bench::of("mh4@1");
+    let log = |name: &str| {
+        let bus = format!("replay:{}", recorded(name));
+        bench.finish(bench.command(&["--bus", &bus, "log", "5"]).env("TZ", "UTC0")).exit(0).stdout
+    };
+    let expected = log("candump.log");
+    assert_eq!(expected.lines().count(), 6, "{expected}");
+    for name in [
+        "candump.log.gz",
+        "vector-dec-relative.asc",
+        "python-can.asc",
+        "peak-1.1.trc",
+        "peak-2.0.trc",
+        "python-can.trc",
+        "python-can.csv",
+    ] {
+        assert_eq!(log(name), expected, "{name}");
+    }
+}
+
+#[test]
+fn channel_follows_the_file() {
+    let bench = Bench::of("mh4@1");
+    let two = "(1700000000.0) can0 701#05\n(1700000000.1) can1 702#05\n";
+    fs::write(bench.path("t.log"), two).expect("written");
+    fs::write(bench.path("a:b.log"), two.replace("can1", "can0")).expect("written");
+    let nodes = |file: &str, count| {
+        let done = replay(&bench, file, "scan --passive --format json").exit(0);
+        assert_eq!(done.json().len(), count, "{done:?}");
+        done.json()[0]["node"].as_u64()
+    };
+    assert_eq!(nodes("t.log:can0", 1), Some(1));
+    assert_eq!(nodes("t.log:can1", 1), Some(2));
+    assert_eq!(nodes("a:b.log", 2), Some(1));
+    let done = replay(&bench, "t.log", "scan --passive").exit(8);
+    assert_eq!(
+        done.stderr,
+        "cangauge: replay t.log:2: frames of can0 and of can1: choose one of them\n\
+         hint: choose one: -b replay:t.log:can0\n"
+    );
+    let done = replay(&bench, "t.log:can7", "scan --passive").exit(8);
+    assert!(done.stderr.contains("no frames of channel can7 (found: can0, can1)"), "{}", done.stderr);
+    bench.run("scan --pace").refuses("--pace plays a recording: -b replay:FILE");
+}
+
+#[test]
+fn pdo_watch_and_check_read_the_mapping_from_the_recording() {
+    let bench = Bench::of("mh4@1");
+    fs::write(bench.path("t.log"), recording(log_form)).expect("written");
+    for nodes in ["5", "all"] {
+        let done = replay(&bench, "t.log", &format!("pdo watch {nodes} --format json")).exit(0);
+        let values: Vec<_> = done.json().iter().map(|row| row["values"][0]["value"].as_f64()).collect();
+        assert_eq!(values, [1.25, 1.5, 1.75, 2.0, 2.25].map(Some), "{done:?}");
+    }
+    let words = |nodes, expression| ["-b", "replay:t.log", "check", nodes, expression];
+    bench.finish(&mut bench.command(&words("5", "ch1 < 3 bar"))).exit(0);
+    bench.finish(&mut bench.command(&words("5", "ch1 < 2 bar"))).exit(1);
+    let values: String = recording(log_form).lines().skip(13).map(|line| format!("{line}\n")).collect();
+    fs::write(bench.path("t.log"), values).expect("written");
+    let done = replay(&bench, "t.log", "pdo watch 5").exit(2);
+    assert!(done.stderr.contains("node 5: it sends TPDOs, and their mapping is unknown"), "{}", done.stderr);
+    fs::write(bench.path("t.log"), "(1700000000.0) can0 705#05\n").expect("written");
+    assert_eq!(replay(&bench, "t.log", "pdo watch 5").exit(3).stderr, "cangauge: no TPDO was received\n");
 }

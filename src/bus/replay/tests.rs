@@ -3,29 +3,47 @@
 use super::*;
 use std::cell::RefCell;
 use std::rc::Rc;
+use std::sync::{Arc, Mutex};
 
 const START: Mono = Mono::START;
 
+/// The events of a text in one format: milliseconds, channel and frame.
+pub(super) fn lines(parser: &mut dyn Parser, text: &str) -> Vec<String> {
+    let event = |line: &str| match parser.line(line.trim()) {
+        Line::Event(wall, channel, event) => {
+            let event = event.map_or_else(|fault| format!("{fault:?}"), |frame| frame.to_string());
+            Some(format!("{} {channel} {event}", wall.since_epoch().as_millis()))
+        }
+        Line::Ignored => None,
+        line => Some(format!("{line:?}")),
+    };
+    text.lines().filter_map(event).collect()
+}
+
+fn replay_of(bytes: &'static [u8], report: Report) -> Replay {
+    Replay::new("x.log", Lines::new(Box::new(bytes)).expect("readable"), report)
+}
+
 fn replay(text: &'static str) -> Replay {
-    Replay::new("x.log", Box::new(text.as_bytes()), Box::new(|_| {}))
+    replay_of(text.as_bytes(), Box::new(|_| {}))
 }
 
 /// The notes about a recording that is replayed to its end.
 fn notes(text: &'static str) -> Vec<ReplayNote> {
     let notes = Rc::new(RefCell::new(Vec::new()));
     let sink = Rc::clone(&notes);
-    let mut bus = Replay::new(
-        "x.log",
-        Box::new(text.as_bytes()),
-        Box::new(move |note: &ReplayNote| sink.borrow_mut().push(note.clone())),
-    );
+    let report = move |note: &ReplayNote| sink.borrow_mut().push(note.clone());
+    let mut bus = replay_of(text.as_bytes(), Box::new(report));
     while let Ok(Event::Frame(_)) = bus.receive(START + Duration::from_secs(3600)) {}
     drop(bus);
     notes.take()
 }
 
 fn all(text: &'static str) -> Vec<String> {
-    let mut bus = replay(text);
+    events(replay(text))
+}
+
+fn events(mut bus: Replay) -> Vec<String> {
     let mut seen = Vec::new();
     for _ in 0..20 {
         let event = bus.receive(START + Duration::from_secs(3600));
@@ -75,7 +93,10 @@ fn a_truncated_last_line_is_skipped_and_reported() {
 fn broken_lines_are_skipped_and_counted() {
     let text = "(1.5) can0 181#01\n(2.0) c\n  can0  181   [1]  01\n\u{fffd}\n(3.0) can0 181#02\n";
     assert_eq!(all(text), ["0 181#01", "1500000 181#02", "end"]);
-    assert_eq!(notes(text), [ReplayNote::NoDate, ReplayNote::Skipped { count: 3, first: 2 }]);
+    assert_eq!(
+        notes(text),
+        [ReplayNote::NoDate, ReplayNote::Skipped { format: RecordingFormat::Candump, count: 3, first: 2 }]
+    );
     assert_eq!(notes("(1700000000.1) c 181#01\n"), []);
 }
 
@@ -100,26 +121,78 @@ fn byte_order_mark_comments_and_other_line_ends() {
 
 #[test]
 fn files_that_are_no_recordings_are_named() {
+    let unknown = "not a recording in a known format (candump, Vector ASC, PEAK TRC, CSV of python-can)";
     for (text, message) in [
         ("", "the file is empty"),
         (" \n\n", "the file is empty"),
-        ("nonsense\nmore\n", "not a candump log: no line has a time, an interface and a frame"),
-        ("(1.5) can0 181\n", "not a candump log: no line has a time, an interface and a frame"),
-        (
-            "date Mon Jan 1 10:00:00 2024\nbase hex  timestamps absolute\n",
-            "this is a Vector ASC file, not a candump log",
-        ),
-        (";$FILEVERSION=2.1\n;\n", "this is a PEAK TRC file, not a candump log"),
-        ("timestamp,arbitration_id,extended\n", "this is a CSV file of python-can, not a candump log"),
-        ("time,elapsed_s,node,signal,value,unit,status,raw\n", "this is a CSV file of measurements, not a candump log"),
-        ("; exported\n;$FILEVERSION=1.1\n;\n", "this is a PEAK TRC file, not a candump log"),
-        ("LOGG\x01\x02", "this is a Vector BLF file, not a candump log"),
-        ("\n\r\r\n\x1c\0\0\0", "this is a Wireshark capture, not a candump log"),
-        ("UnFinMF 4.10", "this is an MDF file, not a candump log"),
+        ("# a comment\n", "the file is empty"),
+        ("nonsense\nmore\n", unknown),
+        ("\x7fELF\x02\x01\x01\0\0\0", unknown),
+        ("(1.5) can0 181\n", "this is a candump log without frames"),
+        ("date Mon Jan 1 10:00:00 2024\nbase hex  timestamps absolute\n", "this is a Vector ASC file without frames"),
+        (";$FILEVERSION=2.1\n;\n", "this is a PEAK TRC file without frames"),
+        ("; exported\n;$FILEVERSION=1.1\n;\n", "this is a PEAK TRC file without frames"),
+        ("timestamp,arbitration_id,extended\n", "this is a CSV file of python-can without frames"),
     ] {
         assert_eq!(all(text), [format!("replay x.log: {message}")], "{text}");
     }
-    assert_eq!(FileFormat::of(b"\x1f\x8b\x08"), Some(FileFormat::Gzip));
+    for (text, name) in [
+        ("time,elapsed_s,node,signal,value,unit,status,raw\n", "a CSV file of measurements"),
+        ("Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n", "a CSV file of SavvyCAN"),
+        ("<?xml version=\"1.0\"?>\n", "an XML file"),
+        ("LOGG\x01\x02", "a Vector BLF file"),
+        ("\n\r\r\n\x1c\0\0\0", "a Wireshark capture"),
+        ("UnFinMF 4.10", "an MDF file"),
+        ("SQLite format 3\0 ", "an SQLite database"),
+        ("PK\x03\x04", "a zip archive"),
+        ("BZh91AY", "a bzip2 file"),
+    ] {
+        let expected = format!("replay x.log: this is {name}, which cannot be replayed");
+        assert_eq!(all(text), [expected], "{text}");
+    }
+}
+
+/// Two frames, 250 ms apart, in every format.
+const FORMS: [&str; 6] = [
+    "(1700000000.000000) 1 181#01\n(1700000000.250000) 1 01890ABC#\n",
+    "date Tue Nov 14 2023 10:00:00\nbase hex timestamps absolute\n0.0 1 181 Rx d 1 01\n0.25 1 1890ABCx Tx d 0\n",
+    "0.5 1 181 Rx d 1 01\n0.75 1 1890ABCx Tx d 0\n",
+    ";$FILEVERSION=1.1\n;$STARTTIME=45244.5\n1) 0.0 Rx 0181 1 01\n2) 250.0 Rx 01890ABC 0\n",
+    "1) 0 0181 1 01\n2) 250 01890ABC 0\n",
+    "timestamp,arbitration_id,extended,remote,error,dlc,data\n1.7e9,0x181,0,0,0,1,AQ==\n1700000000.25,0x1890abc,1,0,0,0,\n",
+];
+
+#[test]
+fn all_formats_alike() {
+    let expected = ["0 181#01", "250000 01890ABC#", "end"];
+    let packed = |text: &str| {
+        let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        io::Write::write_all(&mut packed, text.as_bytes()).expect("packed");
+        packed.finish().expect("packed")
+    };
+    let leak = |bytes: Vec<u8>| replay_of(bytes.leak(), Box::new(|_| {}));
+    for text in FORMS {
+        let broken = text.replacen('\n', "\n\u{1}broken\n# comment\n\n", text.matches('\n').count() - 1);
+        for text in [text.to_owned(), text.replace('\n', "\r\n"), format!("\u{feff}{text}"), broken] {
+            assert_eq!(events(leak(packed(&text))), expected, "packed {text}");
+            assert_eq!(events(leak(text.clone().into_bytes())), expected, "{text}");
+        }
+        // Cut off anywhere: fewer frames, never others. Only a log of candump does not show that data is missing.
+        for length in 0..text.len() {
+            let mut seen = all(&text[..length]);
+            let end = seen.pop();
+            assert!(end.is_some_and(|end| end == "end" || end.starts_with("replay")), "{text}");
+            assert!(seen.iter().zip(expected).all(|(seen, frame)| frame.starts_with(seen.as_str())), "{seen:?}");
+        }
+        let packed = packed(&text.repeat(50));
+        for length in [packed.len() - 1, packed.len() - 9, 20, 10, 3] {
+            let seen = events(leak(packed[..length].to_vec()));
+            assert!(
+                seen.last().is_some_and(|end| end == "end" || end.contains("cut off")) || seen.len() == 20,
+                "{seen:?}"
+            );
+        }
+    }
 }
 
 #[test]
@@ -144,9 +217,38 @@ fn intervals_are_no_times() {
 }
 
 #[test]
-fn two_interfaces_are_an_error() {
-    let seen = all("(1.5) can0 181#01\n(1.6) can1 181#02\n");
-    assert_eq!(seen[1], "replay x.log:2: frames of can1 and of can0: select one interface (grep)");
+fn channel_is_chosen() {
+    let channel = |text, channel: &str| events(replay(text).of_channel(channel));
+    for (text, [one, two]) in [
+        ("(1.5) can0 181#01\n(1.6) can1 181#02\n", ["can0", "can1"]),
+        ("0.5 1 181 Rx d 1 01\n0.6 2 181 Rx d 1 02\n", ["1", "2"]),
+        (";$COLUMNS=N,O,T,B,I,d,R,L,D\n1 0.0 DT 1 0181 Rx - 1 01\n2 100.0 DT 2 0181 Rx - 1 02\n", ["1", "2"]),
+    ] {
+        assert_eq!(channel(text, one), ["0 181#01", "end"]);
+        assert_eq!(channel(text, two), ["100000 181#02", "end"]);
+        let line = text.lines().count();
+        let several = format!("replay x.log:{line}: frames of {one} and of {two}: choose one of them");
+        assert_eq!(all(text)[1], several);
+        assert_eq!(channel(text, "can7"), [format!("replay x.log: no frames of channel can7 (found: {one}, {two})")]);
+    }
+    let none = "replay x.log: no frames of channel can0 (the file names no channels)";
+    assert_eq!(channel(FORMS[5], "can0"), [none]);
+}
+
+#[test]
+fn real_time_waits_for_each_event() {
+    struct Log(Arc<Mutex<Vec<Duration>>>);
+    impl Sleeper for Log {
+        fn sleep(&mut self, length: Duration) -> bool {
+            self.0.lock().expect("no panic").push(length);
+            false
+        }
+    }
+    let slept = Arc::default();
+    let bus = replay("(1.0) c 181#01\n(61.0) c 181#02\n").in_real_time(Box::new(Log(Arc::clone(&slept))));
+    assert_eq!(events(bus).len(), 3);
+    let minutes: Vec<u64> = slept.lock().expect("no panic").iter().map(|it| it.as_secs().div_ceil(60)).collect();
+    assert_eq!(minutes[..2], [0, 1]);
 }
 
 #[test]

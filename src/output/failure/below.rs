@@ -29,7 +29,10 @@ pub(super) fn bus(error: &BusError) -> Words {
         BusError::NoInterface(_) | BusError::NotCan(_) => {
             words.hint("list the interfaces: cangauge bus list; without hardware: --bus sim")
         }
-        BusError::ReceiveOnly(_) => words.hint("commands that only listen work on it: log, scan --passive, nmt watch"),
+        BusError::ReceiveOnly(_) => words.hint(
+            "commands that only listen work on it: log, check, pdo watch, scan --passive, nmt \
+             watch",
+        ),
         BusError::InUse(_) => words.hint("wait until it ends, or stop it; to ignore it, add --ignore-lock"),
         BusError::Recording { file, error, .. } => match recording_hint(file, error) {
             Some(hint) => words.hint(hint),
@@ -44,27 +47,42 @@ pub(super) fn bus(error: &BusError) -> Words {
 fn recording_hint(file: &str, error: &RecordingError) -> Option<String> {
     let converted = Path::new(file).with_extension("candump.log");
     let converted = converted.display();
+    let channel =
+        |name: &str| format!("choose one: -b replay:{}:{name}", if file == "standard input" { "-" } else { file });
     Some(match error {
-        RecordingError::Empty => return None,
-        RecordingError::NotALog | RecordingError::SeveralInterfaces(..) => "record with: candump -L can0".to_owned(),
+        RecordingError::Empty | RecordingError::NoFrames(_) | RecordingError::CutOff => return None,
+        RecordingError::UnknownFormat => "record with: candump -L can0".to_owned(),
+        RecordingError::SeveralChannels(first, _) => channel(first),
+        RecordingError::NoChannel { channels, .. } => match channels.first() {
+            Some(first) => channel(first),
+            None => format!("leave the channel out: -b replay:{file}"),
+        },
         RecordingError::NoTimes => "record with times: candump -L can0 (or candump -ta can0)".to_owned(),
         RecordingError::Intervals => "record with absolute times: candump -L can0".to_owned(),
         RecordingError::OtherFormat(format) => match format {
-            FileFormat::Gzip => format!("zcat {file} | cangauge -b replay:- ..."),
+            FileFormat::Gzip => format!("unpack it: zcat {file} | cangauge -b replay:- ..."),
+            FileFormat::Xz => format!("unpack it: xzcat {file} | cangauge -b replay:- ..."),
+            FileFormat::Bzip2 => format!("unpack it: bzcat {file} | cangauge -b replay:- ..."),
+            FileFormat::Zstd => format!("unpack it: zstdcat {file} | cangauge -b replay:- ..."),
+            FileFormat::Zip => format!("unpack it: unzip -p {file} | cangauge -b replay:- ..."),
             FileFormat::Utf16 => format!("convert it: iconv -f UTF-16 -t UTF-8 {file} > {converted}"),
-            FileFormat::Blf
-            | FileFormat::Mdf
-            | FileFormat::Sqlite
-            | FileFormat::Asc
-            | FileFormat::Trc
-            | FileFormat::PythonCanCsv => {
+            FileFormat::Blf | FileFormat::Sqlite => {
                 format!("convert it with python-can: python3 -m can.logconvert {file} {converted}")
             }
+            FileFormat::Mdf => format!(
+                "convert it with python-can (pip install 'python-can[mf4]'): python3 -m can.logconvert {file} \
+                 {converted}"
+            ),
+            FileFormat::Pcap => format!(
+                "convert it: tshark -r {file} -Y 'can.flags.xtd==0 && can.flags.rtr==0' -T fields -E separator=, -e \
+                 frame.time_epoch -e can.id -e data | while IFS=, read t i d; do printf \"($t) can0 %03X#$d\\n\" $i; \
+                 done > {converted}"
+            ),
             FileFormat::SavvyCanCsv => "save it from SavvyCAN as a candump log".to_owned(),
             FileFormat::Measurements => {
                 "replay needs the frames: record them with --trace FILE or candump -L".to_owned()
             }
-            FileFormat::Pcap | FileFormat::Xml => "record with: candump -L can0".to_owned(),
+            FileFormat::Xml => "record with: candump -L can0".to_owned(),
         },
     })
 }
