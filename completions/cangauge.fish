@@ -1,6 +1,6 @@
 # Print an optspec for argparse to handle cmd's options that are independent of any subcommand.
 function __fish_cangauge_global_optspecs
-    string join \n b/bus= t/timeout= retries= device= eds= sdo= accept-mismatch f/format= trace= ignore-lock q/quiet v/verbose progress= color= h/help V/version
+    string join \n b/bus= t/timeout= retries= device= eds= sdo= accept-mismatch f/format= wait= pace trace= ignore-lock q/quiet v/verbose progress= color= h/help V/version
 end
 
 function __fish_cangauge_needs_command
@@ -24,7 +24,7 @@ function __fish_cangauge_using_subcommand
     contains -- $cmd[1] $argv
 end
 
-complete -c cangauge -n "__fish_cangauge_needs_command" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_needs_command" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -33,7 +33,8 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -l sdo -d 'The COB-IDs o
 complete -c cangauge -n "__fish_cangauge_needs_command" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_needs_command" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_needs_command" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_needs_command" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_needs_command" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -41,6 +42,7 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -l color -d 'Use colour 
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_needs_command" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_needs_command" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_needs_command" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_needs_command" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_needs_command" -s v -l verbose -d 'Print more on stderr'
@@ -70,10 +72,11 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "store" -d 'Save s
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "restore" -d 'Restore factory defaults (1011h); node-ID and bit rate stay'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "objects" -d 'Show what a description or an EDS states about a device\'s objects'
+complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "export" -d 'Describe the TPDOs of nodes for other programs'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "devices" -d 'List device descriptions; show one as TOML, check a file, or describe a new device'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "completions" -d 'Print the completion script for a shell'
 complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -82,7 +85,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l sdo -d 'The C
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -91,12 +95,13 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l passive -d 'Send nothing: list the nodes that send something within 3 s (or --timeout)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -105,7 +110,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l sdo -d 'The COB
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -114,13 +120,14 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l passive -d 'Send nothing: list the nodes that send something within 3 s (or --timeout)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l in -d 'Convert to this unit: bar, mbar, kPa, MPa, psi, degC, degF, K' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -129,7 +136,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l sdo -d 'The C
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -137,12 +145,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l color -d 'Use
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -151,7 +160,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -159,6 +169,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s v -l verbose -d 'Print more on stderr'
@@ -173,7 +184,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "watch" -d 'Follow heartbeats, boot-ups and losses until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "startup" -d 'Show or set the start after power-on: wait (for the master) or auto (the device starts itself)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -182,7 +193,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -190,6 +202,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s v -l verbose -d 'Print more on stderr'
@@ -197,7 +210,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l no-wait -d 'Send the command without confirmation'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -206,7 +219,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -214,6 +228,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s v -l verbose -d 'Print more on stderr'
@@ -221,7 +236,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l no-wait -d 'Send the command without confirmation'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -230,7 +245,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -238,6 +254,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s v -l verbose -d 'Print more on stderr'
@@ -245,7 +262,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l no-wait -d 'Send the command without confirmation'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -254,7 +271,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -262,6 +280,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s v -l verbose -d 'Print more on stderr'
@@ -269,7 +288,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l no-wait -d 'Send the command without confirmation'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -278,7 +297,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -286,6 +306,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s v -l verbose -d 'Print more on stderr'
@@ -293,7 +314,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l no-wait -d 'Send the command without confirmation'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -302,7 +323,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -310,13 +332,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l probe -d 'If the state is unknown, switch the heartbeat on for a moment (1017h)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -325,7 +348,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -334,12 +358,13 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s d -l duration -d 'End after this time' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -348,7 +373,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -356,6 +382,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s v -l verbose -d 'Print more on stderr'
@@ -370,7 +397,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "watch" -d 'Follow heartbeats, boot-ups and losses until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "startup" -d 'Show or set the start after power-on: wait (for the master) or auto (the device starts itself)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -379,7 +406,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -387,6 +415,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s v -l verbose -d 'Print more on stderr'
@@ -395,7 +424,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -f -a "read" -d 'Read objects and print their unscaled values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -f -a "write" -d 'Write an object, or several OBJECT=VALUE'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -404,7 +433,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -417,6 +447,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 never\t'Never'
 auto\t'For long objects'"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s v -l verbose -d 'Print more on stderr'
@@ -425,7 +456,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l force -d 'Overwrite the file'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -434,7 +465,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -450,6 +482,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 never\t'Never'
 auto\t'For long objects'"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s v -l verbose -d 'Print more on stderr'
@@ -476,7 +509,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l decimal -d 'De
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l time -d 'Format of times: text (RFC 3339), seconds since 1970, or days as in spreadsheets; all UTC' -r -f -a "rfc3339\t''
 unix\t''
 excel\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -485,7 +518,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sdo -d 'The CO
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -498,6 +532,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l force -d 'Over
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l append -d 'Continue existing files with the same columns. A last line that was cut off is removed'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l bom -d 'Start CSV with a byte order mark, which some spreadsheets need'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s v -l verbose -d 'Print more on stderr'
@@ -507,7 +542,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l for -d 'Chec
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sync -d 'Send SYNC at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l poll -d 'Read by SDO at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l junit -d 'Write the verdicts as JUnit XML for CI servers, one test case per expression and node. An existing file is replaced' -r -F
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -516,7 +551,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sdo -d 'The 
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -524,12 +560,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l color -d 'Us
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -538,7 +575,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -546,6 +584,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s v -l verbose -d 'Print more on stderr'
@@ -560,7 +599,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "store" -d 'Store node-ID and bit rate in non-volatile memory'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "identify" -d 'Check whether devices have an identity in a range. Exit code 3 if none answers'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -569,7 +608,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -577,12 +617,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -591,7 +632,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -599,6 +641,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s v -l verbose -d 'Print more on stderr'
@@ -607,7 +650,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l via -d 'Method: LSS, objects of the device (sdo), or what its description prefers (auto)' -r -f -a "auto\t''
 lss\t''
 sdo\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -616,7 +659,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -626,6 +670,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l no-store -d 'Do not store: a power cycle restores the old values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l force -d 'Accept more than one device for "only": all of them change'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s v -l verbose -d 'Print more on stderr'
@@ -635,7 +680,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l via -d 'Method: LSS, objects of the device (sdo), or what its description prefers (auto)' -r -f -a "auto\t''
 lss\t''
 sdo\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -644,7 +689,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -655,6 +701,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l no-store -d 'Do not store: a power cycle restores the old values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l force -d 'Accept more than one device for "only": all of them change'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s v -l verbose -d 'Print more on stderr'
@@ -666,7 +713,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l via -d 'Method: LSS, objects of the device (sdo), or what its description prefers (auto)' -r -f -a "auto\t''
 lss\t''
 sdo\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -675,7 +722,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -686,12 +734,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l no-store -d 'Do not store: a power cycle restores the old values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l force -d 'Accept more than one device for "only": all of them change'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -700,7 +749,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -709,12 +759,13 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l force -d 'Accept more than one device for "only"'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -723,7 +774,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -732,12 +784,13 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l force -d 'Accept more than one device for "only"'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -746,7 +799,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -754,6 +808,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s v -l verbose -d 'Print more on stderr'
@@ -768,7 +823,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "store" -d 'Store node-ID and bit rate in non-volatile memory'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "identify" -d 'Check whether devices have an identity in a range. Exit code 3 if none answers'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -777,7 +832,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l sdo -d 'The C
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -785,12 +841,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l color -d 'Use
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -799,7 +856,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l sdo -d 'The
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -807,12 +865,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l color -d 'U
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -821,7 +880,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l sdo -d 'The C
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -829,6 +889,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l color -d 'Use
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s v -l verbose -d 'Print more on stderr'
@@ -839,7 +900,7 @@ moving\t''
 repeating\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l constant -d 'Filter constant: number of values' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l damping -d 'Time in which the value follows a step; the device calculates the constant' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -848,7 +909,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l sdo -d 'The
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -856,6 +918,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l color -d 'U
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s v -l verbose -d 'Print more on stderr'
@@ -865,7 +928,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l delta -d 'S
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l lower -d 'Lower limit: send if the value falls below it' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l upper -d 'Upper limit: send if the value rises above it' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l hysteresis -d 'Hysteresis before a limit triggers again' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -874,7 +937,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l sdo -d 'The
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -882,12 +946,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l color -d 'U
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -896,7 +961,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l sdo -d 'The
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -905,12 +971,13 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l reset -d 'Reset, and print the previous values'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -919,7 +986,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l sdo -d 'The
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -928,12 +996,13 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l clear -d 'Delete the history; a pending error stays in the register'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -942,7 +1011,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -950,6 +1020,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s v -l verbose -d 'Print more on stderr'
@@ -960,7 +1031,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -f -a "down" -d 'Bring an interface down'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -f -a "detect" -d 'Find the bit rate of a running bus by listening; print it in bit/s'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -969,7 +1040,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -977,12 +1049,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -991,7 +1064,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1000,12 +1074,13 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l listen-only -d 'Listen only: send no frame, no acknowledge and no error flag'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1014,7 +1089,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1022,13 +1098,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l for -d 'Time per bit rate; the default is longer than a heartbeat interval of 1 s' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1037,7 +1114,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1046,6 +1124,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l active -d 'If nothing is received, ask each node-ID for its device type at each bit rate. Only for a bench with one device: at a wrong bit rate this disturbs every frame on the bus'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s v -l verbose -d 'Print more on stderr'
@@ -1056,7 +1135,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from help" -f -a "down" -d 'Bring an interface down'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from help" -f -a "detect" -d 'Find the bit rate of a running bus by listening; print it in bit/s'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1065,7 +1144,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1073,6 +1153,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s v -l verbose -d 'Print more on stderr'
@@ -1082,7 +1163,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -f -a "map" -d 'Set the mapping and the transmission of a TPDO'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -f -a "watch" -d 'Show received TPDOs, decoded, until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1091,7 +1172,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1099,12 +1181,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1113,7 +1196,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1125,13 +1209,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l inhibit -d 'Inhibit time: shortest time between two transmissions, in steps of 100us; 0: none' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l cob-id -d 'CAN identifier, 11 bits: 0x1A5' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l store -d 'Store the change (1010h; only the communication settings if the device can store them separately)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1140,7 +1225,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1149,6 +1235,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s d -l duration -d 'End after this time' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s v -l verbose -d 'Print more on stderr'
@@ -1158,7 +1245,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from help" -f -a "map" -d 'Set the mapping and the transmission of a TPDO'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from help" -f -a "watch" -d 'Show received TPDOs, decoded, until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1167,7 +1254,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1175,6 +1263,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s v -l verbose -d 'Print more on stderr'
@@ -1185,7 +1274,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -f -a "apply" -d 'Set a device from a file: check the file, write the differences, read everything back'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -f -a "schema" -d 'Print the JSON Schema of the file, for editors'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1194,7 +1283,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1202,13 +1292,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l changed -d 'Omit settings that are factory defaults'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1217,7 +1308,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1225,6 +1317,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s v -l verbose -d 'Print more on stderr'
@@ -1232,7 +1325,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l with-calibration -d 'Compare [calibration], too'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1241,7 +1334,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1251,6 +1345,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l table -d 'Set many devices, one row each: vendor, product, serial, node (with --address), and columns that fill in "{column}" in the file. A device that is not in the table is not changed' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l record -d 'Write a record: when, which devices, before, after, how it was verified; HTML if the name ends with .html, else JSON' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s v -l verbose -d 'Print more on stderr'
@@ -1263,7 +1358,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l rollback -d 'Restore the settings from before the last apply that failed or was killed'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1272,7 +1367,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1280,6 +1376,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s v -l verbose -d 'Print more on stderr'
@@ -1293,7 +1390,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l channel -d 'Channel [default: the only one with a zero]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l limit -d 'Largest accepted reading: 0.1 (in the present unit), 100mbar, 2% (of the measuring range) [default: 1%]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l samples -d 'Number of readings before and after, 100 ms apart' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1302,7 +1399,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l sdo -d 'T
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1313,6 +1411,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l force -d 
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l store -d 'Store the offset, with the other application settings'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l dry-run -d 'Measure and check only; change nothing'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s v -l verbose -d 'Print more on stderr'
@@ -1321,7 +1420,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s V -l vers
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l channel -d 'Channel [default: the only one with a zero]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l limit -d 'Largest accepted reading: 0.1 (in the present unit), 100mbar, 2% (of the measuring range) [default: 1%]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l samples -d 'Number of readings before and after, 100 ms apart' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1330,7 +1429,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l sdo -d 'The C
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1341,6 +1441,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l force -d 'Ski
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l store -d 'Store the offset, with the other application settings'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l dry-run -d 'Measure and check only; change nothing'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s v -l verbose -d 'Print more on stderr'
@@ -1349,7 +1450,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s V -l version 
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l group -d 'Settings: all, communication (1000h to 1FFFh), or application (6000h to 9FFFh)' -r -f -a "all\t''
 comm\t''
 app\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1358,7 +1459,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l sdo -d 'The 
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1367,6 +1469,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l verify -d 'Reset the node, read the stored settings again, and compare'
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s v -l verbose -d 'Print more on stderr'
@@ -1375,7 +1478,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s V -l version
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l group -d 'Settings: all, communication (1000h to 1FFFh), or application (6000h to 9FFFh)' -r -f -a "all\t''
 comm\t''
 app\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1384,7 +1487,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l sdo -d 'Th
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1393,12 +1497,13 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l reset -d 'Reset the node, and compare with its description'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1407,7 +1512,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l sdo -d 'The CO
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1415,12 +1521,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l color -d 'Use 
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1429,7 +1536,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l sdo -d 'Th
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1437,12 +1545,65 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l color -d '
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l ignore-lock -d 'Continue although another program uses the same nodes'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s q -l quiet -d 'Print less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s v -l verbose -d 'Print more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s h -l help -d 'Print help'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -f -a "dbc" -d 'Print a DBC of the TPDOs as they are mapped now'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
+json\t''
+csv\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
+always\t''
+never\t''"
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l pace -d 'Play a recording (replay:) in real time'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l ignore-lock -d 'Continue although another program uses the same nodes'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s q -l quiet -d 'Print less on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s v -l verbose -d 'Print more on stderr'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s V -l version -d 'Print version'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from help" -f -a "dbc" -d 'Print a DBC of the TPDOs as they are mapped now'
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1451,7 +1612,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fis
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1459,6 +1621,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fis
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s v -l verbose -d 'Print more on stderr'
@@ -1468,7 +1631,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fis
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "new" -d 'Print a first description of a device, from the device and its EDS (--eds), with comments for what to fill in'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "check" -d 'Report each mistake in a description file with its line'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1477,7 +1640,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1485,12 +1649,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1499,7 +1664,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1507,12 +1673,13 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1521,7 +1688,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1529,6 +1697,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s v -l verbose -d 'Print more on stderr'
@@ -1538,7 +1707,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "new" -d 'Print a first description of a device, from the device and its EDS (--eds), with comments for what to fill in'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "check" -d 'Report each mistake in a description file with its line'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1547,7 +1716,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l sdo -d
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1555,35 +1725,37 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l color 
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "nmt" -d 'Send NMT commands and show NMT states'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "lss" -d 'Set the node-ID and bit rate of devices (LSS, CiA 305, or objects of the device)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "info" -d 'Show everything about a device on one page'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "unit" -d 'Show or set the physical unit of a signal (6131h)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "filter" -d 'Show or set the filter of a signal: type (61A0h) and constant (61A1h)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "limits" -d 'Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "minmax" -d 'Show the lowest and highest value that the device has measured, or reset them'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "errors" -d 'Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "bus" -d 'List CAN interfaces, bring them up and down, find the bit rate of a bus'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "pdo" -d 'Show, change and watch the transmit PDOs of nodes'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "config" -d 'Show all settings of a device as a file, compare them with a file, and set them from a file'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "autozero" -d 'Set the zero of a channel (6125h), with checks before and after'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "store" -d 'Save settings to non-volatile memory (1010h)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "restore" -d 'Restore factory defaults (1011h); node-ID and bit rate stay'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "objects" -d 'Show what a description or an EDS states about a device\'s objects'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "devices" -d 'List device descriptions; show one as TOML, check a file, or describe a new device'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "completions" -d 'Print the completion script for a shell'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects devices completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "scan" -d 'List every node that answers, with its state, identity and recognised device'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "read" -d 'Read measured values now, scaled, with unit and status'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "nmt" -d 'Send NMT commands and show NMT states'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "sdo" -d 'Read and write objects of the object dictionary'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "log" -d 'Record measurements as CSV or JSON Lines'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "check" -d 'Check measurements against limits (exit code 0: all satisfied, 1: not, 3: no data)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "lss" -d 'Set the node-ID and bit rate of devices (LSS, CiA 305, or objects of the device)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "info" -d 'Show everything about a device on one page'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "unit" -d 'Show or set the physical unit of a signal (6131h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "filter" -d 'Show or set the filter of a signal: type (61A0h) and constant (61A1h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "limits" -d 'Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "minmax" -d 'Show the lowest and highest value that the device has measured, or reset them'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "errors" -d 'Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "bus" -d 'List CAN interfaces, bring them up and down, find the bit rate of a bus'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "pdo" -d 'Show, change and watch the transmit PDOs of nodes'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "config" -d 'Show all settings of a device as a file, compare them with a file, and set them from a file'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "autozero" -d 'Set the zero of a channel (6125h), with checks before and after'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "store" -d 'Save settings to non-volatile memory (1010h)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "restore" -d 'Restore factory defaults (1011h); node-ID and bit rate stay'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "sim" -d 'Simulate devices on a bus until Ctrl-C'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "objects" -d 'Show what a description or an EDS states about a device\'s objects'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "export" -d 'Describe the TPDOs of nodes for other programs'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "devices" -d 'List device descriptions; show one as TOML, check a file, or describe a new device'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "completions" -d 'Print the completion script for a shell'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and not __fish_seen_subcommand_from scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero store restore sim objects export devices completions help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "start" -d 'Set nodes to OPERATIONAL: they send their TPDOs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "stop" -d 'Set nodes to STOPPED: only NMT, heartbeat and LSS work'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from nmt" -f -a "preop" -d 'Set nodes to PRE-OPERATIONAL: everything except PDOs works'
@@ -1613,6 +1785,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "diff" -d 'Compare a device with a file, two devices, or two files; exit 1 if anything differs'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "apply" -d 'Set a device from a file: check the file, write the differences, read everything back'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "schema" -d 'Print the JSON Schema of the file, for editors'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from export" -f -a "dbc" -d 'Print a DBC of the TPDOs as they are mapped now'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "show" -d 'Print a description as TOML'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "new" -d 'Print a first description of a device, from the device and its EDS (--eds), with comments for what to fill in'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "check" -d 'Report each mistake in a description file with its line'

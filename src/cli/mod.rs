@@ -11,6 +11,7 @@ mod devices;
 mod each;
 mod errors;
 pub mod exit;
+mod export;
 mod file;
 mod filter;
 mod info;
@@ -244,6 +245,7 @@ commands! {
     Restore(store::Restore): "restore";
     Sim(sim::Sim): "sim";
     Objects(objects::Objects): "objects";
+    Export(export::Export): "export";
     Devices(devices::Devices): "devices";
     Completions(completions::Completions): "completions";
 }
@@ -253,7 +255,7 @@ impl Command {
     fn only_reads(&self) -> bool {
         match self {
             Command::Scan(_) | Command::Read(_) | Command::Info(_) => true,
-            Command::Objects(_) | Command::Devices(_) => true,
+            Command::Objects(_) | Command::Devices(_) | Command::Export(_) => true,
             Command::Sdo(sdo) => sdo.only_reads(),
             Command::Config(config) => config.only_reads(),
             _ => false,

@@ -6,6 +6,6 @@ pub mod decode;
 pub mod expression;
 pub mod histogram;
 pub mod layout;
-mod reading;
+pub mod reading;
 pub mod sample;
 pub mod statistics;

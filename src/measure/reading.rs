@@ -5,7 +5,7 @@ use super::sample::{Doubt, Number, Raw, Sample, Status};
 use crate::bus::Stamp;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};
-use crate::device::scale::Scale;
+use crate::device::scale::{Decimal, Scale};
 
 /// How the bytes of one value become a sample.
 #[derive(Clone, Debug)]
@@ -88,6 +88,21 @@ impl Reading {
     /// The data type of the value; `None` if no source states it.
     pub fn data_type(&self) -> Option<DataType> {
         self.data_type
+    }
+
+    /// From the number in the bytes to the value; `None` if the type or the decimal digits are unknown.
+    pub fn scale(&self) -> Option<Scale> {
+        let plain = Scale { factor: Decimal::ONE, offset: Decimal::ZERO };
+        let data_type = self.data_type.filter(|data_type| data_type.is_number())?;
+        let is_integer = matches!(data_type, DataType::Integer(_) | DataType::Unsigned(_));
+        match self.scaling {
+            Scaling::Fixed(scale) => Some(scale),
+            Scaling::Digits(digits) if is_integer => {
+                let digits = digits.filter(|digits| *digits <= MAX_DIGITS)?;
+                Some(Scale { factor: Decimal::new(1, digits), ..plain })
+            }
+            Scaling::Plain | Scaling::Digits(_) => Some(plain),
+        }
     }
 
     /// The sample for the bytes of a value and, if there are any, its status bits. `None` if the bytes do not fit the type.

@@ -6,6 +6,7 @@ pub mod config;
 pub mod config_record;
 pub mod console;
 pub mod csv;
+pub mod dbc;
 pub mod devices;
 pub mod diagnosis;
 pub mod doubt;

@@ -9,6 +9,7 @@ mod config;
 mod descriptions;
 mod devices;
 mod examples;
+mod export;
 mod half_dead;
 mod hostile;
 mod info;
