@@ -19,6 +19,7 @@ pub mod replay;
 mod script;
 #[cfg(target_os = "linux")]
 pub mod socketcan;
+pub mod stdout;
 pub mod time;
 pub mod trace;
 

@@ -1,11 +1,11 @@
 //! `cangauge completions`.
 
-use super::exit::stdout;
+use super::exit::{open_stdout, stdout};
 use super::{Cli, Global};
 use crate::bus::claim::Claim;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
-use std::io::{self, Write};
+use std::io::Write;
 
 /// Print the completion script for a shell
 #[derive(Debug, Args)]
@@ -25,6 +25,6 @@ impl Completions {
         // Into memory first: the generator panics on a closed pipe.
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut Cli::command(), "cangauge", &mut script);
-        io::stdout().write_all(&script).map_err(stdout)
+        open_stdout()?.write_all(&script).map_err(stdout)
     }
 }

@@ -6,7 +6,7 @@ mod journal;
 mod table;
 
 use super::args::Nodes;
-use super::exit::{FileError, stdout};
+use super::exit::{FileError, open_stdout, stdout};
 use super::{Global, descriptions};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -78,7 +78,7 @@ impl Config {
             Action::Dump(dump) => dump.run(global),
             Action::Diff(diff) => diff.run(global),
             Action::Apply(apply) => apply.run(global),
-            Action::Schema => std::io::stdout().lock().write_all(SCHEMA.as_bytes()).map_err(stdout),
+            Action::Schema => open_stdout()?.lock().write_all(SCHEMA.as_bytes()).map_err(stdout),
         }
     }
 }

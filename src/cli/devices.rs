@@ -93,7 +93,7 @@ fn check(file: &str, global: &Global) -> anyhow::Result<()> {
     let count = mistakes.len();
     let mistakes = mistakes.into_iter().map(|mistake| finding(mistake, true));
     let mut findings: Vec<Finding> = mistakes.chain(notes.into_iter().map(|note| finding(note, false))).collect();
-    findings.sort_by_key(|finding| finding.mistake.line);
+    findings.sort_by_key(|finding| finding.mistake.place);
     global.print(&findings)?;
     match (result, count) {
         (Ok(description), _) => {

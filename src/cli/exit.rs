@@ -98,12 +98,17 @@ fn code(kind: Kind) -> u8 {
 /// Prints what the argument parser returned and returns the exit code: help and version unchanged, an error on one
 /// line with a hint. `words` are the words of the command line.
 pub fn usage(error: &clap::Error, words: impl Iterator<Item = OsString>) -> u8 {
-    if !error.use_stderr() || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        // If the pipe is closed, the reader has seen enough of the help.
-        let _ = error.print();
-        return if error.use_stderr() { code(Kind::Usage) } else { 0 };
-    }
     let words: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
+    let console =
+        Console { quiet: false, verbose: 0, json: wants_json(&words), color: ColorChoice::Auto, progress: None };
+    if !error.use_stderr() {
+        let printed = open_stdout().and_then(|_| error.print().map_err(stdout));
+        return printed.map_or_else(|error| print(&console, &error), |()| 0);
+    }
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        let _ = error.print();
+        return code(Kind::Usage);
+    }
     let text = error.render().to_string();
     let paragraphs: Vec<&str> = text.split("\n\n").map(str::trim).collect();
     let first = paragraphs.first().map_or("", |first| first.trim_start_matches("error: "));
@@ -120,8 +125,6 @@ pub fn usage(error: &clap::Error, words: impl Iterator<Item = OsString>) -> u8 {
         failure = (&Failure::from(error.clone())).into();
     }
     failure.hint.get_or_insert(hint);
-    let console =
-        Console { quiet: false, verbose: 0, json: wants_json(&words), color: ColorChoice::Auto, progress: None };
     console.fail(&failure, code(Kind::Usage));
     code(Kind::Usage)
 }
@@ -171,7 +174,10 @@ fn help_for(words: &[String]) -> String {
 
 /// Prints an error and returns the exit code of the process.
 pub fn report(cli: &Cli, error: &anyhow::Error) -> u8 {
-    let console = cli.global.console();
+    print(&cli.global.console(), error)
+}
+
+fn print(console: &Console, error: &anyhow::Error) -> u8 {
     let messages = messages(error);
     for message in &messages {
         console.fail(message, code(message.kind));
@@ -203,6 +209,14 @@ fn message(error: &anyhow::Error) -> ErrorMessage {
     } else {
         ErrorMessage::new(Kind::Unexpected, format!("{error:#}"))
     }
+}
+
+/// stdout.
+///
+/// # Errors
+/// It was closed when the program started.
+pub(super) fn open_stdout() -> anyhow::Result<io::Stdout> {
+    crate::bus::stdout::stdout().map_err(stdout)
 }
 
 /// An error of writing to stdout. A closed pipe ends the command with success.

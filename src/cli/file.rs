@@ -1,6 +1,6 @@
 //! Files that a command writes. They are opened before the bus, so that a wrong name has no effect on it.
 
-use super::exit::FileError;
+use super::exit::{FileError, open_stdout};
 use crate::bus::file::{Locked, is_same, lock, wait_for_reader};
 use crate::output::failure::ErrorMessage;
 use crate::output::rows::{ExistingLines, Target, existing_lines};
@@ -58,6 +58,9 @@ impl OutFile {
             waited,
         };
         if is_own_stream(path) {
+            if ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| path == Path::new(name)) {
+                open_stdout()?;
+            }
             // The shell opened it, and it may already contain other data.
             let file = options.open(path).map_err(|source| file_error("open", path, source))?;
             return Ok(out(file, false, true, Duration::ZERO));

@@ -324,7 +324,7 @@ impl Global {
 
     /// Prints reports to stdout in the chosen format.
     pub(crate) fn print<R: Report>(&self, reports: &[R]) -> anyhow::Result<()> {
-        render(reports, self.format, &mut io::stdout().lock()).map_err(exit::stdout)
+        render(reports, self.format, &mut exit::open_stdout()?.lock()).map_err(exit::stdout)
     }
 
     /// Prints reports if the format is for programs, else what `text` writes.
@@ -333,7 +333,10 @@ impl Global {
         reports: &[R],
         text: impl FnOnce(&mut dyn io::Write) -> io::Result<()>,
     ) -> anyhow::Result<()> {
-        if self.prints_text() { text(&mut io::stdout().lock()).map_err(exit::stdout) } else { self.print(reports) }
+        if !self.prints_text() {
+            return self.print(reports);
+        }
+        text(&mut exit::open_stdout()?.lock()).map_err(exit::stdout)
     }
 
     /// Prints reports if the format is for programs. People get a note on stderr.
@@ -348,7 +351,7 @@ impl Global {
 
     /// Prints reports one by one as they arrive.
     pub(crate) fn stream<R: Report>(&self) -> anyhow::Result<Stream<R, io::Stdout>> {
-        Stream::new(self.format, io::stdout()).map_err(exit::stdout)
+        Stream::new(self.format, exit::open_stdout()?).map_err(exit::stdout)
     }
 
     /// Runs `work` with a master on the bus.

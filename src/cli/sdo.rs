@@ -1,7 +1,7 @@
 //! `cangauge sdo`.
 
 use super::args::ObjectArg;
-use super::exit::{FileError, IntoFailure, stdout};
+use super::exit::{FileError, IntoFailure, open_stdout, stdout};
 use super::file::OutFile;
 use super::{Global, descriptions};
 use crate::bus::claim::Claim;
@@ -201,7 +201,7 @@ impl ReadArgs {
                 }
                 match &mut file {
                     Some(file) => file.write(&read.raw)?,
-                    None if to_stdout => io::stdout().write_all(&read.raw).map_err(stdout)?,
+                    None if to_stdout => open_stdout()?.write_all(&read.raw).map_err(stdout)?,
                     None => {
                         let (typed, is_single) = (object.to_string(), self.objects.len() == 1);
                         values.push(ObjectValue { read, typed, is_single, form: self.form() });

@@ -1,5 +1,6 @@
 //! The built-in device descriptions, and the recognition of a device by its answers.
 
+use super::config_file::Place;
 use super::description::{self, Description, DescriptionError};
 use super::dictionary::Dictionary;
 use crate::canopen::id::NodeId;
@@ -94,7 +95,8 @@ impl Model {
     /// [`description::read`] returns all of them.
     pub fn from_toml(text: &str) -> Result<Model, DescriptionError> {
         let description = description::read(text).map_err(|mistakes| {
-            let none = || DescriptionError { line: 1, message: "not a description".to_owned() };
+            let none =
+                || DescriptionError { place: Place { line: 1, column: 1 }, message: "not a description".to_owned() };
             mistakes.into_iter().next().unwrap_or_else(none)
         })?;
         let mut dictionary = Dictionary::new();

@@ -17,7 +17,7 @@ pub struct Place {
 
 impl Place {
     /// The place of a byte of a text.
-    fn of(text: &str, offset: usize) -> Place {
+    pub fn of(text: &str, offset: usize) -> Place {
         let before = text.get(..offset).unwrap_or(text);
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().map_or(0, |line| line.chars().count()) + 1;
@@ -107,16 +107,23 @@ pub struct SyntaxError {
     pub message: String,
 }
 
+impl SyntaxError {
+    /// The error of a TOML parser for this text.
+    pub fn new(text: &str, error: &toml::de::Error) -> SyntaxError {
+        SyntaxError {
+            place: Place::of(text, error.span().map_or(0, |span| span.start)),
+            message: error.message().lines().collect::<Vec<_>>().join(", "),
+        }
+    }
+}
+
 impl Document {
     /// Reads a file.
     ///
     /// # Errors
     /// The text is not TOML.
     pub fn parse(text: &str) -> Result<Document, SyntaxError> {
-        let table = DeTable::parse(text).map_err(|error| SyntaxError {
-            place: Place::of(text, error.span().map_or(0, |span| span.start)),
-            message: error.message().lines().collect::<Vec<_>>().join(", "),
-        })?;
+        let table = DeTable::parse(text).map_err(|error| SyntaxError::new(text, &error))?;
         let mut document = Document::default();
         document.add(text, "", table.get_ref());
         document.entries.sort_by_key(|entry| entry.key_at);

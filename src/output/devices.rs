@@ -78,26 +78,32 @@ impl Report for DescriptionText {
 pub struct Finding {
     /// The file.
     pub file: String,
-    /// The line and the text.
+    /// The place and the text.
     pub mistake: DescriptionError,
     /// Whether the file cannot be used because of it.
     pub is_error: bool,
 }
 
 impl Report for Finding {
-    const COLUMNS: &'static [Column] =
-        &[Column::new("file"), Column::new("line"), Column::new("error"), Column::new("message")];
+    const COLUMNS: &'static [Column] = &[
+        Column::new("file"),
+        Column::new("line"),
+        Column::new("column"),
+        Column::new("error"),
+        Column::new("message"),
+    ];
 
     fn cells(&self) -> Vec<Cell> {
-        let message = self.mistake.message.as_str();
-        vec![self.file.as_str().into(), self.mistake.line.into(), self.is_error.into(), message.into()]
+        let DescriptionError { place, message } = &self.mistake;
+        vec![self.file.as_str().into(), place.line.into(), place.column.into(), self.is_error.into(), message.into()]
     }
 
     fn text(reports: &[Self], out: &mut dyn Write) -> io::Result<()> {
         for report in reports {
-            let DescriptionError { line, message } = &report.mistake;
+            let DescriptionError { place, message } = &report.mistake;
             let note = if report.is_error { "" } else { "note: " };
-            writeln!(out, "{}", text::safe(&format!("{}:{line}: {note}{message}", report.file)))?;
+            let line = format!("{}:{place}: {note}{message}", report.file);
+            writeln!(out, "{}", text::safe(&text::one_line(&line)))?;
         }
         Ok(())
     }

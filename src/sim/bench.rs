@@ -47,6 +47,7 @@ mod values;
 use super::device::Device;
 use super::record::Recorder;
 use crate::bus::memory::{BIT_RATE, Clock, MemoryBus};
+use crate::device::config_file::SyntaxError;
 use file::{BenchFile, DeviceEntry};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -93,7 +94,9 @@ impl Bench {
         } else if Path::new(spec).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
             let path = Path::new(spec);
             let beside = path.parent().unwrap_or(Path::new(""));
-            Bench::from_toml(&read(path)?, beside).map_err(|error| match error {
+            let file = parse_file(&read(path)?)
+                .map_err(|SyntaxError { place, message }| BenchError::Usage(format!("{spec}:{place}: {message}")))?;
+            Bench::build(file, beside).map_err(|error| match error {
                 BenchError::Usage(message) => BenchError::Usage(format!("{spec}: {message}")),
                 io @ BenchError::Io { .. } => io,
             })
@@ -121,12 +124,10 @@ impl Bench {
     /// Reads a bench file; `beside` is the folder of the files that it names.
     ///
     /// # Errors
-    /// TOML errors with their line, unknown keys, devices and objects that do not exist.
+    /// TOML errors with their place, unknown keys, devices and objects that do not exist.
     pub fn from_toml(text: &str, beside: &Path) -> Result<Bench, BenchError> {
-        let file = toml::from_str(text).map_err(|error| {
-            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or("");
-            BenchError::Usage(format!("line {}: {}", before.matches('\n').count() + 1, error.message()))
-        })?;
+        let file = parse_file(text)
+            .map_err(|SyntaxError { place, message }| BenchError::Usage(format!("{place}: {message}")))?;
         Bench::build(file, beside)
     }
 
@@ -177,6 +178,10 @@ impl Bench {
         self.into_devices()?.into_iter().for_each(|device| bus.attach(device));
         Ok(bus)
     }
+}
+
+fn parse_file(text: &str) -> Result<BenchFile, SyntaxError> {
+    toml::from_str(text).map_err(|error| SyntaxError::new(text, &error))
 }
 
 fn check_rate(bit_rate: u32) -> Result<u32, BenchError> {

@@ -123,7 +123,32 @@ fn invalid_bus_names_are_refused() {
     run("sim:none.toml").fails(8, "cangauge: none.toml: No such file or directory (os error 2)\n");
     std::fs::write(bench.path("bad.toml"), "clock = \"virtual\"\nsped = 1\n").expect("written");
     let done = run("sim:bad.toml").exit(2);
-    assert!(done.stderr.starts_with("cangauge: bad.toml: line 2: unknown field `sped`"), "{}", done.stderr);
+    assert!(done.stderr.starts_with("cangauge: bad.toml:2:1: unknown field `sped`"), "{}", done.stderr);
+}
+
+#[test]
+fn mistakes_in_files_are_one_line_with_their_place() {
+    let bench = Bench::of(ALL);
+    let long = format!("x = [{}@ ]\n", "1, ".repeat(400));
+    let key = format!("{} = 1\n", "k".repeat(500));
+    for (text, place) in
+        [("[[x]\n", ":1:"), (long.as_str(), ":1:1206: "), (key.as_str(), ":1:1: "), ("\n\n x = \n", ":3:")]
+    {
+        std::fs::write(bench.path("bad.toml"), text).expect("written");
+        let device = ["--device", "bad.toml", "read", "1"];
+        let apply = ["config", "apply", "1", "bad.toml"];
+        let used = bench.finish(&mut bench.command(&["-b", "sim:bad.toml", "scan"]));
+        let others = [&device[..], &apply].map(|words| bench.run_words(words));
+        for done in others.into_iter().chain([used]) {
+            let done = done.exit(2);
+            let first = done.stderr.lines().find(|line| line.contains("bad.toml")).unwrap_or_default();
+            assert!(first.contains(&format!("bad.toml{place}")), "{}", done.stderr);
+            assert!(first.chars().count() <= 200 + "cangauge: ".len(), "{}", done.stderr);
+        }
+        let done = bench.run_words(&["devices", "check", "bad.toml"]).exit(2);
+        assert!(done.stdout.lines().all(|line| line.chars().count() <= 200), "{}", done.stdout);
+        assert!(done.stdout.contains(&format!("bad.toml{place}")), "{}", done.stdout);
+    }
 }
 
 #[test]

@@ -190,19 +190,25 @@ fn a_unit_in_a_description_is_the_unit_of_the_signal() {
 }
 
 #[test]
-fn mistakes_in_a_description_are_shown_with_their_lines() {
+fn mistakes_in_a_description_are_shown_with_their_places() {
     let head = "name = \"mine\"\ntitle = \"Mine\"\nvendor = \"Maker\"\n[identify]\n";
     let signal =
         |name, channel, rest| format!("[[signal]]\nname = \"{name}\"\n{channel}\nvalue = \"0x6130:1\"\n{rest}");
     let one = signal("pressure", "channel = 1", "");
     for (text, message) in [
-        (format!("{one}{}", signal("temperature", "channel = 1", "")), "11: channel: two signals have the channel 1"),
-        (format!("{one}{}", signal("pressure", "channel = 2", "")), "10: name: two signals have the name \"pressure\""),
-        (signal("pressure", "channel = 0", ""), "7: channel: 0 is not in the range"),
-        (signal("ch2", "channel = 1", ""), "6: name: \"ch2\" is channel 2"),
-        (signal("pressure", "chanel = 1", ""), "7: unknown key \"chanel\""),
-        (signal("pressure", "channel = 1", "units = \"bar\"\n"), "9: unknown key \"units\""),
-        ("[[signal]\n".to_owned(), "5: "),
+        (
+            format!("{one}{}", signal("temperature", "channel = 1", "")),
+            "11:11: channel: two signals have the channel 1",
+        ),
+        (
+            format!("{one}{}", signal("pressure", "channel = 2", "")),
+            "10:8: name: two signals have the name \"pressure\"",
+        ),
+        (signal("pressure", "channel = 0", ""), "7:11: channel: 0 is not in the range"),
+        (signal("ch2", "channel = 1", ""), "6:8: name: \"ch2\" is channel 2"),
+        (signal("pressure", "chanel = 1", ""), "7:1: unknown key \"chanel\""),
+        (signal("pressure", "channel = 1", "units = \"bar\"\n"), "9:1: unknown key \"units\""),
+        ("[[signal]\n".to_owned(), "5:9: "),
     ] {
         let bench = bench_with("mh4@1", &[("mine.toml", format!("{head}{text}"))]);
         for line in ["read 1", "log 1 --sync 100ms --count 1", "pdo show 1"] {

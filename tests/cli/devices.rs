@@ -74,7 +74,7 @@ fn every_mistake_of_a_description_has_its_line() {
     assert_eq!(found, [1, 4, 8, 11, 13], "{}", done.stdout);
     assert_eq!(done.error()["error"]["message"], "own.toml: 5 mistakes");
     let done = bench.run("devices check own.toml").exit(2);
-    assert!(done.stdout.contains("own.toml:8: channel: 0 is not in the range 1 to 199\n"), "{}", done.stdout);
+    assert!(done.stdout.contains("own.toml:8:11: channel: 0 is not in the range 1 to 199\n"), "{}", done.stdout);
     bench.run("devices check missing.toml").exit(8);
 }
 
@@ -172,6 +172,6 @@ fn descriptions_of_the_user_are_found_and_have_priority() {
         "{}",
         done.stderr
     );
-    assert!(done.stderr.contains("not used: ") && done.stderr.contains("broken.toml:1: "), "{}", done.stderr);
+    assert!(done.stderr.contains("not used: ") && done.stderr.contains("broken.toml:1:1: "), "{}", done.stderr);
     assert!(run_as_user(&bench, "objects mh4 1008").exit(0).stdout.contains("device-name"));
 }

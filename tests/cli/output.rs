@@ -49,6 +49,26 @@ fn full_disk_is_an_error() {
     }
 }
 
+/// A closed descriptor is not a closed pipe: the data is lost, so it is an error.
+#[test]
+#[cfg(target_os = "linux")]
+fn closed_descriptor_of_stdout_is_an_error() {
+    let bench = Bench::of(ALL);
+    let run = |line: &str| {
+        let mut command = std::process::Command::new("sh");
+        command.env_clear().current_dir(bench.path("")).args(["-c", "exec \"$@\" >&-", "sh"]);
+        command.args([env!("CARGO_BIN_EXE_cangauge"), "-b", &bench.bus]).args(line.split(' '));
+        bench.finish(&mut command)
+    };
+    let others = ["--help", "check 1 temperature<99", "log 1 --sync 10ms --count 1 -o /dev/stdout", "devices"];
+    for line in PRINTING.into_iter().chain(others) {
+        let done = run(line).exit(8);
+        let says = done.stderr.lines().any(|line| line.contains("write to stdout: it is closed"));
+        assert!(says, "{line}: {}", done.stderr);
+    }
+    run("log 127 --sync 10ms --count 1 -o run.csv").exit(0);
+}
+
 #[test]
 fn quiet_prints_only_errors() {
     let bench = Bench::of(ALL);

@@ -176,13 +176,13 @@ fn error_in_a_description_names_its_line() {
         bench.finish(&mut bench.command(&["-b", "sim:mine.toml@5", "read", "5"])).refuses(message);
     };
     let two = head.to_owned() + &signal("pressure") + &signal("temperature");
-    refuses(two, "mine.toml:12: channel: two signals have the channel 1");
+    refuses(two, "mine.toml:12:11: channel: two signals have the channel 1");
     let again = head.to_owned() + &signal("pressure") + &signal("pressure").replace("= 1", "= 2");
-    refuses(again, "mine.toml:11: name: two signals have the name \"pressure\"");
+    refuses(again, "mine.toml:11:8: name: two signals have the name \"pressure\"");
     let none = head.to_owned() + &signal("pressure").replace("= 1", "= 0");
-    refuses(none, "mine.toml:7: channel: 0 is not in the range 1 to 199");
+    refuses(none, "mine.toml:7:11: channel: 0 is not in the range 1 to 199");
     let unknown = head.to_owned() + "[sdo]\nsizes = \"omitted\"\n";
-    refuses(unknown, "mine.toml:6: unknown key \"sizes\" (known: size, expedited_only, block, aborts)");
+    refuses(unknown, "mine.toml:6:1: unknown key \"sizes\" (known: size, expedited_only, block, aborts)");
 }
 
 #[test]

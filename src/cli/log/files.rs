@@ -1,6 +1,6 @@
 //! The output files of `cangauge log`, and their format.
 
-use super::super::exit::FileError;
+use super::super::exit::{FileError, open_stdout};
 use super::super::file::{Existing, OutFile, ReportFile, lock_output};
 use crate::output::events::Events;
 use crate::output::failure::ErrorMessage;
@@ -330,7 +330,7 @@ impl OpenFiles {
     pub(super) fn rows(&mut self, waits: bool) -> anyhow::Result<Rows> {
         let target = match &self.rows {
             Some(file) => file.target(self.keep)?,
-            None => Target::Stream(Box::new(io::stdout())),
+            None => Target::Stream(Box::new(open_stdout()?)),
         };
         Ok(Rows::new(line_writer(target, self.series.take(), waits)?, self.setup.clone()))
     }

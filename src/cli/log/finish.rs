@@ -1,6 +1,6 @@
 //! The end of `cangauge log`: what is still to be written, the summary, and the exit code.
 
-use super::super::exit::{Several, stdout};
+use super::super::exit::{Several, open_stdout, stdout};
 use super::super::file::OutFile;
 use super::files::OpenFiles;
 use super::recorder::{Recorder, Unwritten};
@@ -101,7 +101,7 @@ impl Finished {
         match files.summary.take() {
             Some(file) => file.write(&text),
             None if self.is_closed => Ok(()),
-            None => io::stdout().lock().write_all(&text).map_err(stdout),
+            None => open_stdout()?.lock().write_all(&text).map_err(stdout),
         }
     }
 

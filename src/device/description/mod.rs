@@ -14,6 +14,7 @@ pub use load::{read, read_with_notes};
 pub use object::{Access, ObjectEntry, ObjectRun, Signature, StoreGroup};
 
 use super::assign::AssignEntry;
+use super::config_file::Place;
 use super::quirk::Quirk;
 use super::scalar::Scalar;
 use super::scale::{Markers, Scale, StatusBits};
@@ -26,18 +27,18 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// A mistake in a description.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}: {message}")]
+#[error("{place}: {message}")]
 pub struct DescriptionError {
-    /// The line, counted from 1.
-    pub line: usize,
+    /// The place in the text.
+    pub place: Place,
     /// The mistake, in one line of text.
     pub message: String,
 }
 
 impl DescriptionError {
-    /// The mistake with its place: `x.toml:6: unknown key "signals" (known: …)`.
+    /// The mistake with its place: `x.toml:6:1: unknown key "signals" (known: …)`.
     pub fn in_file(&self, file: &str) -> String {
-        format!("{file}:{}: {}", self.line, self.message)
+        format!("{file}:{}: {}", self.place, self.message)
     }
 }
 

@@ -1,9 +1,10 @@
-//! Reads TOML tables into checked types and collects every mistake with its line.
+//! Reads TOML tables into checked types and collects every mistake with its place.
 
 use super::DescriptionError;
 use crate::canopen::id::{NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
+use crate::device::config_file::Place;
 use crate::device::nearest::distance;
 use crate::device::scalar::{NumberRange, Scalar};
 use crate::device::scale::Decimal;
@@ -37,16 +38,14 @@ impl<'a> Source<'a> {
     }
 
     fn at(&self, offset: usize, message: impl Into<String>) -> DescriptionError {
-        let before = self.text.as_bytes().get(..offset).unwrap_or_default();
-        let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
-        DescriptionError { line, message: message.into() }
+        DescriptionError { place: Place::of(self.text, offset), message: message.into() }
     }
 
     /// Every mistake and every note, in the order of the lines.
     pub(super) fn into_findings(self) -> [Vec<DescriptionError>; 2] {
         [self.mistakes, self.notes].map(|findings| {
             let mut findings = findings.into_inner();
-            findings.sort_by_key(|finding| finding.line);
+            findings.sort_by_key(|finding| finding.place);
             findings
         })
     }

@@ -6,7 +6,9 @@ const HEAD: &str = "name = \"x\"\ntitle = \"X\"\nvendor = \"V\"\n";
 fn mistakes(text: &str) -> Vec<String> {
     match read(&format!("{HEAD}{text}")) {
         Ok(_) => Vec::new(),
-        Err(mistakes) => mistakes.iter().map(|mistake| mistake.in_file("x.toml")).collect(),
+        Err(mistakes) => {
+            mistakes.iter().map(|found| format!("x.toml:{}: {}", found.place.line, found.message)).collect()
+        }
     }
 }
 
@@ -34,6 +36,12 @@ fn unknown_keys_are_listed_with_their_line() {
 fn syntax_errors_have_their_line() {
     let [error] = &mistakes("[sdo]\nsize = \n")[..] else { panic!("one mistake") };
     assert!(error.starts_with("x.toml:5: ") && !error.contains('\n'), "{error}");
+    let place = |text: &str| read(&format!("{HEAD}{text}")).map(drop).map_err(|found| found[0].in_file("x.toml"));
+    assert_eq!(
+        place("auto_bit_rate = 300").unwrap_err(),
+        "x.toml:4:17: auto_bit_rate: 300 is not in the range 0 to 255"
+    );
+    assert!(place("source = \"\u{e4}\" @").unwrap_err().starts_with("x.toml:4:14: "), "characters count, not bytes");
 }
 
 #[test]
@@ -141,7 +149,7 @@ fn tpdos_have_parameters_and_map_described_objects() {
 fn notes_name_what_may_be_a_mistake() {
     let signal = "[[signal]]\nname = \"p\"\nchannel = 1\nvalue = \"0x6130:1\"\n";
     let notes = |text: &str| -> Vec<usize> {
-        read_with_notes(&format!("{HEAD}{text}")).1.iter().map(|note| note.line).collect()
+        read_with_notes(&format!("{HEAD}{text}")).1.iter().map(|note| note.place.line).collect()
     };
     assert_eq!(notes(signal), [1, 5], "no [identify], no TPDO");
     assert_eq!(notes(&format!("[identify]\nvendor_id = 1\n{signal}")), [7]);

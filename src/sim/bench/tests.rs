@@ -57,10 +57,10 @@ fn devices_without_a_node_id() {
 fn mistakes_in_a_file_have_their_line() {
     let text = |text: &str| refusal(Bench::from_toml(text, Path::new("")));
     let device = "[[device]]\nkind = \"mh4\"\nnode = 5\n";
-    assert!(text("seed = 1\nsped = 2\n").starts_with("line 2: unknown field `sped`"));
-    assert!(text(&format!("{device}nod = 5\n")).starts_with("line 4: unknown field `nod`"));
-    assert!(text(&format!("clock = \"unreal\"\n{device}")).starts_with("line 1: unknown variant `unreal`"));
-    assert_eq!(text("[[device]]\nkind = \"mh4\"\nnode = 128\n"), "line 3: \"128\" is not a node-ID (1 to 127)");
+    assert!(text("seed = 1\nsped = 2\n").starts_with("2:1: unknown field `sped`"));
+    assert!(text(&format!("{device}nod = 5\n")).starts_with("4:1: unknown field `nod`"));
+    assert!(text(&format!("clock = \"unreal\"\n{device}")).starts_with("1:9: unknown variant `unreal`"));
+    assert_eq!(text("[[device]]\nkind = \"mh4\"\nnode = 128\n"), "3:8: \"128\" is not a node-ID (1 to 127)");
     assert_eq!(text(&format!("bit_rate = 0\n{device}")), "0 bit/s is not a bit rate of CAN (1 to 1000000)");
     assert_eq!(text("seed = 1\n"), "no device");
     assert_eq!(
@@ -76,11 +76,11 @@ fn mistakes_in_a_file_have_their_line() {
         text(&format!("{device}set = {{ \"1017\" = 70000 }}\n")),
         "mh4@5: 0x1017:0: 70000 does not fit u16 (0 to 65535)"
     );
-    assert!(text(&format!("{device}set = {{ \"x\" = 1 }}\n")).starts_with("line 4: \"x\" is not an object"));
+    assert!(text(&format!("{device}set = {{ \"x\" = 1 }}\n")).starts_with("4:9: \"x\" is not an object"));
     assert_eq!(text(&format!("{device}[[device.channel]]\nchannel = 3\n")), "mh4@5 has no channel 3");
     let overload = "[[device.overload]]\nchannel = 1\nfrom = \"2s\"\nuntil = \"1s\"\ndirection = \"high\"\n";
     assert_eq!(text(&format!("{device}{overload}")), "mh4@5: an overload that ends before it begins");
-    assert!(text(&format!("{device}{}", overload.replace("2s", "2 parsecs"))).starts_with("line 6: "));
+    assert!(text(&format!("{device}{}", overload.replace("2s", "2 parsecs"))).starts_with("6:8: "));
 }
 
 /// Frames up to `until`.

@@ -1,0 +1,31 @@
+//! stdout, or the error that it was closed when the program started.
+//!
+//! The standard library opens `/dev/null` in place of a closed stdout before `main`, and ignores the error of writing to
+//! a closed one. So this module looks before both.
+
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static IS_CLOSED: AtomicBool = AtomicBool::new(false);
+
+/// Runs before `main` and before the start of the standard library.
+#[cfg(target_os = "linux")]
+#[used]
+#[expect(unsafe_code, reason = "std has no function that runs before it opens the closed descriptors")]
+#[unsafe(link_section = ".init_array")]
+static LOOK: extern "C" fn() = {
+    extern "C" fn look() {
+        // SAFETY: F_GETFD only reads, and any descriptor is allowed.
+        let flags = unsafe { libc::fcntl(libc::STDOUT_FILENO, libc::F_GETFD) };
+        IS_CLOSED.store(flags == -1, Ordering::Relaxed);
+    }
+    look
+};
+
+/// stdout.
+///
+/// # Errors
+/// It was closed when the program started. The kind of the error differs from that of a closed pipe.
+pub fn stdout() -> io::Result<io::Stdout> {
+    if IS_CLOSED.load(Ordering::Relaxed) { Err(io::Error::other("it is closed")) } else { Ok(io::stdout()) }
+}
