@@ -69,6 +69,7 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String
         TpdoCause::SyncCounter { is_expected: false } => {
             format!("{number} waits for SYNC without a counter (1019h is 0), and SYNC is sent with one{also}")
         }
+        TpdoCause::SyncRejected => format!("{number} waits for SYNC, and the node rejects the length of SYNC"),
         TpdoCause::TooFewSyncs { every, seen } => {
             let every = if every == 1 { "every SYNC".to_owned() } else { format!("every {every}th SYNC") };
             format!("{number} is sent at {every} ({communication:04X}h:2), and {seen} SYNC were sent")
@@ -146,6 +147,9 @@ pub fn hint(silence: &Silence, node: NodeId) -> Option<String> {
                 "read by SDO instead: add --poll 100ms (or: cangauge pdo map {node} {} --event-timer 100ms)",
                 number.get()
             )),
+            TpdoCause::SyncRejected => {
+                Some(format!("SYNC has a counter if 1019h of the node is not 0: cangauge sdo read {node} 0x1019"))
+            }
             TpdoCause::Disabled
             | TpdoCause::NothingMapped(_)
             | TpdoCause::OnlyOnRequest(_)

@@ -18,6 +18,9 @@ use crate::node::Node;
 use crate::node::state::Proof;
 use std::time::Duration;
 
+/// The emergency of a node that received a SYNC of an unexpected length.
+const SYNC_LENGTH: u16 = 0x8240;
+
 /// Why a node, or a signal of it, sends no measurements.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Silence {
@@ -98,6 +101,8 @@ pub enum TpdoCause {
         /// Whether the node expects a counter.
         is_expected: bool,
     },
+    /// The node reports that SYNC has an unexpected length (emergency 8240h).
+    SyncRejected,
     /// It is sent at every n-th SYNC, and fewer were seen.
     TooFewSyncs {
         /// n.
@@ -134,6 +139,8 @@ pub struct Heard {
     pub state: Option<NmtState>,
     /// Its last heartbeat or boot-up message was a boot-up message.
     pub booted: bool,
+    /// It was operational once.
+    pub was_operational: bool,
     /// Its heartbeat stopped.
     pub heartbeat_stopped: bool,
     /// The code of its last emergency.
@@ -219,7 +226,8 @@ fn setup_cause(
     let causes: Vec<(TpdoNumber, TpdoCause)> =
         candidates.iter().map(|tpdo| (tpdo.number, tpdo_cause(node, tpdo, heard, known, situation))).collect();
     // A TPDO that is due and is not sent shows that the parameters of the others are not the cause.
-    let is_due = |cause: &TpdoCause| matches!(cause, TpdoCause::Due(_) | TpdoCause::NotSentAtSync);
+    let is_due =
+        |cause: &TpdoCause| matches!(cause, TpdoCause::Due(_) | TpdoCause::NotSentAtSync | TpdoCause::SyncRejected);
     let cause = causes.iter().find(|(_, cause)| is_due(cause)).or(causes.first());
     cause.map_or(SilenceCause::NoTpdo, |&(number, cause)| SilenceCause::Tpdo(number, cause))
 }
@@ -240,6 +248,9 @@ fn tpdo_cause(node: &Node, tpdo: &Tpdo, heard: &Heard, findings: &Findings, situ
         }
         Some(Transmission::AcyclicSync | Transmission::Sync(_)) if received > 0 && is_expected != (length > 0) => {
             TpdoCause::SyncCounter { is_expected }
+        }
+        Some(Transmission::AcyclicSync | Transmission::Sync(_)) if heard.emergency == Some(SYNC_LENGTH) => {
+            TpdoCause::SyncRejected
         }
         Some(Transmission::Sync(every)) if u64::from(every) > seen => TpdoCause::TooFewSyncs { every, seen },
         Some(Transmission::AcyclicSync) if seen == 0 => TpdoCause::TooFewSyncs { every: 1, seen },

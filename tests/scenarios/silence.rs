@@ -7,7 +7,7 @@ use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::master::{Master, Timing};
 use cangauge::measure::decode::Wanted;
-use cangauge::output::events::event_text;
+use cangauge::output::events::{event_text, remark_text};
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::Bench;
 use cangauge::tasks::log::{LogEvent, LogOptions, Mode, RecordingReport, log};
@@ -136,6 +136,45 @@ fn heartbeats(state: &'static str) -> Vec<(u64, &'static str)> {
 
 const BOTH_OFF: &str = "\"0x1800:1\" = 0xC0000185, \"0x1801:1\" = 0xC0000285";
 const ALIVE: &str = "\"0x1017\" = 100";
+
+#[test]
+fn node_that_left_operational_is_named_at_the_end() {
+    let remarks = |case: Case, others: &[(u64, &'static str)]| -> Vec<String> {
+        let report = Case { seconds: Some(4), ..case }.hears(others).run().0.expect("a report");
+        assert!(report.rows > 0);
+        report.remarks.iter().map(remark_text).filter(|text| text.contains("left operational")).collect()
+    };
+    let synced = || Case::mh4(ALIVE).sync(100);
+    let preop = [(2000, "000#8005"), (2010, "085#3081110000000000")];
+    assert_eq!(
+        remarks(synced(), &preop),
+        ["node 5 left operational: it is pre-operational again after the start, emergency 8130h"]
+    );
+    assert_eq!(remarks(synced(), &[(2000, "000#0205")]), ["node 5 left operational: it is stopped after the start"]);
+    assert_eq!(remarks(synced(), &[(2000, "000#8005"), (2500, "000#0105")]), [""; 0], "it is operational again");
+    // A polled node has values in each state.
+    let polled = || Case { poll: true, ..Case::mh4(ALIVE) };
+    assert_eq!(remarks(polled(), &[]), [""; 0], "it was never operational");
+    assert_eq!(
+        remarks(polled(), &[(500, "000#0105"), (2000, "000#8005")]),
+        ["node 5 left operational: it is pre-operational"]
+    );
+}
+
+#[test]
+fn emergency_about_the_length_of_sync_is_the_reason() {
+    let rejected = [(3000, "085#4082110000000000"), (3500, "085#4082110000000000")];
+    let case = Case::mh4("\"0x1800:2\" = 240, \"0x1801:2\" = 240").sync(100).hears(&rejected);
+    let (message, hint) = case.message();
+    assert!(
+        message.contains("TPDO1 waits for SYNC, and the node rejects the length of SYNC, emergency 8240h"),
+        "{message}"
+    );
+    assert!(hint.expect("a hint").contains("cangauge sdo read 5 0x1019"));
+    // A TPDO that does not depend on SYNC has another reason.
+    let case = Case::mh4("\"0x1800:2\" = 254, \"0x1801:1\" = 0xC0000285").sync(100).hears(&rejected);
+    assert!(!case.message().0.contains("rejects"), "{}", case.message().0);
+}
 
 #[test]
 fn each_cause_has_its_reason() {

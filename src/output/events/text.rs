@@ -146,6 +146,9 @@ pub fn remark_text(remark: &Remark) -> String {
                 listed(nodes)
             ),
         },
+        Remark::NotOperational(node, silence) => {
+            format!("node {node} left operational: {}", diagnosis::reason(silence))
+        }
         Remark::StatesNotRestored(failure) => {
             format!("the nodes' states were not restored: {}", ErrorMessage::of(failure).message)
         }

@@ -24,6 +24,8 @@ pub enum Remark {
     NotReadAgain(NodeId),
     /// These nodes were started. Their previous state is unknown, so they stay operational.
     LeftOperational(Vec<NodeId>),
+    /// The node was operational, and its last heartbeat shows another state.
+    NotOperational(NodeId, Box<Silence>),
     /// The nodes were not returned to their previous NMT states.
     StatesNotRestored(Box<Failure>),
     /// This many SYNC messages were omitted while the interface was down.

@@ -112,6 +112,7 @@ impl Recording<'_> {
             Life::State(state) => Some(state),
             Life::BootUp => None,
         };
+        heard.was_operational |= heard.state == Some(NmtState::Operational);
         if !self.liveness.has(node) {
             return;
         }

@@ -1,6 +1,10 @@
 //! The result of a recording.
 
 use super::Recording;
+use crate::canopen::id::NodeId;
+use crate::canopen::nmt::NmtState;
+use crate::node::state::Proof;
+use crate::tasks::diagnosis::{Running, Silence, SilenceCause};
 use crate::tasks::log::silence::{Silent, why_nothing};
 use crate::tasks::log::{RecordingReport, Remark};
 
@@ -39,10 +43,28 @@ impl Recording<'_> {
         let buffer = self.receive_buffer.filter(|buffer| self.tally.dropped > 0 && buffer.is_small());
         self.remarks.extend(buffer.map(Remark::SmallReceiveBuffer));
         self.remarks.extend(self.rereads.held().map(Remark::NotReadAgain));
+        self.remarks.extend(self.not_operational());
         if self.tally.rows > 0 {
             let remarks = self.silence_remarks();
             self.remarks.extend(remarks);
         }
+    }
+
+    /// The nodes with values that were operational, and whose last heartbeat shows another state.
+    fn not_operational(&self) -> Vec<Remark> {
+        let remark = |node: NodeId| {
+            let heard = self.heard.get(&node)?;
+            let state = heard.state.filter(|&state| state != NmtState::Operational)?;
+            let was_operational = heard.was_operational || self.poll.is_none();
+            let cause = SilenceCause::NotOperational {
+                state,
+                by: Proof::Heartbeat,
+                was_started: self.states.has_started(node),
+            };
+            let silence = Silence { cause, emergency: heard.emergency, running: Running::Unknown };
+            (was_operational && self.has_sent(node)).then(|| Remark::NotOperational(node, Box::new(silence)))
+        };
+        self.liveness.nodes().filter_map(remark).collect()
     }
 
     /// Why nodes, or signals of nodes that sent others, have no values.
