@@ -122,6 +122,52 @@ class Digits200(Device):
         self.map(0x71300110)
 
 
+@case("check 5 'ch1 < 30000'", 1, never="ok ")
+@case("log 5 --poll 100ms --count 2", rows=2, never=",ok,")
+@case(TWO, rows=2, never=",ok,")
+class DigitsMissing(Device):
+    """8130h:1 in TPDO1, and no 6132h."""
+
+    def change(self):
+        self.remove(0x6130, 0x6132)
+        self.array(0x8130, sint(12345, 3))
+        self.map(0x81300118, 0x61500108)
+
+
+@case(TWO, never=r"ch1,[0-9.-]+")
+@case("log 5 --layout wide --sync 100ms --count 2", never=r",[0-9.-]+,ok")
+@case("pdo watch 5 --duration 1s", never="ok")
+class IntegerAsFloatInTpdo(Device):
+    """TPDO1 carries an integer as 6130h:1."""
+
+    def change(self):
+        self.array(0x6130, sint(70000, 4))
+
+
+@case(TWO, never=r"0x6110:1,[0-9-]+,|ch1,[0-9-]+,")
+@case("log 5 0x6110:1 --sync 100ms --duration 1s", out="0x0102030405", never=r"0x6110:1,[0-9-]+,")
+class MappingLongerThanItsObject(Device):
+    """TPDO1 maps 35 bits of 6110h:1, an UNSIGNED16."""
+
+    def change(self):
+        self.map(0x61100123, 0x61500108)
+
+    def pdo(self):
+        return bytes(range(1, 7))
+
+
+@case("log 5 0x6110:1 --sync 100ms --duration 1s", out="0x010203", never=r"0x6110:1,[0-9-]+,")
+@case("check 5 '0x6110:1 < 100000' --for 500ms --sync 100ms", 2, never="ok ")
+class MappingOfThreeBytesOfTwo(MappingLongerThanItsObject):
+    """TPDO1 maps 24 bits of 6110h:1."""
+
+    def change(self):
+        self.map(0x61100118)
+
+    def pdo(self):
+        return bytes(range(1, 4))
+
+
 # A narrow integer at its end is not a value.
 
 class Narrow(Device):

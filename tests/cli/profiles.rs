@@ -183,3 +183,22 @@ fn described_signals_have_their_own_scale_and_status() {
     check(&bench, "--device own.toml 5", "flow > 20 l/h").exit(1);
     bench.run("--device own.toml unit 5 flow bar").exit(6);
 }
+
+/// A wrong power of ten must not pass a check.
+#[test]
+fn integer_with_unknown_or_impossible_digits_passes_no_check() {
+    for (value, data_type, entry) in
+        [("0x7130:1", "i16", "0x71300110"), ("0x8130:1", "i24", "0x81300118"), ("0x9130:1", "i32", "0x91300120")]
+    {
+        for (digits, code) in [(Some("2"), 0), (None, 1), (Some("10"), 1), (Some("255"), 1)] {
+            let mut channel = vec![(value, data_type, "ro", "777"), ("0x6131:1", "u32", "ro", "0x004E0000")];
+            channel.extend(digits.map(|digits| ("0x6132:1", "u8", "ro", digits)));
+            let bench = bench(&device("0x00020194", &channel, &[entry]));
+            for more in [&[][..], &["--for", "1s", "--sync", "100ms"]] {
+                let words = [&["check", "5", "ch1 < 1000"][..], more].concat();
+                let done = bench.run_words(&words).exit(code);
+                assert_eq!(done.stdout.starts_with("ok "), code == 0, "{digits:?} {words:?}: {}", done.stdout);
+            }
+        }
+    }
+}

@@ -13,7 +13,7 @@ use crate::bus::Mono;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
-use crate::measure::sample::{Number, Sample, Source, Status};
+use crate::measure::sample::{Doubt, Number, Sample, Source, Status};
 
 /// Connects a source of samples to an input of a comparison.
 #[derive(Clone, Copy, Debug)]
@@ -157,7 +157,9 @@ impl Evaluator {
             let first = *self.first.get_or_insert(sample.at.mono);
             let elapsed = sample.at.mono.since(first);
             for route in self.routes.get(sample.source).into_iter().flatten() {
-                let is_valid = !sample.status.is_some_and(Status::is_overload);
+                // Without its decimal digits a number is wrong by a power of ten.
+                let is_scaled = sample.doubt != Some(Doubt::UnknownDigits);
+                let is_valid = is_scaled && !sample.status.is_some_and(Status::is_overload);
                 let value = sample.value.filter(|_| is_valid).map(printed_value).and_then(|value| match route.unit {
                     UnitChange::Unchanged => Some(value),
                     UnitChange::Convertible(from, to) => from.convert(value, to),

@@ -99,7 +99,8 @@ impl SetupListener {
                 signal.is_none_or(|signal| {
                     let [_, digits] = signals::unit_and_digits(node, signal);
                     let step = signals::step(node, signal).map(|step| step.object);
-                    let is_integer = matches!(node.mapped_type(entry.object, entry.bits), Some(DataType::Integer(_)));
+                    let data_type = node.mapped_type(entry.object, entry.bits);
+                    let is_integer = matches!(data_type, Some(DataType::Integer(_) | DataType::Unsigned(_)));
                     let mut needed = digits.into_iter().filter(|_| signal.digits.is_none()).chain(step);
                     !is_integer || needed.all(|object| self.overheard.is_refused(id, object))
                 })
