@@ -99,11 +99,16 @@ pub(super) fn write_synced(path: &Path, options: &OpenOptions, text: &[u8]) -> i
     file.set_len(0)?;
     file.write_all(text)?;
     file.sync_all()?;
-    if let Ok(folder) = File::open(folder) {
+    sync_folder(path);
+    Ok(file)
+}
+
+/// Makes the name of a file survive a power failure.
+pub(super) fn sync_folder(path: &Path) {
+    if let Ok(folder) = File::open(path.parent().unwrap_or(path)) {
         // Some file systems cannot sync a folder.
         let _ = folder.sync_all();
     }
-    Ok(file)
 }
 
 /// The folder for the state of programs (XDG base directories). `None` if the environment names none.

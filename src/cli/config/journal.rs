@@ -5,7 +5,7 @@
 
 use super::apply::text_of;
 use crate::cli::Global;
-use crate::cli::journal::{folder, write_synced};
+use crate::cli::journal::{folder, sync_folder, write_synced};
 use crate::tasks::Failure;
 use crate::tasks::config::{ConfigFailure, Journal, Snapshot};
 use std::fs::{self, File};
@@ -48,8 +48,10 @@ impl Journal for FileJournal<'_> {
         if path.exists() {
             return Ok(());
         }
-        let mut options = File::options();
-        write_synced(path, options.write(true).create_new(true), &text_of(before)).map(drop).map_err(|error| {
+        // A program that is killed now leaves no journal, not a part of one.
+        let draft = path.with_extension("draft");
+        let written = write_synced(&draft, File::options().write(true).create(true), &text_of(before));
+        written.and_then(|_| fs::rename(&draft, path)).map(|()| sync_folder(path)).map_err(|error| {
             let reason = format!("{}: {error}", path.display());
             Failure::at(before.node.id, ConfigFailure::Journal { reason })
         })
