@@ -12,6 +12,12 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, TransferError, Uploaded, Violation};
 use std::time::Duration;
 
+/// A transfer may take this long, whatever it transfers.
+const SLOW_TRANSFER: Duration = Duration::from_secs(5);
+
+/// And this long for each byte: a full segment needs less than 0.2 s also on a loaded bus with 10 kbit/s.
+const SLOWEST_BYTE: Duration = Duration::from_millis(30);
+
 /// A transfer in progress.
 #[derive(Debug)]
 pub(super) struct Active {
@@ -29,6 +35,8 @@ pub(super) struct Active {
     pub(super) was_rejected: bool,
     /// When the first request was sent. Earlier frames do not answer it.
     pub(super) asked_at: Option<Mono>,
+    /// When the device began to answer.
+    pub(super) begun_at: Option<Mono>,
     pub(super) foreign: ForeignTraffic,
     /// The caller's transfer. It waits while this one, a barrier read, makes sure that no stale answer is pending.
     pub(super) deferred: Option<(Ticket, Request)>,
@@ -56,7 +64,7 @@ impl Active {
         let attempts = if request.falls_back() { 0 } else { timing.retries };
         let attempts_left = if request.repeatable { attempts } else { 0 };
         let machine = request.machine(accept_60);
-        let (deadline, asked_at, deferred) = (None, None, None);
+        let (deadline, asked_at, begun_at, deferred) = (None, None, None, None);
         let foreign = ForeignTraffic::default();
         Active {
             ticket,
@@ -68,6 +76,7 @@ impl Active {
             unsent: 0,
             attempts_left,
             asked_at,
+            begun_at,
             foreign,
             deferred,
             ambiguous: false,
@@ -229,8 +238,27 @@ impl Active {
         self.request.timeout.unwrap_or(timing.timeout)
     }
 
+    /// How long a transfer may take since the device began to answer. A device can send one byte in each segment, and
+    /// each just in time.
+    pub(super) fn time(&self, timing: &Timing) -> Duration {
+        let bytes = u32::try_from(self.machine.moved().0).unwrap_or(u32::MAX);
+        SLOW_TRANSFER.max(self.timeout(timing).saturating_mul(10)).saturating_add(SLOWEST_BYTE * bytes)
+    }
+
+    /// Whether the transfer is too slow.
+    pub(super) fn is_over(&self, now: Mono, timing: &Timing) -> bool {
+        self.begun_at.is_some_and(|begun_at| now.since(begun_at) >= self.time(timing))
+    }
+
     pub(super) fn error(&self, failure: SdoFailure) -> SdoError {
         self.request.error(failure)
+    }
+
+    /// An error that names the deferred request, except a write that was never sent.
+    pub(super) fn error_of_sent(&self, failure: SdoFailure) -> SdoError {
+        let was_sent = |request: &Request| request.operation() == Operation::Read || request.refused_blocks;
+        let deferred = self.deferred.as_ref().map(|(_, request)| request).filter(|request| was_sent(request));
+        deferred.unwrap_or(&self.request).error(failure)
     }
 
     /// Records a request of another master. If it writes the same object, an acknowledge may be for either of us.

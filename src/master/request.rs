@@ -243,7 +243,7 @@ pub enum SdoFailure {
     /// Another master used the channel again and again.
     #[error("another master uses the node's SDO channel at the same time")]
     Disturbed,
-    /// The time for all transfers together is over.
+    /// The time for the transfer, or for all transfers together, is over.
     #[error("not finished within {}", format_duration(*.0))]
     Overtime(Duration),
     /// The caller cancelled the transfer, or the node was silent to an earlier one.

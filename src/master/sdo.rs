@@ -141,6 +141,10 @@ impl SdoClient {
             active.unsent = active.unsent.saturating_sub(1);
             if active.unsent == 0 {
                 active.deadline = Some(now + active.timeout(timing));
+                if active.machine.has_begun() {
+                    let end = *active.begun_at.get_or_insert(now) + active.time(timing);
+                    active.deadline = earlier(active.deadline, Some(end));
+                }
                 self.due = earlier(self.due, active.deadline);
             }
         }
@@ -228,15 +232,18 @@ impl SdoClient {
             }
             let has_begun = active.machine.has_begun();
             let is_explained = has_begun && active.foreign.explains(TransferError::NoAnswer);
-            if is_explained && active.back_off(node.accept_60, now, timing, outgoing) {
+            let is_over = active.is_over(now, timing);
+            if !is_over && is_explained && active.back_off(node.accept_60, now, timing, outgoing) {
                 continue;
             }
             let mut out = Vec::new();
-            if active.machine.on_timeout(&mut out).is_none() {
+            if is_over {
+                active.machine.abort(AbortCode::TIMEOUT, &mut out);
+            } else if active.machine.on_timeout(&mut out).is_none() {
                 active.enqueue(out, outgoing);
                 continue;
             }
-            if active.restart(TransferError::NoAnswer, node.accept_60, &mut out, outgoing) {
+            if !is_over && active.restart(TransferError::NoAnswer, node.accept_60, &mut out, outgoing) {
                 node.answers.on_repeated(active.request.object);
                 continue;
             }
@@ -264,16 +271,12 @@ impl SdoClient {
             }
             self.clues.on_wasted(active.overtime(now, timing));
             let clue = self.clues.end(active.request.node);
-            let mut error = active.error(match active.request.operation() {
+            let failure = match active.request.operation() {
+                _ if is_over => SdoFailure::Overtime(active.time(timing)),
                 Operation::Read if active.foreign.is_served() => active.disturbance(),
                 _ => SdoFailure::NoAnswer { waited: active.timeout(timing), started: has_begun, clue },
-            });
-            // The error names the deferred request, except a write that was never sent.
-            let was_sent = |request: &Request| request.operation() == Operation::Read || request.refused_blocks;
-            if let Some((_, request)) = active.deferred.as_ref().filter(|(_, request)| was_sent(request)) {
-                (error.object, error.operation) = (request.object, request.operation());
-            }
-            self.finished.push_back((active.ticket, Err(error)));
+            };
+            self.finished.push_back((active.ticket, Err(active.error_of_sent(failure))));
         }
     }
 

@@ -21,6 +21,7 @@ pub use background::BackgroundSurvey;
 pub use ranges::narrow_values;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::time::Duration;
 
 const U8: DataType = DataType::Unsigned(1);
 const U16: DataType = DataType::Unsigned(2);
@@ -31,6 +32,9 @@ const TPDOS_TRIED: u16 = 8;
 
 /// The descriptions that the user named, by node.
 pub type Overrides = BTreeMap<NodeId, Arc<Model>>;
+
+/// How much longer than a recording or a display the reading of the setup may take.
+pub const SETUP_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Reads objects for a survey.
 pub trait Ask {

@@ -31,7 +31,7 @@ use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
 use crate::node::Node;
 use crate::node::Overrides;
-use crate::node::survey::survey_each;
+use crate::node::survey::{SETUP_TIMEOUT, survey_each};
 use crate::tasks::Failure;
 pub use changes::{Change, TpdoChange};
 use checks::{check_wanted, refuse_second_sync, sync_share};
@@ -213,9 +213,6 @@ const FIRST_SAMPLE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// The interval of [`Observer::tick`].
 const TICK: Duration = Duration::from_millis(100);
-
-/// How much longer than the recording the reading of the setup may take.
-const SETUP_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Records until the duration, the count, Ctrl-C or the observer ends the recording.
 ///

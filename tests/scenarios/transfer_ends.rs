@@ -9,7 +9,13 @@ use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::value::{DataType, Value};
 use cangauge::device::catalog;
 use cangauge::master::{Master, Request, SdoFailure, Timing};
-use cangauge::sim::{Device, Setup};
+use cangauge::node::Node;
+use cangauge::node::survey::Overrides;
+use cangauge::node::write::write_and_verify;
+use cangauge::sim::{Bench, Device, Setup};
+use cangauge::tasks::read::read;
+use std::collections::BTreeSet;
+use std::path::Path;
 use std::time::Duration;
 
 const TIMEOUT: Duration = Duration::from_millis(100);
@@ -133,10 +139,14 @@ fn upload_without_an_end_ends() {
         (0x6130, 0, slow, 3),
         (0x1008, 7, slow, 5),
         (0x2000, 7, Duration::from_millis(1), 5),
+        // Each segment is in time.
+        (0x1008, 1, Duration::from_millis(400), 6),
+        (0x2000, 7, Duration::from_millis(400), 12),
+        (0x6130, 0, Duration::from_millis(400), 6),
     ] {
         let mut bus = MemoryBus::new(Clock::Virtual);
         bus.attach(Endless { length, interval, toggle: false, due: None });
-        let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT, retries: 1 });
+        let mut master = Master::new(&mut bus, Timing { timeout: TIMEOUT.max(interval * 5 / 4), retries: 1 });
         let result = master.transfer_one(Request::read(node(), ObjectId::new(index, 0))).expect("the bus works");
         assert!(result.is_err(), "{index:04X}h");
         let took = master.now().since_start();
@@ -156,4 +166,48 @@ fn all_transfers_together_end_with_their_time() {
         assert_eq!(result.expect_err("too slow").failure, SdoFailure::Overtime(time));
     }
     assert!(master.now().since_start() < Duration::from_millis(600));
+}
+
+/// A wire that loses, doubles and delays 3 of 100 frames.
+fn bad_wire(seed: u64) -> FaultPlan {
+    let mut state = (seed + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mut some = || -> BTreeSet<u64> {
+        let mut is_chosen = |_: &u64| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            state % 100 < 3
+        };
+        (0..1000).filter(|number| is_chosen(number)).collect()
+    };
+    let (lose_sent, lose, duplicate, late) = (some(), some(), some(), some());
+    let delay = late.into_iter().map(|number| (number, Duration::from_millis(30))).collect();
+    FaultPlan { lose_sent, lose, duplicate, delay, ..FaultPlan::default() }
+}
+
+#[test]
+fn few_operations_fail_on_a_wire_that_loses_three_of_a_hundred_frames() {
+    const RUNS: u64 = 300;
+    let bench = "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 5\n[[device.channel]]\nchannel = 1\n\
+                 base = 5.0\namplitude = 0.0\nnoise = 0.0\n";
+    let mut failed = [0; 3];
+    for seed in 0..RUNS {
+        let bus = Bench::from_toml(bench, Path::new("")).expect("a bench").open().expect("a bus");
+        let mut bus = Faulty::new(bus, bad_wire(seed));
+        let mut master = Master::new(&mut bus, Timing::default());
+        match master.read(node(), ObjectId::new(0x1008, 0), DataType::VisibleString).expect("the bus works") {
+            Ok(name) => assert_eq!(name, Value::Text("MH-4-CAN".to_owned()), "seed {seed}"),
+            Err(_) => failed[0] += 1,
+        }
+        let readings = read(&mut master, &[node()], &[], &Overrides::new()).expect("the bus works");
+        match readings[0].as_ref().ok().and_then(|all| all.first()?.1.value) {
+            Some(value) => assert_eq!(value.to_string(), "5", "seed {seed}"),
+            None => failed[1] += 1,
+        }
+        let (object, bytes) = (ObjectId::new(0x1017, 0), [seed.to_le_bytes()[0], 1]);
+        let written = write_and_verify(&mut master, &Node::new(node()), object, &bytes, DataType::Unsigned(2));
+        failed[2] += u64::from(written.is_err());
+    }
+    println!("of {RUNS} each failed: name {}, values {}, write {}", failed[0], failed[1], failed[2]);
+    assert!(failed.iter().all(|&count| count * 10 <= RUNS), "{failed:?} of {RUNS}");
 }

@@ -10,7 +10,7 @@ use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::layout::Tpdo;
 use crate::measure::sample::{Sample, Source};
 use crate::node::Overrides;
-use crate::node::survey::survey_each;
+use crate::node::survey::{SETUP_TIMEOUT, survey_each};
 use crate::node::wait::{Policy, Until, Waiter, run};
 use crate::tasks::Failure;
 use crate::tasks::log::{LogFailure, SetupListener};
@@ -79,7 +79,10 @@ pub fn watch(
     }
     master.listen_to(nodes)?;
     let (mut surveyed, mut failures) = (Vec::new(), Vec::new());
-    for result in survey_each(master, nodes, overrides)? {
+    master.limit_transfers(duration.map(|duration| duration.saturating_add(SETUP_TIMEOUT)));
+    let results = survey_each(master, nodes, overrides)?;
+    master.limit_transfers(None);
+    for result in results {
         match result {
             Ok(node) => surveyed.push(node),
             Err(error) => failures.push(Failure::from(error)),
