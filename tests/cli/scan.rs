@@ -40,7 +40,7 @@ fn unknown_fields_are_null_in_json() {
             json!({"node": 3, "state": null, "device_type": "0x00020194", "profile": 404, "vendor": 285, "vendor_name": "HBM",
                 "product": 5641, "revision": 131_073, "serial": 40_003, "name": null, "device": "mc1609"}),
             json!({"node": 5, "state": null, "device_type": "0x00820194", "profile": 404, "vendor": 71, "vendor_name": "WIKA",
-                "product": 1, "revision": 65_543, "serial": 10_001, "name": "MH-4-CAN", "device": "mh4"}),
+                "product": 1, "revision": 1, "serial": 10_001, "name": "MH-4-CAN", "device": "mh4"}),
         ]
     );
     let keys = done.stdout.lines().next().expect("a line");

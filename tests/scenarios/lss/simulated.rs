@@ -73,7 +73,7 @@ fn refused_lost_and_late_answers() {
         ("lose = [0x43]", Ok(())),
     ] {
         let mut bus = bus(&format!("device = [{{ kind = \"mh4\", node = 5, serial = 99, lss = {{ {oddity} }} }}]"));
-        let identity = [0x47, 1, 0x0001_0007, 99];
+        let identity = [0x47, 1, 1, 99];
         let mut master = Master::new(&mut bus, Timing::default());
         let mut lss = master.lss();
         let assign = |lss: &mut cangauge::master::Lss| -> Result<(), LssError> {
