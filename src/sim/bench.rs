@@ -1,6 +1,6 @@
 //! Benches: the simulated devices on a bus, and their settings.
 //!
-//! `mh4@5,dps@127,dps@unconfigured`, or a TOML file:
+//! `mh4@5,dps@127,dps@unconfigured`, `mh4@5:pressure=0bar` with a constant value, `FILE.eds@5`, or a TOML file:
 //!
 //! ```toml
 //! clock = "virtual"          # default: "real"
@@ -110,11 +110,12 @@ impl Bench {
             let (kind, node) = text.rsplit_once('@').ok_or_else(|| {
                 BenchError::Usage(format!("\"{text}\" is not DEVICE@NODE ({DEFAULT}) and no file FILE.toml"))
             })?;
-            let node = match node {
+            let mut parts = node.split(':');
+            let node = match parts.next().unwrap_or_default() {
                 UNCONFIGURED => None,
                 number => Some(number.parse().map_err(|error| BenchError::Usage(format!("{text}: {error}")))?),
             };
-            Ok(DeviceEntry::new(kind, node))
+            Ok(DeviceEntry::new(kind, node, parts.map(str::to_owned).collect()))
         });
         let file =
             BenchFile { device: entries.collect::<Result<_, BenchError>>()?, retime: true, ..BenchFile::default() };

@@ -6,6 +6,7 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::device::catalog::Model;
 use crate::device::description::{Access, ObjectEntry, Signature, StoreGroup};
+use crate::device::dictionary::Entry;
 use crate::device::quirk::Quirk;
 use crate::device::scalar::{NumberRange, Scalar};
 use std::collections::BTreeMap;
@@ -108,7 +109,9 @@ pub(super) struct Objects {
 impl Objects {
     /// A new device under `node`.
     pub(super) fn new(model: &Model, node: NodeId) -> Objects {
-        let mut specs = BTreeMap::new();
+        // An EDS has only a dictionary.
+        let plain = model.dictionary.iter().map(|entry| (entry.object, Spec::plain(entry)));
+        let mut specs: BTreeMap<ObjectId, Spec> = plain.collect();
         for entry in &model.description.objects {
             for object in entry.objects() {
                 specs.insert(object, Spec::new(entry));
@@ -311,6 +314,29 @@ impl Spec {
             allow: entry.allow.clone(),
             default: entry.default.clone(),
             group: entry.stored.map(Group::from),
+        }
+    }
+
+    /// An object of an EDS. The words for storing and restoring are those of CiA 301.
+    fn plain(entry: &Entry) -> Spec {
+        let limit = |scalar: &Option<Scalar>| scalar.as_ref().and_then(Scalar::as_f64);
+        let signature = match (entry.object.index, entry.object.sub) {
+            (0x1010, 1..) => Some(Signature::Save),
+            (0x1011, 1..) => Some(Signature::Load),
+            _ => None,
+        };
+        Spec {
+            name: entry.name.clone(),
+            data_type: entry.data_type,
+            pdo: entry.pdo,
+            signature,
+            only_if_zero: Vec::new(),
+            access: entry.access,
+            low: limit(&entry.low),
+            high: limit(&entry.high),
+            allow: Vec::new(),
+            default: entry.default.clone(),
+            group: None,
         }
     }
 

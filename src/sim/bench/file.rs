@@ -5,7 +5,9 @@ use crate::bus::memory::Clock;
 use crate::canopen::id::{NodeId, parse_u32};
 use crate::canopen::object::ObjectId;
 use crate::device::catalog::{self, Model};
+use crate::device::eds;
 use crate::device::scalar::Scalar;
+use crate::device::unit::Unit;
 use crate::sim::data::SimChannel;
 use crate::sim::model::{Direction, Overload};
 use crate::sim::setup::{Oddities, OfflineAfter, Setup};
@@ -76,6 +78,9 @@ pub(super) struct DeviceEntry {
     channel: Vec<ChannelEntry>,
     #[serde(default)]
     overload: Vec<OverloadEntry>,
+    /// Constant values of the one-line form: `pressure=0bar`.
+    #[serde(skip)]
+    constant: Vec<String>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -162,8 +167,8 @@ fn duration<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Duration, D::E
 }
 
 impl DeviceEntry {
-    pub(super) fn new(kind: &str, node: Option<NodeId>) -> DeviceEntry {
-        DeviceEntry { kind: kind.to_owned(), node, ..DeviceEntry::default() }
+    pub(super) fn new(kind: &str, node: Option<NodeId>, constant: Vec<String>) -> DeviceEntry {
+        DeviceEntry { kind: kind.to_owned(), node, constant, ..DeviceEntry::default() }
     }
 
     /// The short form: `mh4@5`.
@@ -196,6 +201,13 @@ impl DeviceEntry {
         for changed in &self.channel {
             changed.apply(self.find(&mut setup.channels, changed.channel)?);
         }
+        for text in &self.constant {
+            self.hold(&mut setup, text).ok_or_else(|| {
+                let signals: Vec<&str> = setup.model.description.signals.iter().map(|it| it.name.as_str()).collect();
+                let message = format!("\"{text}\" is not SIGNAL=VALUE with a unit of the signal");
+                BenchError::Usage(format!("{}: {message} ({})", self.name(), signals.join(", ")))
+            })?;
+        }
         for overload in &self.overload {
             self.find(&mut setup.channels, overload.channel)?;
             if overload.from >= overload.until {
@@ -211,6 +223,20 @@ impl DeviceEntry {
         Ok(setup)
     }
 
+    /// Holds a signal at a value: `pressure=0bar`, in the unit of the simulator if none is named.
+    fn hold(&self, setup: &mut Setup, text: &str) -> Option<()> {
+        let (name, value) = text.split_once('=')?;
+        let (number, unit) =
+            value.split_at(value.find(|letter: char| !"+-.0123456789".contains(letter)).unwrap_or(value.len()));
+        let signal = setup.model.description.signals.iter().find(|signal| signal.name == name)?;
+        let channel = setup.channels.iter_mut().find(|channel| channel.channel == signal.channel)?;
+        let own = Unit(channel.unit);
+        let unit = if unit.is_empty() { own } else { Unit::from_symbol(unit.trim())? };
+        channel.base = unit.convert(number.parse().ok()?, own)?;
+        (channel.amplitude, channel.noise) = (0.0, 0.0);
+        Some(())
+    }
+
     fn find<'a>(&self, channels: &'a mut [SimChannel], number: u8) -> Result<&'a mut SimChannel, BenchError> {
         channels
             .iter_mut()
@@ -219,14 +245,20 @@ impl DeviceEntry {
     }
 
     fn model(&self, beside: &Path) -> Result<Arc<Model>, BenchError> {
-        if Path::new(&self.kind).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
-            let path = beside.join(&self.kind);
+        let is_a = |kind: &str| Path::new(&self.kind).extension().is_some_and(|it| it.eq_ignore_ascii_case(kind));
+        let path = beside.join(&self.kind);
+        if is_a("eds") || is_a("dcf") {
+            let bytes = std::fs::read(&path).map_err(|source| BenchError::Io { path: path.clone(), source })?;
+            let eds = eds::read(&bytes).map_err(|error| BenchError::Usage(format!("{}: {error}", path.display())))?;
+            return Ok(Arc::new(Model::from_eds(&eds)));
+        }
+        if is_a("toml") {
             let model = Model::from_toml(&read(&path)?);
             return model.map(Arc::new).map_err(|error| BenchError::Usage(error.in_file(&path.display().to_string())));
         }
         catalog::by_name(&self.kind).ok_or_else(|| {
             let known: Vec<&str> = catalog::names().collect();
-            BenchError::Usage(format!("no device \"{}\" ({}, or FILE.toml)", self.kind, known.join(", ")))
+            BenchError::Usage(format!("no device \"{}\" ({}, FILE.toml or FILE.eds)", self.kind, known.join(", ")))
         })
     }
 }

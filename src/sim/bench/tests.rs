@@ -1,7 +1,7 @@
 use super::*;
 use crate::bus::time::Mono;
 use crate::bus::{BitRateControl, Bus, Event};
-use crate::canopen::id::NodeId;
+use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::object::ObjectId;
 use std::time::Duration;
 
@@ -34,7 +34,7 @@ fn lists_of_devices() {
         ("mh4@0", "mh4@0: \"0\" is not a node-ID (1 to 127)"),
         ("mh4@5,", "\"\" is not DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) and no file FILE.toml"),
         ("mh4@5,dps@5", "two devices with node-ID 5"),
-        ("mh5@5", &format!("no device \"mh5\" ({}, or FILE.toml)", names.join(", "))),
+        ("mh5@5", &format!("no device \"mh5\" ({}, FILE.toml or FILE.eds)", names.join(", "))),
     ] {
         assert_eq!(refusal(Bench::parse(spec)), message);
     }
@@ -211,4 +211,55 @@ fn description_from_a_user_file() {
     let mut bus = Bench::from_toml(text, folder.path()).expect("a bench").open().expect("opened");
     bus.send(&"609#4000100000000000".parse().expect("a frame")).expect("room");
     assert_eq!(hear(&mut bus, Duration::from_secs(1)), ["709#00", "589#4300100094010000"]);
+}
+
+#[test]
+fn one_line_bench_holds_a_value() {
+    let values = |spec: &str, channel| {
+        let mut bench = Bench::parse(spec).unwrap_or_else(|error| panic!("{spec}: {error}"));
+        [0, 7000].map(|at| {
+            let bytes = bench.devices[0].value(ObjectId::new(0x6130, channel), Mono::at(Duration::from_millis(at)));
+            bytes.and_then(|bytes| bytes.try_into().ok()).map(f32::from_le_bytes)
+        })
+    };
+    assert_eq!(values("mh4@5:pressure=0bar", 1), [Some(0.0); 2]);
+    assert_eq!(values("mh4@5:pressure=250mbar:temperature=-5.5degC", 1), [Some(0.25); 2]);
+    assert_eq!(values("mh4@5:pressure=250mbar:temperature=-5.5degC", 2), [Some(-5.5); 2]);
+    assert_eq!(values("mh4@5:pressure=1", 1), [Some(1.0); 2]);
+    let moving = values("mh4@5:pressure=1", 2);
+    assert_ne!(moving[0], moving[1]);
+    for wrong in ["mh4@5:", "mh4@5:pressure", "mh4@5:level=1", "mh4@5:pressure=1degC", "mh4@5:pressure=bar"] {
+        let error = refusal(Bench::parse(wrong));
+        assert!(error.contains("is not SIGNAL=VALUE with a unit of the signal (pressure, temperature)"), "{error}");
+    }
+}
+
+#[test]
+fn eds_alone_is_a_device() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("x.eds");
+    let eds = "[DeviceInfo]\nVendorNumber=0x1234\nProductNumber=7\n[MandatoryObjects]\nSupportedObjects=2\n1=0x1000\n\
+               2=0x1018\n[1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\nDefaultValue=0x20194\n\
+               [1018]\nParameterName=Identity\nObjectType=9\nSubNumber=2\n[1018sub0]\nParameterName=Count\n\
+               DataType=5\nAccessType=ro\nDefaultValue=1\n[1018sub1]\nParameterName=Vendor\nDataType=7\n\
+               AccessType=ro\nDefaultValue=0x1234\n";
+    std::fs::write(&path, eds).expect("written");
+    let bench = Bench::parse(&format!("{}@9", path.display())).expect("a bench");
+    assert_eq!(nodes(&bench), [9]);
+    let mut bus = bench.open().expect("no record");
+    let mut answer = |request: &str| {
+        bus.send(&request.parse().expect("a frame")).expect("sent");
+        loop {
+            match bus.receive(Mono::at(Duration::from_secs(5))) {
+                Ok(Event::Frame(received)) if received.frame.id() == CanId::Standard(0x589) => {
+                    return received.frame.to_string();
+                }
+                Ok(Event::Frame(_)) => {}
+                other => return format!("{other:?}"),
+            }
+        }
+    };
+    assert_eq!(answer("609#4000100000000000"), "589#4300100094010200");
+    assert_eq!(answer("609#4018100100000000"), "589#4318100134120000");
+    assert!(refusal(Bench::parse("missing.eds@5")).starts_with("missing.eds: "));
 }
