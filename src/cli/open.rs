@@ -32,8 +32,12 @@ const WAIT_INTERVAL: Duration = Duration::from_millis(200);
 const CLAIM_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The bus that the options name, or else the only CAN interface that is up.
-pub(super) fn spec(global: &Global) -> Result<BusSpec, ErrorMessage> {
-    global.bus.clone().map_or_else(only_interface, Ok)
+pub(super) fn spec(global: &Global) -> anyhow::Result<BusSpec> {
+    let is_down = |error: &ErrorMessage| interfaces().iter().all(|(_, up)| !up).then(|| error.message.clone());
+    match &global.bus {
+        Some(bus) => Ok(bus.clone()),
+        None => Ok(within(global, only_interface, is_down)??),
+    }
 }
 
 /// Opens the bus that the options name, or else the only CAN interface that is up.
@@ -69,7 +73,7 @@ pub(super) fn open_as(global: &Global, spec: &BusSpec, even_down: bool) -> anyho
     let bus: Box<dyn Bus> = match spec {
         BusSpec::Sim(bench) => Box::new(simulated(bench.as_deref())?),
         BusSpec::Replay(spec) => Box::new(recording(global, spec)?),
-        BusSpec::SocketCan(name) => within(global, || socketcan(name, even_down))?,
+        BusSpec::SocketCan(name) => within(global, || socketcan(name, even_down), is_missing)?.or_fail()?,
     };
     // After the bus: without one, an existing trace keeps its content. Nothing was sent yet.
     let bus: Box<dyn Bus> = match &global.trace {
@@ -137,25 +141,36 @@ fn recording(global: &Global, spec: &str) -> anyhow::Result<Replay> {
     Ok(if global.pace { bus.in_real_time(Box::new(interrupts()?)) } else { bus })
 }
 
-/// Opens an interface, and waits as long as `--wait` allows if it is missing or down.
-fn within<T>(global: &Global, mut open: impl FnMut() -> Result<T, BusError>) -> anyhow::Result<T> {
+/// Why an interface cannot be opened yet.
+fn is_missing(error: &BusError) -> Option<String> {
+    matches!(error, BusError::NoInterface(_) | BusError::Down(_)).then(|| error.to_string())
+}
+
+/// Tries again, as long as `--wait` allows, while `obstacle` names something that may change.
+///
+/// # Errors
+/// Ctrl-C. The result inside is that of the last attempt.
+fn within<T, E>(
+    global: &Global,
+    mut attempt: impl FnMut() -> Result<T, E>,
+    obstacle: impl Fn(&E) -> Option<String>,
+) -> anyhow::Result<Result<T, E>> {
     let mut left = global.wait.map_or(Duration::ZERO, |wait| wait.0);
     let mut interrupts = None;
     loop {
-        match open() {
-            Err(error @ (BusError::NoInterface(_) | BusError::Down(_))) if !left.is_zero() => {
-                if interrupts.is_none() {
-                    global.console().note(&format!("{error}; waiting up to {}", format_duration(left)));
-                    interrupts = Some(self::interrupts()?);
-                }
-                let pause = left.min(WAIT_INTERVAL);
-                if interrupts.as_mut().is_some_and(|interrupts| interrupts.wait_for(pause)) {
-                    return Err(Failure::from(Error::Interrupted).into());
-                }
-                left -= pause;
-            }
-            opened => return Ok(opened.or_fail()?),
+        let result = attempt();
+        let Some(why) = result.as_ref().err().and_then(&obstacle).filter(|_| !left.is_zero()) else {
+            return Ok(result);
+        };
+        if interrupts.is_none() {
+            global.console().note(&format!("{why}; waiting up to {}", format_duration(left)));
+            interrupts = Some(self::interrupts()?);
         }
+        let pause = left.min(WAIT_INTERVAL);
+        if interrupts.as_mut().is_some_and(|interrupts| interrupts.wait_for(pause)) {
+            return Err(Failure::from(Error::Interrupted).into());
+        }
+        left -= pause;
     }
 }
 
@@ -251,11 +266,12 @@ mod tests {
         let mut attempts = 0;
         let mut up_at = |attempt, error: fn(String) -> BusError| {
             attempts = 0;
-            let opened = within(&global, || {
+            let attempt = || {
                 attempts += 1;
                 if attempts == attempt { Ok(()) } else { Err(error("can0".to_owned())) }
-            });
-            (opened.is_ok(), attempts)
+            };
+            let opened = within(&global, attempt, is_missing);
+            (opened.is_ok_and(|opened| opened.is_ok()), attempts)
         };
         assert_eq!(up_at(2, BusError::Down), (true, 2));
         assert_eq!(up_at(2, BusError::NoInterface), (true, 2));
