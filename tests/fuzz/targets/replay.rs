@@ -1,4 +1,4 @@
-//! Replays a candump log.
+//! Replays a recording.
 #![no_main]
 
 use cangauge::bus::replay::Replay;
@@ -29,6 +29,7 @@ fuzz_target!(|data: &[u8]| {
         };
         assert!(at.mono >= last, "time goes back");
         (last, events) = (at.mono, events + 1);
-        assert!(events <= lines, "more than there is");
+        // Compressed data may have more lines than it shows.
+        assert!(events <= lines || data.starts_with(b"\x1f\x8b"), "more than there is");
     }
 });
