@@ -15,7 +15,8 @@ use clap::Args;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b vcan0 sim mh4@5 dps@127\n  cangauge -b vcan0 sim bench.toml")]
 pub(crate) struct Sim {
-    /// Devices: mh4@5 dps@127, mh4@unconfigured for one without a node-ID; or a bench file in TOML
+    /// Devices: mh4@5 dps@127, mh4@unconfigured for one without a node-ID, mh4@5:pressure=0bar with a constant value,
+    /// FILE.eds@5 from an EDS; or a bench file in TOML
     #[arg(required = true, value_name = "DEVICE@NODE|FILE.toml")]
     devices: Vec<String>,
 }
