@@ -1,6 +1,6 @@
 //! Fastscan over a bus. In fastscan, a missing answer means "no", so the time-outs decide the duration.
 
-use super::{Lss, LssError};
+use super::{Lss, LssError, RETRY_PAUSE};
 use crate::bus::Mono;
 use crate::canopen::lss::{Fastscan, LssAddress, Mode, Progress, Step, Wait};
 use std::time::Duration;
@@ -24,6 +24,8 @@ struct Pace {
     /// The slowest recent answer; old ones are forgotten gradually.
     slowest: Duration,
     timeout: Duration,
+    /// The shortest time between two frames.
+    pause: Duration,
 }
 
 impl Pace {
@@ -35,7 +37,7 @@ impl Pace {
     /// The time-out of a step: 1.5 times the slowest answer plus a margin, doubled for each earlier time-out that was
     /// too short.
     fn usual(self, extensions: u8) -> Duration {
-        self.stretched(MIN_STEP_TIMEOUT.max(self.slowest * 3 / 2 + HOST_MARGIN), extensions)
+        self.stretched(MIN_STEP_TIMEOUT.max(self.pause).max(self.slowest * 3 / 2 + HOST_MARGIN), extensions)
     }
 
     /// The time-out for an expected answer.
@@ -68,8 +70,16 @@ impl Lss<'_, '_> {
     /// # Errors
     /// As [`Lss::fastscan`], or a slave in `aside` does not answer.
     pub fn fastscan_beside(&mut self, aside: &[LssAddress]) -> Result<Option<LssAddress>, LssError> {
+        match self.scan_with_pauses(aside, Duration::ZERO)? {
+            None if self.master.timing.retries > 0 => self.scan_with_pauses(aside, RETRY_PAUSE),
+            found => Ok(found),
+        }
+    }
+
+    /// A fastscan with at least this time between two frames.
+    fn scan_with_pauses(&mut self, aside: &[LssAddress], pause: Duration) -> Result<Option<LssAddress>, LssError> {
         let mut scan = Fastscan::new(self.master.timing.retries);
-        let mut pace = Pace { slowest: Duration::ZERO, timeout: self.master.timing.timeout };
+        let mut pace = Pace { slowest: Duration::ZERO, timeout: self.master.timing.timeout, pause };
         self.is_configuring = true;
         self.discard_received()?;
         loop {
@@ -80,8 +90,11 @@ impl Lss<'_, '_> {
                 for address in aside {
                     self.switch_selective(address)?;
                 }
+                self.pause(pause)?;
             }
+            let next_at = self.master.now() + pause;
             let answers = self.step(step, &mut pace)?;
+            self.pause(next_at.since(self.master.now()))?;
             match scan.on_end(answers) {
                 Progress::Continue => {}
                 Progress::NoneFound => {

@@ -8,8 +8,8 @@ use crate::output::notes::NoteText;
 use crate::tasks::Failure;
 use crate::tasks::failure::LssError;
 use crate::tasks::lss::{
-    DeviceName, HostObstacle, LssCause, LssEffect, LssFailure, Neighbour, NextStep, NotReset, RequestedRate, Setting,
-    TakenSign,
+    DeviceName, DuplicateSign, HostObstacle, LssCause, LssEffect, LssFailure, Neighbour, NextStep, NotReset,
+    RequestedRate, Setting, TakenSign,
 };
 
 /// What to do if one identity or one node-ID belongs to several devices.
@@ -31,6 +31,9 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
             Words::new("it has no serial number, so it cannot be distinguished from another device")
                 .hint("connect only this device, and use the target \"only\"")
         }
+        LssCause::DuplicateNodeId(DuplicateSign::OtherMaster) => {
+            Words::new(duplicate(DuplicateSign::OtherMaster)).hint("stop the other program, or try again")
+        }
         LssCause::DuplicateNodeId(sign) => {
             Words::new(format!("{}: it seems that several devices have this node-ID", duplicate(*sign))).hint(
                 "connect one device at a time, or name one by the identity on its label: \
@@ -38,7 +41,7 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
             )
         }
         LssCause::NoAnswer(waited) => Words::new(format!("no answer within {}", format_duration(*waited)))
-            .hint("list the devices: cangauge lss scan"),
+            .hint("check its node-ID, power and cable; list the devices: cangauge lss scan"),
         LssCause::OtherNodeIdByLss(found) => {
             let found = found.map_or_else(|| "has no node-ID".to_owned(), |found| format!("has node-ID {found}"));
             Words::new(format!("a device with the same identity answers LSS and {found}")).hint(CONNECT_ALONE)
@@ -162,6 +165,9 @@ fn after_reset(failure: &Failure, cause: &LssCause) -> Words {
             Words::new(format!("another device answers under the new node-ID: {found}"))
         }
         LssCause::NotIdentified => Words::new("the device with the new node-ID reports no identity"),
+        LssCause::DuplicateNewNodeId(DuplicateSign::OtherMaster) => {
+            Words::new(duplicate(DuplicateSign::OtherMaster)).hint("stop the other program, and check: cangauge scan")
+        }
         LssCause::DuplicateNewNodeId(sign) => {
             Words::new(format!("{}: several devices have this node-ID", duplicate(*sign)))
         }

@@ -100,9 +100,7 @@ fn prepare(
     notify: Notify<'_>,
 ) -> Result<(LssDevice, AssignEntry, Option<PlannedRate>), Failure> {
     let device = resolve(master, &job.target, &job.descriptions, (job.via, job.force), notify)?;
-    let mut method = choose_method(&device, job.via, job.store, notify)?;
-    // Nothing is known of the device: it may answer LSS in STOPPED only.
-    method.retry_stopped |= device.description().is_none_or(|description| description.assign.is_empty());
+    let method = choose_method(&device, job.via, job.store, notify)?;
     let plan = |rate| plan_rate(device.description(), rate, method.way).map_err(|cause| device.failure(cause));
     let rate = job.rate.map(plan).transpose()?;
     if let (Some(RequestedRate::Bits(_)), RateSource::Standard) = (job.rate, RateTable::of(device.description()).source)

@@ -55,7 +55,9 @@ pub(super) fn choose_method(
             Some(objects.ok_or_else(|| device.failure(LssCause::ObjectsUnknown))?)
         }
     };
-    let entry = entry.unwrap_or_else(AssignEntry::lss);
+    let mut entry = entry.unwrap_or_else(AssignEntry::lss);
+    // Nothing is known of the device: it may answer LSS in STOPPED only.
+    entry.retry_stopped |= description.is_none_or(|description| description.assign.is_empty());
     if entry.way == AssignKind::Objects {
         check_objects(device, &entry, store, notify)?;
     }

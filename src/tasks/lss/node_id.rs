@@ -84,12 +84,15 @@ pub(super) fn occupant(master: &mut Master<'_>, node: NodeId) -> Result<Occupant
                         false => Occupant::None(waited),
                     });
                 }
+                Err(SdoError { failure: SdoFailure::TwoDevices(_), .. }) if !monitor.has_other_master => {
+                    return Ok(Occupant::Several(DuplicateSign::AnswersDiffer));
+                }
                 Err(error) => return Err(error.into()),
             };
             if sub == 4 {
                 monitor.listen(master, SECOND_ANSWER_TIMEOUT)?;
             }
-            if let Some(sign) = monitor.sign() {
+            if let Some(sign) = monitor.sign(master) {
                 return Ok(Occupant::Several(sign));
             }
         }
@@ -106,23 +109,24 @@ pub(super) fn occupant(master: &mut Master<'_>, node: NodeId) -> Result<Occupant
     })
 }
 
-/// Watches the SDO channel of a node for frames other than the expected answers.
+/// Watches the SDO channel of a node for another master and for collisions.
 struct SdoMonitor {
     node: NodeId,
-    has_extra_answer: bool,
     has_other_master: bool,
     has_collision: bool,
 }
 
 impl SdoMonitor {
     fn new(node: NodeId) -> SdoMonitor {
-        SdoMonitor { node, has_extra_answer: false, has_other_master: false, has_collision: false }
+        SdoMonitor { node, has_other_master: false, has_collision: false }
     }
 
-    fn sign(&self) -> Option<DuplicateSign> {
+    fn sign(&self, master: &Master<'_>) -> Option<DuplicateSign> {
+        // The master knows which frames are answers to other masters or late ones.
+        let has_second_answer = || master.second_answers().iter().any(|(node, _)| *node == self.node);
         match self {
             SdoMonitor { has_other_master: true, .. } => Some(DuplicateSign::OtherMaster),
-            SdoMonitor { has_extra_answer: true, .. } => Some(DuplicateSign::AnswersTwice),
+            _ if has_second_answer() => Some(DuplicateSign::AnswersTwice),
             SdoMonitor { has_collision: true, .. } => Some(DuplicateSign::AnswersCollide),
             SdoMonitor { .. } => None,
         }
@@ -131,9 +135,7 @@ impl SdoMonitor {
     fn on_event(&mut self, event: &Happening) {
         match event {
             Happening::Frame(received) => {
-                let id = received.frame.id();
-                self.has_extra_answer |= id.sdo_response_node() == Some(self.node);
-                self.has_other_master |= id.sdo_request_node() == Some(self.node);
+                self.has_other_master |= received.frame.id().sdo_request_node() == Some(self.node);
             }
             Happening::Fault(fault, _) => self.has_collision |= is_collision(*fault),
             _ => {}

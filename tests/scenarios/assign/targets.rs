@@ -13,6 +13,7 @@ use cangauge::sim::{Device, State};
 use cangauge::tasks::Kind;
 use cangauge::tasks::lss::{Confirmed, Descriptions, Job, RequestedRate, Target, Via, assign, store};
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 const ALL: &str = "device = [
     { kind = 'mh4', node = 1 }, { kind = 'd20', node = 2 }, { kind = 'mc1609', node = 3 }, { kind = 'dps', node = 127 },
@@ -119,6 +120,44 @@ fn answers_that_differ_show_two_devices() {
     let done = run(&mut bus, "5", &id(12));
     assert_eq!(done.failure().0, Kind::CheckFailed);
     assert!(done.failure().1.contains("its answers to the same request differ"), "{}", done.failure().1);
+}
+
+/// Another master reads node 5: these frames are sent every 3 ms.
+struct OtherMaster(&'static [&'static str], usize, Mono);
+
+impl Station for OtherMaster {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, _: Mono, _: &Frame, _: &mut Outbox) {}
+
+    fn wake(&mut self, now: Mono, out: &mut Outbox) {
+        out.send(self.0[self.1 % self.0.len()].parse().unwrap());
+        (self.1, self.2) = (self.1 + 1, now + Duration::from_millis(3));
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        Some(self.2)
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+#[test]
+fn traffic_of_another_master_is_no_second_device() {
+    // Its answers alone (its requests came before) prove nothing; its requests are reported.
+    for (frames, expected) in [
+        (&["585#4B17100000000000"][..], None),
+        (&["585#4300200012345678", "585#0000000000000000"], None),
+        (&["605#4017100000000000"], Some("another master sends requests to it")),
+        (&["605#4018100100000000", "585#4318100147000000"], Some("another master sends requests to it")),
+    ] {
+        let mut bus = bus("device = [{ kind = 'mh4', node = 5 }]");
+        bus.attach(OtherMaster(frames, 0, Mono::START));
+        let done = run(&mut bus, "5", &id(12));
+        let message = done.result.as_ref().err().map(|failure| ErrorMessage::of(failure).message).unwrap_or_default();
+        assert!(!message.contains("several devices"), "{frames:?}: {message}");
+        assert!(expected.is_none_or(|text| message.contains(text)), "{frames:?}: {message}");
+    }
 }
 
 #[test]

@@ -55,6 +55,17 @@ fn slow_slaves_are_found() {
 }
 
 #[test]
+fn slaves_that_need_pauses_are_found() {
+    for pause in [10, 50, 190] {
+        let mut slave = Slave::new(DPS, 0xff);
+        slave.pause = Duration::from_millis(pause);
+        let mut bus = bus_of([slave]);
+        let (found, configuring) = scan(&mut bus);
+        assert_eq!((found.unwrap(), configuring), (Some(address(DPS)), vec![DPS]), "{pause} ms");
+    }
+}
+
+#[test]
 fn three_slaves_are_found_without_changing_them() {
     let identities = [DPS, [0x362, 0x0044_3150, 0x0001_0000, 20003], [0x47, 1, 0x0001_0007, 99]];
     for latencies in [[300, 300, 300], [200, 900, 1600], [100, 3000, 200], [5000, 100, 100]] {

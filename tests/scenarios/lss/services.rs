@@ -69,6 +69,17 @@ fn address_is_repeated_from_its_first_part() {
 }
 
 #[test]
+fn address_is_repeated_with_pauses() {
+    for pause in [10, 190] {
+        let mut slave = Slave::new(ONE, 5);
+        slave.pause = Duration::from_millis(pause);
+        let mut bus = bus_of([slave]);
+        run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();
+        assert_eq!(bus.stations::<Slave>().map(|slave| slave.node).collect::<Vec<_>>(), [12], "{pause} ms");
+    }
+}
+
+#[test]
 fn store_has_a_long_timeout_and_is_sent_once() {
     let mut bus = bus_of([Slave::new(ONE, 5).slow(&[300, 300, 2_900_000])]);
     run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();

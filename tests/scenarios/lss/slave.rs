@@ -23,6 +23,10 @@ pub(super) struct Slave {
     pub(super) answers_all_fastscans: Option<bool>,
     /// The numbers of the answers that are lost, counted from 0.
     pub(super) loses: BTreeSet<usize>,
+    /// It loses frames that arrive within this time after the previous one.
+    pub(super) pause: Duration,
+    /// When it received the last frame that was not lost.
+    received_at: Option<Mono>,
     /// The number of services it received that address one slave.
     pub(super) commands: usize,
     selected: usize,
@@ -44,6 +48,8 @@ impl Slave {
             answers: BTreeMap::new(),
             answers_all_fastscans: None,
             loses: BTreeSet::new(),
+            pause: Duration::ZERO,
+            received_at: None,
             commands: 0,
             selected: 0,
             identified: 0,
@@ -154,6 +160,10 @@ impl Station for Slave {
 
     fn receive(&mut self, now: Mono, frame: &Frame, _: &mut Outbox) {
         let (true, Some(data)) = (frame.id() == CanId::LSS_MASTER, frame.all_eight()) else { return };
+        if self.received_at.is_some_and(|at| now.since(at) < self.pause) {
+            return;
+        }
+        self.received_at = Some(now);
         let Some(mut answer) = self.answer(data) else { return };
         if !self.answers.contains_key(&data[0]) {
             answer.resize(8, 0);
