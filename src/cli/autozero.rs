@@ -44,7 +44,7 @@ pub(crate) struct Autozero {
     store: bool,
     /// Measure and check only; change nothing
     #[arg(long)]
-    dry_run: bool,
+    pub(super) dry_run: bool,
 }
 
 fn parse_limit(text: &str) -> Result<Limit, String> {

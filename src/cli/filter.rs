@@ -2,11 +2,10 @@
 
 use super::Global;
 use super::args::Duration;
-use super::each::on_node;
+use super::each::{on_channels, print_notes};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
-use crate::output::notes;
-use crate::tasks::settings::filter::{FilterReport, FilterRequest, FilterType, set, show};
+use crate::tasks::settings::filter::{FilterRequest, FilterType, has_filter, set, show};
 use clap::{Args, ValueEnum};
 
 /// Show or set the filter of a signal: type (61A0h) and constant (61A1h)
@@ -20,7 +19,8 @@ use clap::{Args, ValueEnum};
 pub(crate) struct Filter {
     /// Node-ID: 5, 0x7f
     node: NodeId,
-    /// Signal: pressure, temperature, ch1 to ch16 [default: all; to set: the only one with a filter]
+    /// Signal: pressure, temperature, ch1 to ch16; several: ch1-ch4, ch1,ch3, all [default: all; to set: the only one
+    /// with a filter]
     signal: Option<String>,
     /// Filter type
     #[arg(long = "type", value_name = "TYPE")]
@@ -62,16 +62,16 @@ impl Filter {
             damping: self.damping.map(|damping| damping.0),
         };
         let signal = self.signal.as_deref();
-        if wanted == FilterRequest::default() {
-            let filters = on_node(global, self.node, |master, node| show(master, node, signal))?;
-            let filters =
-                filters.into_iter().map(|filter| FilterReport { filter, damping_shown: None, notes: Vec::new() });
-            return global.print(&filters.collect::<Vec<_>>());
-        }
-        let change = on_node(global, self.node, |master, node| set(master, node, signal, wanted))?;
-        let report = change.into_report();
-        global.print(std::slice::from_ref(&report))?;
-        report.notes.iter().for_each(|note| notes::print(&global.console(), note));
-        Ok(())
+        let each = on_channels(global, self.node, signal, has_filter, |master, node, signal| {
+            match wanted == FilterRequest::default() {
+                true => show(master, node, signal),
+                false => Ok(vec![set(master, node, signal, wanted)?]),
+            }
+        })?;
+        let (reports, end) = each.into_parts();
+        let reports = reports.concat();
+        global.print(&reports)?;
+        print_notes(global, reports.iter().flat_map(|report| &report.notes));
+        end.end()
     }
 }

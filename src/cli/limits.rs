@@ -1,12 +1,11 @@
 //! `cangauge limits`.
 
 use super::Global;
-use super::each::on_node;
+use super::each::{on_channels, print_notes};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::failure::ErrorMessage;
-use crate::output::notes;
-use crate::tasks::settings::limits::{Limit, set, show};
+use crate::tasks::settings::limits::{Limit, has_limits, set, show};
 use clap::Args;
 
 /// Show or set what triggers a TPDO: delta, limits, hysteresis (x133h to x136h)
@@ -20,7 +19,7 @@ use clap::Args;
 pub(crate) struct Limits {
     /// Node-ID: 5, 0x7f
     node: NodeId,
-    /// Signal: pressure, temperature, ch1 to ch16
+    /// Signal: pressure, temperature, ch1 to ch16; several: ch1-ch4, ch1,ch3, all
     signal: String,
     /// Send if the value changes by at least this; 0: off
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = finite)]
@@ -61,12 +60,16 @@ impl Limits {
                 return Err(ErrorMessage::usage(message).into());
             }
         }
-        let report = on_node(global, self.node, |master, node| match wanted.is_empty() {
-            true => show(master, node, &self.signal),
-            false => set(master, node, &self.signal, &wanted),
+        let each = on_channels(global, self.node, Some(&self.signal), has_limits, |master, node, signal| {
+            let signal = signal.unwrap_or(&self.signal);
+            match wanted.is_empty() {
+                true => show(master, node, signal),
+                false => set(master, node, signal, &wanted),
+            }
         })?;
-        global.print(std::slice::from_ref(&report))?;
-        report.notes.iter().for_each(|note| notes::print(&global.console(), note));
-        Ok(())
+        let (reports, end) = each.into_parts();
+        global.print(&reports)?;
+        print_notes(global, reports.iter().flat_map(|report| &report.notes));
+        end.end()
     }
 }

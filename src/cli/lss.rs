@@ -107,6 +107,10 @@ impl LssCommand {
         Claim::Bus
     }
 
+    pub(super) fn changes_devices(&self) -> bool {
+        !matches!(self.action, Action::Scan | Action::Inquire(_) | Action::Identify(_))
+    }
+
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         match &self.action {
             Action::Scan => run_scan(global),

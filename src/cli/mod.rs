@@ -174,6 +174,14 @@ pub struct Global {
     #[arg(skip)]
     pub(crate) on_two_devices: OnTwoDevices,
 
+    /// Whether the command shows NMT states: unusual heartbeats are then reported.
+    #[arg(skip)]
+    pub(crate) shows_states: bool,
+
+    /// Whether the command changes something in devices that lasts.
+    #[arg(skip)]
+    pub(crate) changes_devices: bool,
+
     /// Descriptions that are yet to be compared with the devices of these nodes.
     #[arg(skip)]
     pub(crate) pending: RefCell<Option<(Vec<Named>, Vec<NodeId>)>>,
@@ -281,6 +289,24 @@ impl Command {
     }
 }
 
+impl Command {
+    /// Whether it changes something in devices that a later command could see.
+    fn changes_devices(&self) -> bool {
+        match self {
+            Command::Lss(lss) => lss.changes_devices(),
+            Command::Nmt(nmt) => nmt.changes_devices(),
+            Command::Config(config) => !config.only_reads(),
+            Command::Autozero(autozero) => !autozero.dry_run,
+            _ => self.on_two_devices() == OnTwoDevices::RefuseWrites,
+        }
+    }
+}
+
+/// Whether a simulated bus is described by a file, not by a list of devices.
+fn is_bench_file(bench: &Option<String>) -> bool {
+    bench.as_ref().is_some_and(|bench| bench.ends_with(".toml"))
+}
+
 /// Adds the arguments of a command.
 type Augment = fn(clap::Command) -> clap::Command;
 
@@ -381,6 +407,12 @@ impl Global {
                 self.console().warn(&output::failure::second_answer(node, answers));
             }
         }
+        for (node, length) in master.odd_heartbeats().filter(|_| self.shows_states) {
+            self.console().warn(&output::events::heartbeat_text(node, length));
+        }
+        if self.changes_devices && result.is_ok() && matches!(&spec, BusSpec::Sim(bench) if !is_bench_file(bench)) {
+            self.console().note("the simulated devices start afresh with every command: they do not keep this change");
+        }
         let finished = bus.finish().or_fail();
         let result = result?;
         finished?;
@@ -424,6 +456,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         claim: cli.command.claim(),
         only_reads: cli.command.only_reads(),
         on_two_devices: cli.command.on_two_devices(),
+        shows_states: matches!(cli.command, Command::Scan(_) | Command::Nmt(_)),
+        changes_devices: cli.command.changes_devices(),
         ..cli.global.clone()
     };
     let broken = own::load()?;

@@ -116,6 +116,10 @@ impl Nmt {
         }
     }
 
+    pub(super) fn changes_devices(&self) -> bool {
+        !matches!(&self.action, Action::State(_) | Action::Watch(_) | Action::Startup(StartupArgs { set: None, .. }))
+    }
+
     pub(super) fn writes(&self) -> bool {
         match &self.action {
             Action::Startup(args) => args.set.is_some(),

@@ -17,8 +17,8 @@ use crate::output::notes;
 use crate::output::progress::Transfer;
 use crate::output::sdo::{ObjectValue, ValueForm};
 use crate::output::text;
-use crate::tasks::Failure;
 use crate::tasks::sdo::{FILE_LIMIT, ReadOptions, clipping, encode, find_form, read, write};
+use crate::tasks::{Failure, Note};
 use clap::{Args, Subcommand, ValueEnum};
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -318,7 +318,8 @@ impl WriteArgs {
                 bar.finish();
                 let written = text::wire_bytes(&bytes);
                 global.console().detail(&format!("node {}: {at} written: {written}", self.node));
-                clipping(master, &node, at).iter().for_each(|note| notes::print(&global.console(), note));
+                let doubts = Note::out_of_range(&node, at, &bytes).into_iter().chain(clipping(master, &node, at));
+                doubts.for_each(|note| notes::print(&global.console(), &note));
             }
             Ok(())
         })

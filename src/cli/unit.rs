@@ -1,14 +1,15 @@
 //! `cangauge unit`.
 
 use super::Global;
-use super::each::on_node;
+use super::each::{on_channels, print_notes};
 use super::read::parse_unit;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit as Code;
+use crate::measure::layout::Signal;
+use crate::node::Node;
 use crate::output::failure::ErrorMessage;
-use crate::output::notes;
-use crate::tasks::settings::unit::{set, show};
+use crate::tasks::settings::unit::{is_alike, set, show};
 use clap::Args;
 
 /// Show or set the physical unit of a signal (6131h)
@@ -22,7 +23,7 @@ use clap::Args;
 pub(crate) struct Unit {
     /// Node-ID: 5, 0x7f
     node: NodeId,
-    /// Signal (pressure, temperature, ch1 to ch16), and the unit to set (bar, psi, MPa, kPa, mbar, degC, K, or the
+    /// Signal (pressure, temperature, ch1 to ch16; several: ch1-ch4, ch1,ch3, all), and the unit to set (bar, psi, MPa, kPa, mbar, degC, K, or the
     /// code 0x004E0000)
     #[arg(value_names = ["SIGNAL", "UNIT"], num_args = 0..=2)]
     words: Vec<String>,
@@ -40,15 +41,25 @@ impl Unit {
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let (signal, unit) = self.words().map_err(ErrorMessage::usage)?;
-        match unit {
-            None => global.print(&on_node(global, self.node, |_, node| show(node, signal))?),
-            Some(unit) => {
-                let change = on_node(global, self.node, |master, node| set(master, node, signal, unit))?;
-                global.print(std::slice::from_ref(&change))?;
-                change.notes.iter().for_each(|note| notes::print(&global.console(), note));
-                Ok(())
-            }
-        }
+        let Some(unit) = unit else {
+            let each = on_channels(
+                global,
+                self.node,
+                signal,
+                |_, signal| signal.unit.is_some(),
+                |_, node, signal| show(node, signal),
+            )?;
+            let (units, end) = each.into_parts();
+            global.print(&units.concat())?;
+            return end.end();
+        };
+        let is_alike = |_: &Node, signal: &Signal| is_alike(signal, unit);
+        let each =
+            on_channels(global, self.node, signal, is_alike, |master, node, signal| set(master, node, signal, unit))?;
+        let (changes, end) = each.into_parts();
+        global.print(&changes)?;
+        print_notes(global, changes.iter().flat_map(|change| &change.notes));
+        end.end()
     }
 
     /// A single word is a unit if it names one, otherwise a signal.

@@ -21,6 +21,22 @@ const KINDS: [(u16, &str); 16] = [
     (100, "temperature transducer"),
 ];
 
+/// The code for a word: `J`, `type K`, `Pt 100`.
+pub fn code(word: &str) -> Option<u16> {
+    KINDS.iter().find(|(_, kind)| is_same(kind, word)).map(|(code, _)| *code)
+}
+
+/// Whether two words mean the same kind of sensor. Case, blanks and the words "thermocouple" and "type" do not count.
+pub fn is_same(one: &str, other: &str) -> bool {
+    let bare = |text: &str| {
+        let folded = text.to_lowercase();
+        let words = folded.split([' ', '-', '_']).filter(|word| !matches!(*word, "thermocouple" | "type"));
+        words.collect::<String>()
+    };
+    let bare_word = bare(one);
+    !bare_word.is_empty() && bare_word == bare(other)
+}
+
 /// The meaning of a code of 6110h; `None` if it is unknown. Codes above 10000 are manufacturer-specific.
 pub fn kind(code: u16) -> Option<&'static str> {
     KINDS.iter().find(|(known, _)| *known == code).map(|(_, kind)| *kind)
@@ -28,7 +44,7 @@ pub fn kind(code: u16) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::kind;
+    use super::{code, is_same, kind};
 
     #[test]
     fn codes_of_the_manuals() {
@@ -36,5 +52,23 @@ mod tests {
         assert_eq!(kind(100), Some("temperature transducer"));
         assert_eq!(kind(2), Some("thermocouple K"));
         assert_eq!(kind(10_501), None);
+    }
+
+    #[test]
+    fn words_for_a_sensor_are_found() {
+        for (word, expected) in [
+            ("J", Some(1)),
+            ("type k", Some(2)),
+            ("thermocouple-T", Some(7)),
+            ("Pt100", Some(30)),
+            ("PT 1000", Some(33)),
+            ("Pressure Transducer", Some(90)),
+            ("Pt10", None),
+            ("type", None),
+            ("", None),
+        ] {
+            assert_eq!(code(word), expected, "{word}");
+        }
+        assert!(is_same("thermocouple type K", "K") && !is_same("thermocouple type K", "J"));
     }
 }

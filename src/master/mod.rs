@@ -217,6 +217,11 @@ impl<'bus> Master<'bus> {
         self.sdo.second_answers().collect()
     }
 
+    /// The nodes whose heartbeats have not one byte, and the length of the first such heartbeat.
+    pub fn odd_heartbeats(&self) -> impl Iterator<Item = (NodeId, usize)> {
+        self.sdo.odd_heartbeats()
+    }
+
     /// Makes sure, before the first write to a node, that no two devices have its node-ID.
     ///
     /// # Errors
@@ -354,6 +359,7 @@ impl<'bus> Master<'bus> {
                     }
                     self.sdo.on_time(at, &self.timing, &mut self.outgoing);
                     if !self.sdo.on_frame(&received, &self.timing, &mut self.outgoing) {
+                        self.sdo.on_other_frame(&received.frame);
                         return Ok(Happening::Frame(received));
                     }
                 }

@@ -13,6 +13,7 @@ use super::send::Outgoing;
 use crate::bus::{Mono, Received};
 use crate::canopen::frame::Frame;
 use crate::canopen::id::NodeId;
+use crate::canopen::nmt::Life;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::{AbortCode, TransferError, proves_60};
 use std::collections::{BTreeMap, VecDeque};
@@ -57,9 +58,22 @@ pub(super) struct SdoClient {
     can_start: bool,
     on_two_devices: OnTwoDevices,
     clues: Clues,
+    /// The length of the first heartbeat of each node that has not one byte.
+    odd_heartbeats: BTreeMap<NodeId, usize>,
 }
 
 impl SdoClient {
+    /// Records a heartbeat of another length than one byte.
+    pub(super) fn on_other_frame(&mut self, frame: &Frame) {
+        if let Some((node, length)) = Life::odd_length(frame) {
+            self.odd_heartbeats.entry(node).or_insert(length);
+        }
+    }
+
+    pub(super) fn odd_heartbeats(&self) -> impl Iterator<Item = (NodeId, usize)> {
+        self.odd_heartbeats.iter().map(|(&node, &length)| (node, length))
+    }
+
     pub(super) fn submit(&mut self, request: Request) -> Ticket {
         let ticket = Ticket { number: self.next_ticket, node: request.node };
         self.next_ticket += 1;

@@ -8,7 +8,8 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::description::{ObjectEntry, Signature};
 use crate::device::dictionary::{self, Entry};
 use crate::device::nearest::distance;
-use crate::device::standard;
+use crate::device::profiles::MEASURING;
+use crate::device::{sensor, standard};
 use crate::master::{Master, Request, SdoError, SdoFailure};
 use crate::measure::decode::Wanted;
 use crate::measure::layout::{PROCESS_VALUES, Signal};
@@ -203,18 +204,21 @@ pub fn encode(node: &Node, object: ObjectId, data_type: DataType, text: &str) ->
     encoded.or_else(|error| word(node, object, data_type, text).ok_or(Error::Value { node: node.id, object, error }))
 }
 
-/// The bytes for a word instead of a number: the signature of the object, or one of the numbers that its description
-/// explains.
+/// The bytes for a word instead of a number: the signature of the object, one of the numbers that its description
+/// explains, or a sensor type of CiA 404 (6110h).
 pub fn word(node: &Node, object: ObjectId, data_type: DataType, text: &str) -> Option<Vec<u8>> {
     if !matches!(data_type, DataType::Unsigned(_) | DataType::Integer(_)) {
         return None;
     }
+    let is_sensor = object.index == 0x6110 && object.sub > 0 && node.identity.profile() == Some(MEASURING);
+    let is_meant = |word: &str| word.eq_ignore_ascii_case(text) || is_sensor && sensor::is_same(word, text);
     let explained = || {
-        let mut alike = node.described(object)?.values.iter().filter(|(_, word)| word.eq_ignore_ascii_case(text));
-        let only = alike.next().filter(|_| alike.next().is_none())?.0;
-        data_type.encode_text(&only.to_string()).ok()
+        let mut alike = node.described(object)?.values.iter().filter(|(_, word)| is_meant(word));
+        alike.next().filter(|_| alike.next().is_none()).map(|(code, _)| *code)
     };
-    signature(node, object, text).or_else(explained)
+    let standard = || sensor::code(text).filter(|_| is_sensor).map(u64::from);
+    let number = || data_type.encode_text(&explained().or_else(standard)?.to_string()).ok();
+    signature(node, object, text).or_else(number)
 }
 
 /// The bytes of the signature of an object, if `text` is its word: `save`, `load`, `zero`.

@@ -130,7 +130,10 @@ pub fn hint(silence: &Silence, node: NodeId) -> Option<String> {
         SilenceCause::InterfaceDown => Some("show the interfaces: cangauge bus list".to_owned()),
         SilenceCause::NotReadAgain | SilenceCause::PollFailed(_) | SilenceCause::SharedCobId(..) => None,
         SilenceCause::NotOperational { state: NmtState::Stopped, .. } => Some(format!("cangauge nmt preop {node}")),
-        SilenceCause::NotOperational { .. } if silence.emergency.is_some() => Some(format!("cangauge errors {node}")),
+        // It left OPERATIONAL by itself, and would do so again.
+        SilenceCause::NotOperational { was_started, .. } if *was_started || silence.emergency.is_some() => {
+            Some(format!("cangauge errors {node}"))
+        }
         SilenceCause::NotOperational { .. } | SilenceCause::Restarted => Some(format!("cangauge nmt start {node}")),
         SilenceCause::Unreachable { had_heartbeat: false } => {
             Some(format!("check its power and cable; if it is stopped: cangauge nmt preop {node}"))
@@ -142,7 +145,10 @@ pub fn hint(silence: &Silence, node: NodeId) -> Option<String> {
         SilenceCause::Tpdo(number, cause) => match cause {
             TpdoCause::WaitsForSync(_) => Some(format!("add --sync 100ms, or read by SDO: --poll 100ms (node {node})")),
             TpdoCause::NotSentAtSync | TpdoCause::Due(_) if silence.running == Running::Operational => poll(),
-            TpdoCause::NotSentAtSync | TpdoCause::Due(_) => Some(format!("cangauge nmt state {node} --probe")),
+            TpdoCause::NotSentAtSync | TpdoCause::Due(_) if silence.running == Running::NotStopped => {
+                Some(format!("cangauge nmt state {node} --probe"))
+            }
+            TpdoCause::NotSentAtSync | TpdoCause::Due(_) => Some("check its power and cable".to_owned()),
             TpdoCause::SlowEventTimer(_) | TpdoCause::NoTrigger(..) | TpdoCause::SendsOnChange => Some(format!(
                 "read by SDO instead: add --poll 100ms (or: cangauge pdo map {node} {} --event-timer 100ms)",
                 number.get()

@@ -135,6 +135,11 @@ pub fn errors(errors: &Errors) -> Vec<Vec<String>> {
         let detail = if error.detail.is_empty() { String::new() } else { format!(" ({})", error.detail) };
         rows.push(row("", format!("0x{:04X} {}{detail}", error.code, error.text)));
     }
+    for counter in &errors.counters {
+        let count = counter.count.map_or_else(|| "-".to_owned(), |count| count.to_string());
+        let text = if counter.text.is_empty() { String::new() } else { format!(" ({})", counter.text) };
+        rows.push(row(&counter.name, format!("{count}{text}")));
+    }
     rows
 }
 

@@ -3,7 +3,7 @@
 use super::identity;
 use super::info::{self, name_of};
 use super::report::{Cell, Column, Report};
-use super::settings::error_cells;
+use super::settings::{counters_cell, error_cells};
 use crate::measure::layout::Tpdo;
 use crate::tasks::settings::errors::Errors;
 use crate::tasks::settings::info::{Channel, Info, Setting};
@@ -106,7 +106,8 @@ fn errors_cell(errors: &Errors) -> Cell {
         ])
     });
     let history = Cell::List(history.collect());
-    Cell::Object(vec![("register", register), ("register_text", register_text), ("count", count), ("history", history)])
+    let fields = [("register", register), ("register_text", register_text), ("count", count), ("history", history)];
+    Cell::Object(fields.into_iter().chain([("counters", counters_cell(errors))]).collect())
 }
 
 fn signal_cell(channel: &Channel) -> Cell {

@@ -6,11 +6,11 @@ use super::console::Console;
 use super::doubt;
 use super::failure::host::up_by_hand;
 use super::failure::{self, autozero, config, pdo, settings, store};
-use super::lss;
 use super::report::Cell;
+use super::{lss, objects};
 use crate::canopen::id::NodeId;
 use crate::tasks::journal::{TemporaryWrite, Undone};
-use crate::tasks::note::StateEffect;
+use crate::tasks::note::{Rule, StateEffect};
 use crate::tasks::{Effect, Fact, Note};
 use serde::Serialize;
 
@@ -66,6 +66,7 @@ impl NoteText {
 pub(super) fn effect(node: Option<NodeId>, effect: &Effect) -> NoteText {
     let number = node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
     match effect {
+        Effect::Rule(rule) => rule_text(&number, rule),
         Effect::NothingChanged => NoteText::new("nothing-changed", "nothing was changed"),
         Effect::InterfaceNotRestored { interface, bit_rate, reason } => NoteText::new(
             "interface-not-restored",
@@ -101,6 +102,7 @@ pub fn note(note: &Note) -> NoteText {
             "left-operational",
             "the node was started; its previous state is unknown, so it stays operational",
         ),
+        Fact::Rule(rule) => rule_text("", rule),
         Fact::MayClip(value) => NoteText::new("may-clip", doubt::may_clip(value)),
         Fact::Autozero(fact) => autozero::fact(note.node, fact),
         Fact::Lss(fact) => lss::fact(fact),
@@ -114,6 +116,22 @@ pub fn note(note: &Note) -> NoteText {
             "the state before the reset is unknown; the node is in the state in which it boots",
         ),
     }
+}
+
+/// `0x1800:5 accepts 0, 4-65535 ms (manual: table 29)`.
+fn rule_text(node: &str, rule: &Rule) -> NoteText {
+    let Rule { object, entry, is_out_of_range } = rule;
+    let page = if entry.page.is_empty() { String::new() } else { format!(" (manual: {})", entry.page) };
+    if *is_out_of_range {
+        let unit = entry.unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}"));
+        return NoteText::new("not-allowed", format!("{object} accepts {}{unit}{page}", objects::allowed(entry)));
+    }
+    let others: Vec<String> = entry.only_if_zero.iter().map(ToString::to_string).collect();
+    let are = if others.len() == 1 { "is" } else { "are" };
+    let message = format!("{object} can be set only while {} {are} 0{page}", others.join(" and "));
+    let zeros: Vec<String> = entry.only_if_zero.iter().map(|other| format!("{other}=0")).collect();
+    NoteText::new("only-if-zero", message)
+        .command("switch the other off first", format!("cangauge sdo write {node} {}", zeros.join(" ")))
 }
 
 /// The text for an NMT state that is not the previous one.

@@ -7,7 +7,7 @@ use crate::canopen::value::DataType;
 use crate::device::catalog::Model;
 use crate::device::description::ObjectEntry;
 use crate::device::dictionary::Entry;
-use crate::device::scalar::Scalar;
+use crate::device::scalar::{NumberRange, Scalar};
 use crate::output::sdo::is_usually_hexadecimal;
 use std::io::{self, Write};
 
@@ -65,14 +65,7 @@ impl<'a> ObjectFacts<'a> {
 
     /// The values and ranges that the object accepts, if they are not one range.
     fn allowed(&self) -> Vec<String> {
-        let is_hexadecimal = is_usually_hexadecimal(self.entry.object);
-        let number = |number: u32| if is_hexadecimal { format!("0x{number:08X}") } else { number.to_string() };
-        let ranges = self.described().map_or(&[][..], |described| &described.allow);
-        let text = |low: u32, high: u32| match low == high {
-            true => number(low),
-            false => format!("{}-{}", number(low), number(high)),
-        };
-        ranges.iter().map(|range| text(range.low, range.high)).collect()
+        self.described().map(ranges).unwrap_or_default()
     }
 
     fn unit(&self) -> Cell {
@@ -144,6 +137,28 @@ impl<'a> ObjectFacts<'a> {
 }
 
 const HEADING: [&str; 9] = ["OBJECT", "NAME", "TYPE", "ACCESS", "PDO", "RANGE", "DEFAULT", "UNIT", "MANUAL"];
+
+/// The values and ranges that an object accepts, if they are not one range.
+fn ranges(entry: &ObjectEntry) -> Vec<String> {
+    let is_hexadecimal = is_usually_hexadecimal(entry.at.first);
+    let number = |number: u32| if is_hexadecimal { format!("0x{number:08X}") } else { number.to_string() };
+    let text = |range: &NumberRange| match range.low == range.high {
+        true => number(range.low),
+        false => format!("{}-{}", number(range.low), number(range.high)),
+    };
+    entry.allow.iter().map(text).collect()
+}
+
+/// The numbers that an object accepts: `0, 4-65535`, `from 100`.
+pub(super) fn allowed(entry: &ObjectEntry) -> String {
+    match (&entry.low, &entry.high) {
+        _ if !entry.allow.is_empty() => ranges(entry).join(", "),
+        (Some(low), Some(high)) => format!("{low} to {high}"),
+        (Some(low), None) => format!("from {low}"),
+        (None, Some(high)) => format!("up to {high}"),
+        (None, None) => String::new(),
+    }
+}
 
 impl Report for ObjectFacts<'_> {
     const COLUMNS: &'static [Column] = &[

@@ -6,7 +6,7 @@ use super::report::{Cell, Column, Report};
 use super::table::{self, Align};
 use crate::canopen::object::ObjectId;
 use crate::tasks::settings::Quantity;
-use crate::tasks::settings::errors::{ErrorReport, Errors, PastError};
+use crate::tasks::settings::errors::{ErrorCounter, ErrorReport, Errors, PastError};
 use crate::tasks::settings::filter::{FilterOf, FilterReport};
 use crate::tasks::settings::limits::{Limit, Limits};
 use crate::tasks::settings::minmax::{Extremes, MinMax};
@@ -169,11 +169,16 @@ impl Report for Limits {
 
     /// `delta  0.5 bar  (0x6133:1)`.
     fn text(all: &[Limits], out: &mut dyn Write) -> io::Result<()> {
-        let row = |(limit, object, quantity): &(Limit, ObjectId, Quantity)| {
-            vec![limit.as_str().to_owned(), quantity.to_string(), format!("({object})")]
-        };
-        let rows: Vec<Vec<String>> = all.iter().flat_map(|limits| &limits.values).map(row).collect();
-        table::write(out, &[Align::Left; 3], &rows)
+        let is_single = all.len() == 1;
+        let rows = all.iter().flat_map(|limits| {
+            limits.values.iter().map(move |(limit, object, quantity)| {
+                let name = (!is_single).then(|| limits.signal.clone());
+                let cells = [limit.as_str().to_owned(), quantity.to_string(), format!("({object})")];
+                name.into_iter().chain(cells).collect()
+            })
+        });
+        let columns = if is_single { 3 } else { 4 };
+        table::write(out, &[Align::Left; 4][..columns], &rows.collect::<Vec<Vec<String>>>())
     }
 }
 
@@ -228,6 +233,7 @@ impl Report for ErrorReport {
         Column::new("register_text").json_only(),
         Column::new("count").json_only(),
         Column::nested("history", HISTORY),
+        Column::new("counters").json_only(),
         Column::new("cleared").json_only(),
     ];
 
@@ -239,13 +245,25 @@ impl Report for ErrorReport {
         };
         let [register, register_text, count] = error_cells(errors);
         let history = Cell::Rows(errors.history.iter().zip(1..).map(row).collect());
-        vec![self.node.into(), register, register_text, count, history, self.cleared.into()]
+        let counters = counters_cell(errors);
+        vec![self.node.into(), register, register_text, count, history, counters, self.cleared.into()]
     }
 
     fn text(reports: &[ErrorReport], out: &mut dyn Write) -> io::Result<()> {
         let rows: Vec<Vec<String>> = reports.iter().flat_map(|report| info::errors(&report.errors)).collect();
         table::write(out, &[Align::Left; 2], &rows)
     }
+}
+
+/// The counters of errors: one object each.
+pub(super) fn counters_cell(errors: &Errors) -> Cell {
+    let cell = |counter: &ErrorCounter| {
+        let (name, text) = (counter.name.as_str().into(), counter.text.as_str().into());
+        let fields =
+            [("object", counter.object.into()), ("name", name), ("count", counter.count.into()), ("text", text)];
+        Cell::Object(fields.into())
+    };
+    Cell::List(errors.counters.iter().map(cell).collect())
 }
 
 /// Register, its meaning, and the number of errors in the history.

@@ -6,14 +6,14 @@ pub use crate::bus::BusError;
 pub use crate::master::{Clue, LssError, Operation, SdoError, SdoFailure, SecondAnswer};
 pub use crate::measure::expression::ExpressionError;
 
-use super::note::Effect;
+use super::note::{Effect, Rule};
 use super::{autozero, check, config, detect, host, log, lss, nmt, pdo, read, scan, settings, store};
 use crate::canopen::id::NodeId;
 use crate::canopen::lss::Service;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::master::Error;
-use crate::node;
+use crate::node::{self, Node};
 use std::fmt;
 use std::sync::Arc;
 
@@ -214,6 +214,15 @@ impl Failure {
         self.node.get_or_insert(node);
         self.effects.push(effect.into());
         self
+    }
+
+    /// The same failure of a write, with the rule of the device that the number breaks, if the device rejected it.
+    #[must_use]
+    pub fn explained(self, node: &Node, object: ObjectId, data: &[u8]) -> Failure {
+        match self.abort().and_then(|_| Rule::broken(node, object, data)) {
+            Some(rule) => self.with(node.id, Effect::Rule(Box::new(rule))),
+            None => self,
+        }
     }
 
     /// The kind, which decides the exit code.

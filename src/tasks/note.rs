@@ -10,7 +10,12 @@ use super::settings::{SettingsEffect, SettingsFact};
 use super::store::{StoreEffect, StoreFact};
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
+use crate::canopen::object::ObjectId;
+use crate::canopen::value::DataType;
+use crate::device::description::ObjectEntry;
 use crate::measure::layout::NarrowValue;
+use crate::measure::sample::Number;
+use crate::node::Node;
 
 /// What a task that failed had changed before, or what state it left behind.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +33,8 @@ pub enum Effect {
     },
     /// The node was operational and may not be operational any more.
     WasOperational,
+    /// The rejected number breaks a rule of the device.
+    Rule(Box<Rule>),
     /// An autozero failed.
     Autozero(AutozeroEffect),
     /// A change of node-ID or bit rate failed.
@@ -42,6 +49,30 @@ pub enum Effect {
     State(StateEffect),
     /// A store or restore failed.
     Store(StoreEffect),
+}
+
+/// A rule of a description that a number for an object breaks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rule {
+    /// The object.
+    pub object: ObjectId,
+    /// What the description states about it.
+    pub entry: ObjectEntry,
+    /// Whether the number is not among the allowed ones. If it is, other objects must be 0 first.
+    pub is_out_of_range: bool,
+}
+
+impl Rule {
+    /// The rule that these bytes break, if the description of the node has one.
+    pub fn broken(node: &Node, object: ObjectId, data: &[u8]) -> Option<Rule> {
+        let entry = node.described(object)?;
+        let is_number = matches!(entry.data_type, DataType::Unsigned(_) | DataType::Integer(_) | DataType::Real32);
+        let value = entry.data_type.decode(data).ok().filter(|_| is_number && entry.signature.is_none())?;
+        let number = Number::from_value(&value, 0)?.as_f64();
+        let is_out_of_range = !entry.allows(number);
+        let is_broken = is_out_of_range || number != 0.0 && !entry.only_if_zero.is_empty();
+        is_broken.then(|| Rule { object, entry: entry.clone(), is_out_of_range })
+    }
 }
 
 /// The NMT state after a change, if it is not the previous state.
@@ -83,6 +114,8 @@ pub enum Fact {
     OperationalAgain,
     /// The node was started, its previous state is unknown, and it stays operational.
     LeftOperational,
+    /// The device accepted a number that its description does not allow.
+    Rule(Box<Rule>),
     /// A signal is sent as an integer that is too narrow for its measuring range.
     MayClip(NarrowValue),
     /// An autozero succeeded.
@@ -111,7 +144,7 @@ impl Fact {
             Fact::Config(fact) => fact.is_warning(),
             Fact::Pdo(fact) => fact.is_warning(),
             Fact::Settings(fact) => fact.is_warning(),
-            Fact::State(_) | Fact::MayClip(_) => true,
+            Fact::State(_) | Fact::MayClip(_) | Fact::Rule(_) => true,
             Fact::KeptUntilPowerOff
             | Fact::OperationalAgain
             | Fact::LeftOperational
@@ -126,6 +159,12 @@ impl Note {
     /// Warnings that signals of a node may be clipped.
     pub fn may_clip(node: NodeId, values: Vec<NarrowValue>) -> impl Iterator<Item = Note> {
         values.into_iter().map(move |value| Note { node: Some(node), fact: Fact::MayClip(value) })
+    }
+
+    /// A warning that a node accepted a number that its description does not allow.
+    pub fn out_of_range(node: &Node, object: ObjectId, data: &[u8]) -> Option<Note> {
+        let rule = Rule::broken(node, object, data).filter(|rule| rule.is_out_of_range)?;
+        Some(Note::of_node(node.id, Fact::Rule(Box::new(rule))))
     }
 
     /// A note about one node.

@@ -133,7 +133,8 @@ pub fn write(
     verify: Option<DataType>,
     options: &mut WriteOptions<'_>,
 ) -> Result<Written, Failure> {
-    let written = write_with(master, node, object, data, options)?;
+    let written = write_with(master, node, object, data, options)
+        .map_err(|error| Failure::from(error).explained(node, object, data))?;
     let Some(data_type) = verify else { return Ok(written) };
     let (blocks, longest) = (options.blocks, FILE_LIMIT);
     let mut options = ReadOptions { blocks, longest, is_exact: false, progress: &mut *options.progress };

@@ -100,14 +100,17 @@ fn unknown_states_are_never_guessed() {
 fn absent_node_is_exit_3() {
     let bench = Bench::of(ALL);
     let done = bench.run("nmt state 9").exit(3);
-    assert_eq!(done.stderr, "cangauge: node 9: no heartbeat and no SDO answer\nhint: list the nodes: cangauge scan\n");
+    assert_eq!(
+        done.stderr,
+        "cangauge: node 9: no heartbeat and no SDO answer\nhint: check its node-ID, power and cable; list the nodes that answer: cangauge scan\n"
+    );
     let done = bench.run("nmt state 1,9").exit(7);
     assert_eq!(done.stdout, "1  -  none\n9  -  none\n");
     let done = bench.run("nmt start 9 --confirm").exit(3);
     assert_eq!(
         done.stderr,
         "cangauge: node 9: command sent, but no heartbeat, no boot-up and no SDO answer came\n\
-         hint: list the nodes: cangauge scan\n"
+         hint: check its node-ID, power and cable; list the nodes that answer: cangauge scan\n"
     );
 }
 
@@ -138,6 +141,18 @@ fn watch_shows_boot_ups_and_states() {
         done.stdout.lines().map(|line| line.split_whitespace().skip(1).collect::<Vec<_>>().join(" ")).collect();
     assert_eq!(lines, ["5 boot-up", "6 boot-up", "5 state pre-operational"]);
     assert_eq!(done.frames.iter().filter(|frame| !frame.starts_with("70")).count(), 0, "{:?}", done.frames);
+}
+
+#[test]
+fn a_change_of_the_built_in_bench_is_not_kept() {
+    let note = "the simulated devices start afresh with every command: they do not keep this change";
+    for line in ["nmt start 1", "unit 1 pressure psi", "store 127", "lss set-id 1 9", "sdo write 1 0x1017 100"] {
+        let done = Bench::real("mh4@1,dps@127").run(line).exit(0);
+        assert_eq!(done.stderr.matches(note).count(), 1, "{line}: {}", done.stderr);
+    }
+    for line in ["nmt state 1", "unit 1", "sdo read 1 0x1017", "lss scan", "pdo show 1", "errors 127"] {
+        assert!(!Bench::real("mh4@1,dps@127").run(line).stderr.contains(note), "{line}");
+    }
 }
 
 #[test]

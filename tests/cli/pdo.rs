@@ -105,6 +105,40 @@ fn dps_transmission_is_set_as_in_its_manual() {
     one("pdo map 127 1 --event-timer 1s", &["67F#22001805E8030000", "5FF#6000180500000000"]);
 }
 
+#[test]
+fn a_rejected_number_is_explained_by_the_description() {
+    let bench = Bench::of("mc1609@3,dps@127,d20@2");
+    for (line, text) in [
+        ("pdo map 127 1 --event-timer 2ms", "0x1800:5 accepts 0, 4-65535 ms (manual: 10.4, table 29)"),
+        ("pdo map 127 1 --transmission 241", "0x1800:2 accepts 0-240, 254, 255 (manual: table 17, 10.4)"),
+        ("pdo map 3 1 --event-timer 50ms", "0x1800:5 accepts from 100 ms (manual: 2.1.4)"),
+        ("sdo write 3 0x1800:5 50", "0x1800:5 accepts from 100 ms (manual: 2.1.4)"),
+        (
+            "sdo write 2 0x100C=100 0x1017=1000",
+            "0x1017:0 can be set only while 0x100C:0 and 0x100D:0 are 0 (manual: 14)",
+        ),
+        ("sdo write 2 0x1017=100 0x100C=10", "0x100C:0 can be set only while 0x1017:0 is 0"),
+    ] {
+        let done = bench.run(line);
+        assert!(done.code != Some(0) && done.stderr.contains(text), "{line}: {}", done.stderr);
+    }
+    let done = bench.run("sdo write 2 0x100C=100 0x1017=1000");
+    assert!(done.stderr.ends_with("switch the other off first: cangauge sdo write 2 0x100C:0=0 0x100D:0=0\n"));
+    // A number that the rule allows is rejected for another reason.
+    let done = bench.run("sdo write 127 0x1000 5").exit(4);
+    assert!(!done.stderr.contains("accepts") && !done.stderr.contains("only while"), "{}", done.stderr);
+}
+
+#[test]
+fn settings_that_the_device_does_not_store_are_noted() {
+    let text = "node 127: the device does not store the settings of TPDO1: they are lost at power off\n";
+    assert_eq!(Bench::of("dps@127").run("pdo map 127 1 --event-timer 20ms").exit(0).stderr, text);
+    let done = Bench::of("mh4@1").run("pdo map 1 1 --event-timer 20ms").exit(0);
+    assert!(!done.stderr.contains("does not store"), "{}", done.stderr);
+    let done = Bench::of("dps@127").run("pdo map 127 1 --event-timer 100ms").exit(0);
+    assert!(!done.stderr.contains("does not store"), "nothing was changed: {}", done.stderr);
+}
+
 /// D-20-9, page 6: no invalidation, in PRE-OPERATIONAL. The node is operational before (shown by node guarding) and
 /// afterwards; while the mapping is changed, its PDO would have no bytes.
 #[test]
@@ -178,8 +212,8 @@ fn a_rejected_write_is_named_and_the_old_mapping_is_restored() {
     // A parameter.
     bench.run("pdo map 1 1 --transmission 250").fails(
         4,
-        "cangauge: node 1: write 0x1800:2 (250): refused by the device (0x06090030, value outside its range); TPDO1 has \
-         its old mapping and parameters\n",
+        "cangauge: node 1: write 0x1800:2 (250): refused by the device (0x06090030, value outside its range); \
+         0x1800:2 accepts 0-240, 254, 255 (manual: 4.1.14, 3.4.3); TPDO1 has its old mapping and parameters\n",
     );
 }
 

@@ -31,6 +31,40 @@ fn replay_gives_the_rows_of_the_live_log() {
 }
 
 #[test]
+fn unusual_heartbeats_are_reported_once() {
+    let bench = Bench::of("mh4@1");
+    let frames = ["705#0500", "706#05", "708#7F00000000000000", "705#0500", "707#", "707#", "709#R1", "706#7F"];
+    let lines = frames.iter().zip(1..).map(|(frame, second)| format!("(10{second}.000000) can0 {frame}\n"));
+    fs::write(bench.path("t.log"), lines.collect::<String>()).expect("written");
+    for line in ["nmt watch", "scan --passive"] {
+        let done = replay(&bench, "t.log", line).exit(0);
+        let warnings: Vec<&str> = done.stderr.lines().filter(|line| line.starts_with("warning")).collect();
+        assert_eq!(
+            warnings,
+            [
+                "warning: node 5: its heartbeats have 2 bytes, not 1: the first byte is the state",
+                "warning: node 7: frames of 0 bytes on its heartbeat COB-ID are ignored",
+                "warning: node 8: its heartbeats have 8 bytes, not 1: the first byte is the state",
+            ],
+            "{line}"
+        );
+    }
+}
+
+/// Another master guards nodes without a heartbeat.
+#[test]
+fn guarded_nodes_are_watched() {
+    let bench = Bench::of("mh4@1");
+    let frames = ["705#R1", "705#7F", "705#R1", "705#FF", "705#R1", "705#05", "705#R1", "705#85", "706#R", "706#84"];
+    let lines = frames.iter().zip(10..).map(|(frame, second)| format!("(1{second}.000000) can0 {frame}\n"));
+    fs::write(bench.path("t.log"), lines.collect::<String>()).expect("written");
+    let done = replay(&bench, "t.log", "nmt watch -f json").exit(0);
+    let states: Vec<_> = done.json().iter().map(|event| (event["node"].clone(), event["state"].clone())).collect();
+    let expected = [(5, "pre-operational"), (5, "operational"), (6, "stopped")];
+    assert_eq!(states, expected.map(|(node, state)| (node.into(), state.into())), "{}", done.stdout);
+}
+
+#[test]
 fn recording_without_the_setup_needs_a_description() {
     let bench = Bench::of("mh4@1");
     bench.run("log 1 --sync 20ms --count 20").exit(0);

@@ -113,6 +113,96 @@ fn table_19_with_its_60h() {
     bench.run("sdo read 127 0x1000 0x6131:1").exit(0);
 }
 
+/// MC1609 without its description: CiA 404 gives the codes of 6110h.
+#[test]
+fn sensor_types_have_words() {
+    let devices = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/device/devices/mc1609.toml");
+    let text = fs::read_to_string(devices).expect("the description");
+    let text = text.replacen("name = \"mc1609\"", "name = \"other\"", 1).replace("13720", "13000");
+    let bench = Bench::described(
+        "[[device]]\nkind = \"other.toml\"\nnode = 4\n[[device]]\nkind = \"mc1609\"\nnode = 3\n\
+         [[device]]\nkind = \"inclinometer.toml\"\nnode = 6\n",
+    );
+    fs::write(bench.path("other.toml"), text).expect("written");
+    let inclinometer = "name = \"inclinometer\"\ntitle = \"-\"\nvendor = \"-\"\n[identify]\n\
+                        device_type = 0x0002019A\n[[object]]\nat = \"0x1000\"\nname = \"device-type\"\ntype = \"u32\"\n\
+                        access = \"ro\"\ndefault = 0x0002019A\n[[object]]\nat = \"0x6110\"\nname = \"slope\"\n\
+                        type = \"i32\"\naccess = \"rw\"\ndefault = 0\n";
+    fs::write(bench.path("inclinometer.toml"), inclinometer).expect("written");
+    for (line, id, frame) in [
+        ("sdo write 4 0x6110:1 J", "604", "2B10610101000000"),
+        ("sdo write 4 0x6110:2 pt100", "604", "2B1061021E000000"),
+        ("sdo write 3 0x6110:1 \"type K\"", "603", "2B10610102000000"),
+        ("sdo write 3 0x6110:16 T", "603", "2B10611007000000"),
+    ] {
+        let words = super::examples::words(&line.replace('"', "'"));
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        let done = bench.run_words(&words).exit(0);
+        assert!(done.frames_of(id).contains(&frame), "{line}: {:?}", done.frames);
+    }
+    bench.run("sdo write 4 0x6110:1 Pt10").exit(2);
+    bench.run("sdo write 6 0x6110 J").exit(2);
+    fs::write(bench.path("sensor.toml"), "[signal.ch1]\nsensor-type = \"Pt100\"\n").expect("written");
+    let done = bench.run("config apply 3 sensor.toml").exit(0);
+    assert!(done.frames_of("603").contains(&"2B1061011E000000"), "{:?}", done.frames);
+}
+
+#[test]
+fn one_command_sets_several_channels() {
+    let bench = Bench::described("[[device]]\nkind = \"mc1609\"\nnode = 3\n[[device]]\nkind = \"mh4\"\nnode = 5\n");
+    let signals = |done: &super::Done| -> Vec<String> {
+        done.json().iter().map(|report| report["signal"].as_str().expect("a name").to_owned()).collect()
+    };
+    for (line, expected) in [
+        ("filter 3 ch2-ch4 --type moving --constant 5 -f json", &["ch2", "ch3", "ch4"][..]),
+        ("filter 3 ch15-16,ch1,ch15 -f json", &["ch15", "ch16", "ch1"]),
+        ("unit 5 all psi -f json", &["pressure"]),
+        ("unit 5 all -f json", &["pressure", "temperature"]),
+        ("unit 3 ch1-ch3 -f json", &["ch1", "ch2", "ch3"]),
+        ("limits 5 all --delta 0.5 -f json", &["pressure", "temperature"]),
+        ("filter 5 all --type moving -f json", &["pressure"]),
+    ] {
+        assert_eq!(signals(&bench.run(line).exit(0)), expected, "{line}");
+    }
+    let done = bench.run("filter 3 all --type moving --constant 5 -f json").exit(0);
+    assert_eq!((done.json().len(), done.stderr.lines().count()), (16, 1), "{}", done.stderr);
+    let done = bench.run("limits 5 pressure,temperature").exit(0);
+    assert!(done.stdout.starts_with("pressure     delta       0 bar     (0x6133:1)\n"), "{}", done.stdout);
+    // A wrong channel or a wrong request changes nothing, and is reported once.
+    for line in [
+        "filter 3 ch1-ch40 --type moving",
+        "filter 3 ch1,ch17 --type moving",
+        "filter 3 all --type none",
+        "unit 3 ch1-ch4 degF",
+    ] {
+        let done = bench.run(line).exit(2);
+        assert_eq!(done.stderr.matches("cangauge:").count(), 1, "{}", done.stderr);
+        assert!(done.frames_of("603").iter().all(|frame| frame.starts_with("40")), "{:?}", done.frames);
+    }
+    // One of two channels has no filter.
+    let done = bench.run("filter 5 pressure,temperature --type moving").exit(7);
+    assert_eq!(done.stdout, "pressure  moving average (1)  constant 1\n");
+    assert!(done.stderr.contains("temperature has no filter"), "{}", done.stderr);
+}
+
+#[test]
+fn filter_of_the_mc1609_has_its_limits() {
+    let bench = |more: &str| Bench::described(&format!("[[device]]\nkind = \"mc1609\"\nnode = 3\n{more}"));
+    let constant = "filter constant 0: its effect is not printed in the manual";
+    let done = bench("").run("filter 3 ch1 --type moving").exit(0);
+    assert!(done.stderr.contains(constant), "{}", done.stderr);
+    let done = bench("").run("filter 3 ch1 --type moving --constant 3").exit(0);
+    assert!(!done.stderr.contains("filter constant"), "{}", done.stderr);
+    // The repeating average is formed between two TPDOs, for 1000 ms at most; it ignores the constant.
+    let timer = |ms: u16| format!("set = {{ \"0x1800:2\" = 255, \"0x1800:5\" = {ms} }}\n");
+    let done = bench(&timer(2000)).run("filter 3 ch1").exit(0);
+    let text = "TPDO1 is sent every 2000 ms: after 1000 ms the device changes to the moving average";
+    assert!(done.stderr.contains(text) && !done.stderr.contains("filter constant"), "{}", done.stderr);
+    assert_eq!(bench(&timer(1000)).run("filter 3 ch1").exit(0).stderr, "");
+    let done = bench("set = { \"0x1800:2\" = 10 }\n").run("filter 3 ch1 --type repeating").exit(0);
+    assert!(done.stderr.contains("TPDO1 is sent on SYNC: if that takes longer, after 1000 ms"), "{}", done.stderr);
+}
+
 #[test]
 fn words_of_signatures_and_of_the_description_are_values() {
     let bench = constant();
@@ -301,7 +391,15 @@ fn errors_are_explained_by_the_description() {
     );
     assert!(done.frames_of("605").contains(&"2F03100000000000"));
     // The DPS counts its errors; the entries cannot be read.
-    bench.run("errors 127").prints("register  0x05 overflow or underflow\nhistory   1 error\n");
+    bench.run("errors 127").prints(
+        "register              0x05 overflow or underflow\n\
+         history               1 error\n\
+         span-overflow-count   1 (number of times the pressure crosses the maximum span)\n\
+         span-underflow-count  0 (number of times the pressure crosses the minimum span)\n",
+    );
+    let counters = &bench.run("errors 127 -f json").exit(0).json()[0]["counters"];
+    assert_eq!((&counters[0]["object"], &counters[0]["count"]), (&json!("0x2004:0"), &json!(1)));
+    assert_eq!(bench.run("errors 5 -f json").exit(0).json()[0]["counters"], json!([]));
     bench.run("errors 2").prints("register  0x00 no error\nhistory   not supported\n");
     bench.run("errors 2 --clear").fails(6, "cangauge: node 2: it has no error history (1003h)\n");
     let done = bench.run("errors 9").exit(3);

@@ -40,6 +40,9 @@ pub(super) fn check(description: &Description, tables: &Tables<'_, '_>) {
     assign(description, &known, tables);
     autozero(description, &known, tables);
     pdos(description, tables);
+    for &object in &description.error_counters {
+        known.require(tables.file, "error_counters", object);
+    }
     if let Some((startup, table)) = description.startup.as_ref().zip(tables.startup) {
         known.require(table, "object", startup.object);
     }

@@ -39,6 +39,7 @@ fn description<'t>(file: &mut Table<'t>) -> Option<Description> {
     let (name, title, vendor) = (file.required("name"), file.required("title"), file.required("vendor"));
     let source = file.or_default("source");
     let (quirks, error_history) = (file.list("quirks"), file.or_default("error_history"));
+    let (error_counters, repeating_average_ms) = (file.list("error_counters"), file.optional("repeating_average_ms"));
     let auto_bit_rate = file.optional("auto_bit_rate");
     let mut identify = file.table("identify");
     let mut bit_rates = file.table("bit_rates");
@@ -64,6 +65,8 @@ fn description<'t>(file: &mut Table<'t>) -> Option<Description> {
         pdo,
         quirks,
         error_history,
+        error_counters,
+        repeating_average_ms,
         auto_bit_rate,
         assign,
         autozero,

@@ -65,6 +65,11 @@ pub struct Description {
     pub quirks: Vec<Quirk>,
     /// The layout of an entry of its error history (1003h).
     pub error_history: ErrorHistory,
+    /// Objects that count errors, shown with the error history.
+    pub error_counters: Vec<ObjectId>,
+    /// The longest time in ms over which a repeating average (61A0h) is formed. After it, the device changes to the moving
+    /// average.
+    pub repeating_average_ms: Option<u16>,
     /// The device's own table of bit rates: index to bit rate in bit/s.
     pub bit_rates: BTreeMap<u8, u32>,
     /// The index of automatic bit rate detection, if the device has it.

@@ -91,7 +91,8 @@ fn length_text(node: NodeId, mapped: usize, received: usize, consequence: &str) 
     format!("node {node}: a TPDO has {received} bytes, its mapping {mapped}: {consequence}")
 }
 
-fn heartbeat_text(node: NodeId, length: usize) -> String {
+/// A node sends heartbeats of another length than one byte.
+pub fn heartbeat_text(node: NodeId, length: usize) -> String {
     match length {
         0 => format!("node {node}: frames of 0 bytes on its heartbeat COB-ID are ignored"),
         _ => format!("node {node}: its heartbeats have {length} bytes, not 1: the first byte is the state"),

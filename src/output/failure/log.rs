@@ -123,6 +123,10 @@ fn nothing_received(
         [(only, _)] => only.to_string(),
         _ => "all".to_owned(),
     };
-    Words::new(format!("no measurements within {within}: no TPDO received{states}"))
-        .hint(format!("--passive starts no node: omit it, or: cangauge nmt start {node}"))
+    let words = Words::new(format!("no measurements within {within}: no TPDO received{states}"));
+    // Started already, they wait for something else.
+    if nodes.iter().all(|(_, state)| *state == Some(NmtState::Operational)) {
+        return words.hint("--passive cannot ask the nodes for the reason: omit it");
+    }
+    words.hint(format!("--passive starts no node: omit it, or: cangauge nmt start {node}"))
 }

@@ -180,6 +180,10 @@ pub(in crate::output) fn fact(fact: &PdoFact) -> NoteText {
         PdoFact::AlreadySet { number } => {
             NoteText::new("already-set", format!("{number} has these settings already: nothing was written"))
         }
+        PdoFact::NotKept { number } => NoteText::new(
+            "not-kept",
+            format!("the device does not store the settings of {number}: they are lost at power off"),
+        ),
         PdoFact::Stored { groups } => {
             NoteText::new("stored", format!("stored ({}), acknowledged", Group::names(groups)))
         }

@@ -148,6 +148,17 @@ pub(in crate::output) fn fact(fact: &SettingsFact) -> NoteText {
             let message = format!("it acknowledged the damping, but the filter constant did not change ({constant})");
             NoteText::new("damping-not-shown", message)
         }
+        SettingsFact::FilterConstant { constant, meaning } => {
+            NoteText::new("filter-constant", format!("filter constant {constant}: {meaning}"))
+        }
+        SettingsFact::RepeatingLimit { tpdo, timer_ms, limit_ms } => {
+            let change = format!("after {limit_ms} ms the device changes to the moving average");
+            let message = match timer_ms {
+                Some(timer_ms) => format!("{tpdo} is sent every {timer_ms} ms: {change}"),
+                None => format!("{tpdo} is sent on SYNC: if that takes longer, {change}"),
+            };
+            NoteText::new("repeating-limit", message)
+        }
         SettingsFact::MayNeverSend { tpdo } => NoteText::new(
             "may-never-send",
             format!("{tpdo} is sent on events, and its event timer and the delta are 0: it may never be sent"),

@@ -8,7 +8,7 @@ use crate::canopen::value::{DataType, Value};
 use crate::device::config_file::Item;
 use crate::device::unit::Unit;
 use crate::measure::sample::Number;
-use crate::node::Node;
+use crate::node::{Node, names};
 use crate::tasks::pdo::{entry_of, text_of};
 use crate::tasks::settings::{QuantityError, encode_quantity};
 
@@ -129,7 +129,7 @@ impl Setting {
     pub fn read(&self, node: &Node, scales: &Scales, item: &Item) -> Result<Option<Content>, Problem> {
         let wrong = |expected: &'static str| Problem::Type { expected, found: item.kind() };
         match &self.form {
-            Form::Plain => self.read_plain(item).map(Some),
+            Form::Plain => self.read_plain(node, item).map(Some),
             Form::Quantity(signal, scale) => self.read_quantity(scales.get(*signal), *scale, item),
             Form::Hex => self.integer(number_of(item).ok_or_else(|| wrong("a number (0x180)"))?).map(Some),
             Form::Duration(tick) => {
@@ -164,13 +164,17 @@ impl Setting {
         }
     }
 
-    fn read_plain(&self, item: &Item) -> Result<Content, Problem> {
+    fn read_plain(&self, node: &Node, item: &Item) -> Result<Content, Problem> {
         let wrong = |expected: &'static str| Problem::Type { expected, found: item.kind() };
         let text = match (self.data_type, item) {
             (DataType::Boolean, Item::Flag(flag)) => flag.to_string(),
             (DataType::Boolean, _) => return Err(wrong("true or false")),
             (DataType::Unsigned(_) | DataType::Integer(_), Item::Integer(number)) => return self.integer(*number),
             (DataType::Unsigned(_) | DataType::Integer(_), Item::Text(text)) if text.starts_with("0x") => text.clone(),
+            (DataType::Unsigned(_) | DataType::Integer(_), Item::Text(text)) => {
+                let word = names::word(node, self.object, self.data_type, text);
+                return word.map(Content::Bytes).ok_or_else(|| wrong("an integer"));
+            }
             (DataType::Unsigned(_) | DataType::Integer(_), _) => return Err(wrong("an integer")),
             (DataType::Real32 | DataType::Real64, Item::Integer(number)) => number.to_string(),
             (DataType::Real32 | DataType::Real64, Item::Real(number)) => number.to_string(),

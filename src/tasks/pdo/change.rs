@@ -218,7 +218,13 @@ impl Change<'_, '_> {
             _ => Vec::new(),
         };
         let cause = PdoFailure::Change { error: error.clone(), write: self.failed_at.clone(), mappable };
-        Failure { object: error.object(), ..Failure::at(self.session.node.id, cause) }
+        let failure = Failure { object: error.object(), ..Failure::at(self.session.node.id, cause) };
+        let write =
+            self.failed_at.as_ref().filter(|write| Some(write.object) == failure.object && write.object.index < 0x1a00);
+        match write {
+            Some(write) => failure.explained(self.session.node, write.object, &write.bytes()),
+            None => failure,
+        }
     }
 
     /// The entries that the device can map, from its description.
@@ -253,6 +259,9 @@ impl Change<'_, '_> {
         } else if event_timer_ms == Some(0) {
             self.note(PdoFact::OnlyOnChange { number });
         }
+        let node = self.session.node;
+        let changed = self.writes(&self.old, &self.wanted).into_iter().filter(|write| write.object.index < 0x1a00);
+        self.notes.extend(changed.filter_map(|write| Note::out_of_range(node, write.object, &write.bytes())));
         let is_changed = event_timer_ms != self.old.event_timer_ms || transmission != self.old.transmission();
         let is_unused =
             event_timer_ms != Some(0) && self.session.node.event_timer(Some(transmission), event_timer_ms).is_none();

@@ -278,6 +278,11 @@ pub enum PdoFact {
         /// The TPDO.
         number: TpdoNumber,
     },
+    /// The device does not store the settings of the TPDO.
+    NotKept {
+        /// The TPDO.
+        number: TpdoNumber,
+    },
     /// The settings are stored, and the device acknowledged it.
     Stored {
         /// The groups of 1010h.

@@ -36,6 +36,21 @@ pub struct Errors {
     pub count: Option<u64>,
     /// The entries of the history that can be read, newest first.
     pub history: Vec<PastError>,
+    /// The counters of errors in the description.
+    pub counters: Vec<ErrorCounter>,
+}
+
+/// An object that counts errors (DPS 2004h, 2005h).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ErrorCounter {
+    /// The object.
+    pub object: ObjectId,
+    /// Its name in the description.
+    pub name: String,
+    /// What it counts.
+    pub text: String,
+    /// The count; `None` if it cannot be read.
+    pub count: Option<u64>,
 }
 
 /// An entry of the error history.
@@ -78,7 +93,20 @@ pub fn read(master: &mut Master<'_>, node: &Node) -> Result<Errors, Failure> {
         register_text: register.map(|bits| register_text(node, bits)).unwrap_or_default(),
         count,
         history: history.map(|raw| past(node, raw)).collect(),
+        counters: counters(master, node)?,
     })
+}
+
+fn counters(master: &mut Master<'_>, node: &Node) -> Result<Vec<ErrorCounter>, Failure> {
+    let objects = node.model.as_ref().map_or(&[][..], |model| &model.description.error_counters);
+    let values = read_each(master, node, objects)?;
+    let counter = |(&object, value): (&ObjectId, &Option<Value>)| ErrorCounter {
+        object,
+        name: node.name_of(object),
+        text: node.described(object).map(|entry| entry.text.clone()).unwrap_or_default(),
+        count: value.as_ref().and_then(Value::as_u64),
+    };
+    Ok(objects.iter().zip(&values).map(counter).collect())
 }
 
 fn register_text(node: &Node, bits: u8) -> String {

@@ -192,6 +192,22 @@ pub enum SettingsFact {
         /// The filter constant, if it is known.
         constant: Option<u64>,
     },
+    /// The description explains this filter constant.
+    FilterConstant {
+        /// The constant.
+        constant: u64,
+        /// Its meaning.
+        meaning: String,
+    },
+    /// The repeating average is formed between two TPDOs, and for a limited time only.
+    RepeatingLimit {
+        /// The TPDO.
+        tpdo: String,
+        /// Its event timer in ms; `None` if it is sent on SYNC.
+        timer_ms: Option<u16>,
+        /// The longest time in ms.
+        limit_ms: u16,
+    },
     /// The TPDO is sent on events, and its event timer and the delta are 0.
     MayNeverSend {
         /// The TPDO.

@@ -4,9 +4,10 @@
 use super::{SettingsFact, SettingsFailure, find_signal, read_each, set_object};
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
+use crate::canopen::pdo::Transmission;
 use crate::canopen::value::Value;
 use crate::master::Master;
-use crate::measure::layout::Signal;
+use crate::measure::layout::{Signal, Tpdo};
 use crate::node::Node;
 use crate::node::write::write;
 use crate::tasks::{Fact, Failure, Note};
@@ -60,32 +61,6 @@ pub struct FilterRequest {
     pub damping: Option<Duration>,
 }
 
-/// A filter that was set.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FilterChange {
-    /// The filter before.
-    pub before: FilterOf,
-    /// The filter now, read back.
-    pub now: FilterOf,
-    /// Whether 61A1h changed with the damping, which cannot be read itself. `None` if no damping was set.
-    pub damping_shown: Option<bool>,
-}
-
-impl FilterChange {
-    /// The report, with the notes about the change.
-    pub fn into_report(self) -> FilterReport {
-        let FilterChange { before, now, damping_shown } = self;
-        let mut notes = Vec::new();
-        if damping_shown == Some(false) {
-            notes.push(Note::of_node(now.node, SettingsFact::DampingNotShown { constant: now.constant }));
-        }
-        if before != now {
-            notes.push(Note::of_node(now.node, Fact::KeptUntilPowerOff));
-        }
-        FilterReport { filter: now, damping_shown, notes }
-    }
-}
-
 impl FilterType {
     fn code(self) -> u8 {
         match self {
@@ -130,7 +105,8 @@ pub(in crate::tasks) fn meaning(node: &Node, signal: &Signal, code: u64) -> Stri
     )
 }
 
-fn has_filter(node: &Node, signal: &Signal) -> bool {
+/// Whether a signal may have a filter.
+pub fn has_filter(node: &Node, signal: &Signal) -> bool {
     node.may_have(kind_object(signal)) || node.may_have(constant_object(signal))
 }
 
@@ -138,14 +114,18 @@ fn has_filter(node: &Node, signal: &Signal) -> bool {
 ///
 /// # Errors
 /// No such signal, no filter, no answer.
-pub fn show(master: &mut Master<'_>, node: &Node, signal: Option<&str>) -> Result<Vec<FilterOf>, Failure> {
+pub fn show(master: &mut Master<'_>, node: &Node, signal: Option<&str>) -> Result<Vec<FilterReport>, Failure> {
     let signals: Vec<&Signal> = match signal {
         Some(name) => vec![find_signal(node, Some(name))?],
         None => node.channels(),
     };
     let mut filters = Vec::new();
     for signal in signals.into_iter().filter(|signal| has_filter(node, signal)) {
-        filters.extend(filter_of(master, node, signal)?);
+        let filter = filter_of(master, node, signal)?;
+        filters.extend(filter.map(|filter| {
+            let notes = doubts(node, signal, &filter);
+            FilterReport { filter, damping_shown: None, notes }
+        }));
     }
     if filters.is_empty() {
         return Err(Failure::at(node.id, SettingsFailure::NoFilter { signal: signal.map(str::to_owned) }));
@@ -171,7 +151,7 @@ pub fn set(
     node: &Node,
     signal: Option<&str>,
     wanted: FilterRequest,
-) -> Result<FilterChange, Failure> {
+) -> Result<FilterReport, Failure> {
     let mut with_filter = node.channels().into_iter().filter(|signal| has_filter(node, signal));
     let signal = match (signal, with_filter.next(), with_filter.next()) {
         (None, Some(only), None) => only,
@@ -204,7 +184,38 @@ pub fn set(
     }
     let now = filter_of(master, node, signal)?.ok_or_else(no_filter)?;
     let damping_shown = damping.map(|_| now.constant != before.constant);
-    Ok(FilterChange { before, now, damping_shown })
+    let mut notes = doubts(node, signal, &now);
+    if damping_shown == Some(false) {
+        notes.push(Note::of_node(node.id, SettingsFact::DampingNotShown { constant: now.constant }));
+    }
+    if before != now {
+        notes.push(Note::of_node(node.id, Fact::KeptUntilPowerOff));
+    }
+    Ok(FilterReport { filter: now, damping_shown, notes })
+}
+
+/// What the description states about the effect of a filter, if that may be unexpected.
+fn doubts(node: &Node, signal: &Signal, filter: &FilterOf) -> Vec<Note> {
+    let mut notes = Vec::new();
+    let is_repeating = filter.kind.starts_with(FilterType::Repeating.word());
+    let constant = filter.constant.filter(|_| !is_repeating);
+    let meaning = constant.and_then(|constant| node.described(constant_object(signal))?.meaning(constant));
+    if let Some((constant, meaning)) = constant.zip(meaning) {
+        let meaning = meaning.to_owned();
+        notes.push(Note::of_node(node.id, SettingsFact::FilterConstant { constant, meaning }));
+    }
+    let limit_ms = node.model.as_ref().and_then(|model| model.description.repeating_average_ms);
+    let Some(limit_ms) = limit_ms.filter(|_| is_repeating) else { return notes };
+    let carries = |tpdo: &&Tpdo| tpdo.mapping.iter().any(|entry| signal.is_value(entry.object));
+    for tpdo in node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid()).filter(carries) {
+        let waits_for_sync = tpdo.transmission.is_some_and(Transmission::needs_sync);
+        let timer_ms = tpdo.event_timer_ms.filter(|_| !waits_for_sync);
+        if waits_for_sync || timer_ms.is_some_and(|timer_ms| timer_ms > limit_ms) {
+            let tpdo = tpdo.number.to_string();
+            notes.push(Note::of_node(node.id, SettingsFact::RepeatingLimit { tpdo, timer_ms, limit_ms }));
+        }
+    }
+    notes
 }
 
 /// The object and the number of milliseconds that set a damping. `kind` is the filter type to set.

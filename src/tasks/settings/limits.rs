@@ -67,6 +67,11 @@ pub struct Limits {
     pub notes: Vec<Note>,
 }
 
+/// Whether a signal may have limits.
+pub fn has_limits(node: &Node, signal: &Signal) -> bool {
+    Limit::ALL.iter().any(|limit| node.may_have(limit.object(node, signal)))
+}
+
 /// The limits of a signal.
 ///
 /// # Errors

@@ -63,6 +63,41 @@ pub fn find_signal<'a>(node: &'a Node, name: Option<&str>) -> Result<&'a Signal,
     }
 }
 
+/// The names of the signals that `text` selects: one name, a list (`ch1,ch3`), a range (`ch1-ch4`, `ch1-4`), or `all`.
+/// `all` means the signals that the setting `applies` to, if there is one.
+///
+/// # Errors
+/// The node has no such signal; [`SettingsFailure::NoChannel`].
+pub fn select(node: &Node, text: &str, applies: impl Fn(&Signal) -> bool) -> Result<Vec<String>, Failure> {
+    let channels = node.channels();
+    let place = |name: &str| channels.iter().position(|signal| signal.name == name);
+    let range = |item: &str| {
+        item.match_indices('-').find_map(|(at, _)| {
+            let (first, last) = (&item[..at], &item[at + 1..]);
+            let prefix = first.trim_end_matches(|c: char| c.is_ascii_digit());
+            let (first, last) = (place(first)?, place(last).or_else(|| place(&format!("{prefix}{last}")))?);
+            (first <= last).then_some(first..=last)
+        })
+    };
+    let mut names: Vec<String> = Vec::new();
+    for item in text.split(',') {
+        let found: Vec<&Signal> = match range(item) {
+            _ if place(item).is_none() && item == "all" && channels.iter().any(|signal| applies(signal)) => {
+                channels.iter().copied().filter(|signal| applies(signal)).collect()
+            }
+            _ if place(item).is_none() && item == "all" => channels.clone(),
+            Some(range) if place(item).is_none() => channels[range].to_vec(),
+            _ => vec![find_signal(node, Some(item))?],
+        };
+        for signal in found {
+            if !names.contains(&signal.name) {
+                names.push(signal.name.clone());
+            }
+        }
+    }
+    Ok(names)
+}
+
 /// Reads objects. A value is `None` if the node rejects the request or the bytes do not fit the type.
 fn read_each(master: &mut Master<'_>, node: &Node, objects: &[ObjectId]) -> Result<Vec<Option<Value>>, Failure> {
     let items: Vec<_> = objects.iter().map(|&object| (node.id, object, node.data_type(object))).collect();
@@ -76,8 +111,8 @@ fn read_each(master: &mut Master<'_>, node: &Node, objects: &[ObjectId]) -> Resu
 
 /// Writes a value and reads it back.
 fn set_object(master: &mut Master<'_>, node: &Node, object: ObjectId, data: &[u8]) -> Result<(), Failure> {
-    write_and_verify(master, node, object, data, node.data_type(object))?;
-    Ok(())
+    let written = write_and_verify(master, node, object, data, node.data_type(object));
+    written.map(drop).map_err(|error| Failure::from(error).explained(node, object, data))
 }
 
 /// A value of an object in the unit of its signal; `None` if it is not a finite number.

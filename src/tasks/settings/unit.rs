@@ -179,11 +179,15 @@ pub fn list(units: &[Unit]) -> String {
     units.iter().map(Unit::to_string).collect::<Vec<_>>().join(", ")
 }
 
+/// Whether the unit of a signal is one of the same quantity.
+pub fn is_alike(signal: &Signal, unit: Unit) -> bool {
+    signal.unit.is_some_and(|present| present.convert(0.0, unit).is_some())
+}
+
 /// The signal with this name; without a name the only signal with a unit of the same quantity.
 fn choose<'a>(node: &'a Node, name: Option<&str>, unit: Unit) -> Result<&'a Signal, Failure> {
     if name.is_none() {
-        let like = |signal: &&Signal| signal.unit.is_some_and(|present| present.convert(0.0, unit).is_some());
-        let mut alike = node.signals.iter().filter(like);
+        let mut alike = node.signals.iter().filter(|signal| is_alike(signal, unit));
         if let (Some(only), None) = (alike.next(), alike.next()) {
             return Ok(only);
         }
