@@ -195,5 +195,5 @@ fn arguments_that_are_not_unicode_are_refused() {
 /// The message for a device that does not exist; it lists every description.
 fn no_device() -> String {
     let names: Vec<&str> = cangauge::device::catalog::names().collect();
-    format!("no device \"mh5\" ({}, or FILE.toml)", names.join(", "))
+    format!("no device \"mh5\" ({}, FILE.toml or FILE.eds)", names.join(", "))
 }
