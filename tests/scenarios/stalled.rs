@@ -11,6 +11,7 @@ use cangauge::canopen::frame::Frame;
 use cangauge::canopen::id::NodeId;
 use cangauge::canopen::object::ObjectId;
 use cangauge::canopen::value::{DataType, Value};
+use cangauge::device::catalog;
 use cangauge::master::{Clue, Happening, Master, SdoError, SdoFailure, Timing};
 use cangauge::sim::Bench;
 use cangauge::tasks::log::{LogOptions, Mode, Remark, log};
@@ -134,6 +135,23 @@ fn frames_received_before_ctrl_c_are_recorded() {
     let late = kept.rows.iter().filter(|row| row.starts_with("1603000,"));
     assert!((5..=6).contains(&late.count()), "{:?}", kept.rows);
     assert!(bus.inner.now().mono < Mono::at(Duration::from_millis(1700)), "the recording ends without waiting");
+}
+
+/// All rows may have been received before the recording starts. Its last row is its end, so no node is lost.
+#[test]
+fn recording_with_a_count_ends_with_its_last_row() {
+    let text = "clock = \"virtual\"\n[[device]]\nkind = \"dps\"\nnode = 5\nstart = true\n";
+    for (milliseconds, count) in [(0..5000, 10), (0..5000, 40), (0..900, 5)] {
+        let mut bus = stalled(text, milliseconds, false);
+        bus.sleep().expect("the bus works");
+        let node = NodeId::new(5).expect("a node-ID");
+        let overrides = BTreeMap::from([(node, catalog::by_name("dps").expect("built in"))]);
+        let plan = LogOptions { count: Some(count), overrides, ..plan(Mode::Passive, Duration::from_secs(60)) };
+        let outcome = log(&mut Master::new(&mut bus, Timing::default()), &plan, &mut Kept::default());
+        let outcome = outcome.expect("a recording");
+        assert_eq!((outcome.rows, outcome.lost), (count, Vec::new()));
+        assert!(outcome.length <= Duration::from_millis(100) * u32::try_from(count).expect("small"));
+    }
 }
 
 /// Reads object 2000h of node 5.

@@ -273,7 +273,10 @@ impl<'o> Recording<'o> {
             None => observer.samples(&self.samples, sources)?,
         }
         match self.options.count {
-            Some(count) if self.tally.rows >= count => ControlFlow::Break(()),
+            Some(count) if self.tally.rows >= count => {
+                self.tally.end_at(at.mono);
+                ControlFlow::Break(())
+            }
             _ => ControlFlow::Continue(()),
         }
     }

@@ -87,6 +87,11 @@ impl Tally {
         self.end = self.end.max(at);
     }
 
+    /// Ends the recording with its last row. Frames that were received before the start may contain all rows.
+    pub(super) fn end_at(&mut self, at: Mono) {
+        self.end = at;
+    }
+
     /// The end of the recording.
     pub(super) fn end(&self) -> Mono {
         self.end
