@@ -4,11 +4,14 @@ use super::Global;
 use super::args::Nodes;
 use super::each::each;
 use crate::bus::claim::Claim;
+use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
+use crate::master::Master;
+use crate::node::Overrides;
 use crate::output::autozero::ZeroReport;
 use crate::output::notes;
-use crate::tasks::Kind;
-use crate::tasks::autozero::{Limit, Options, autozero};
+use crate::tasks::autozero::{Action, Limit, Options, Zeroed, autozero};
+use crate::tasks::{Failure, Kind};
 use clap::Args;
 
 /// Set the zero of a channel (6125h), with checks before and after
@@ -71,6 +74,7 @@ impl Autozero {
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
         let options = Options {
+            action: Action::Autozero,
             channel: self.channel,
             limit: self.limit.unwrap_or_default(),
             samples: self.samples,
@@ -78,17 +82,25 @@ impl Autozero {
             store: self.store,
             dry_run: self.dry_run,
         };
-        let mut each =
-            each(global, &self.nodes, |master, node, overrides| autozero(master, node, overrides, &options))?;
-        let reports: Vec<ZeroReport<'_>> =
-            each.done.iter().map(|(node, zeroed)| ZeroReport { node: *node, zeroed }).collect();
-        global.print(&reports)?;
-        for (_, zeroed) in &each.done {
-            zeroed.notes.iter().for_each(|note| notes::print(&global.console(), note));
-        }
-        if self.nodes == Nodes::All {
-            each.excuse(global, |failure| failure.kind() == Kind::Usage);
-        }
-        each.end()
+        run_each(global, &self.nodes, |master, node, overrides| autozero(master, node, overrides, &options))
     }
+}
+
+/// Runs an autozero or a tare on each node and prints the reports.
+pub(super) fn run_each(
+    global: &Global,
+    nodes: &Nodes,
+    work: impl FnMut(&mut Master<'_>, NodeId, &Overrides) -> Result<Zeroed, Failure>,
+) -> anyhow::Result<()> {
+    let mut each = each(global, nodes, work)?;
+    let reports: Vec<ZeroReport<'_>> =
+        each.done.iter().map(|(node, zeroed)| ZeroReport { node: *node, zeroed }).collect();
+    global.print(&reports)?;
+    for (_, zeroed) in &each.done {
+        zeroed.notes.iter().for_each(|note| notes::print(&global.console(), note));
+    }
+    if *nodes == Nodes::All {
+        each.excuse(global, |failure| failure.kind() == Kind::Usage);
+    }
+    each.end()
 }

@@ -184,10 +184,15 @@ fn named(global: &Global) -> anyhow::Result<Vec<Named>> {
 pub(super) fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result<Arc<Model>> {
     if !is_eds {
         if let Some(model) = catalog::by_name(what) {
-            if !global.accept_mismatch {
+            if !global.accept_mismatch && !model.description.unconfirmed {
                 return Ok(model);
             }
-            return Ok(Arc::new(Model { made_for: Vec::new(), ..Model::clone(&model) }));
+            let mut model = Model::clone(&model);
+            model.description.unconfirmed = false;
+            if global.accept_mismatch {
+                model.made_for.clear();
+            }
+            return Ok(Arc::new(model));
         }
         if !what.contains(['.', '/']) {
             return Err(unknown(what).into());
@@ -205,6 +210,7 @@ pub(super) fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result
         Model::from_toml(&text).map_err(|error| ErrorMessage::usage(error.in_file(what)))?
     };
     model.made_for.iter_mut().for_each(|device| what.clone_into(&mut device.file));
+    model.description.unconfirmed = false;
     if global.accept_mismatch {
         model.made_for.clear();
     }

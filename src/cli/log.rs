@@ -5,7 +5,7 @@ mod finish;
 mod recorder;
 
 use super::args::{Duration, Nodes, SignalArg};
-use super::recording::{poll_interval, print_verdicts, refuse_to_send, sync_interval};
+use super::recording::{poll_interval, print_verdicts, refuse_to_send, request_interval, sync_interval};
 use super::{Global, When, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -26,7 +26,7 @@ use std::io::{self, IsTerminal};
 
 /// Record measurements as CSV or JSON Lines
 ///
-/// Without --sync and --poll, log records the TPDOs as the nodes send them. It starts all nodes except those that are
+/// Without --sync, --poll and --request, log records the TPDOs as the nodes send them. It starts all nodes except those that are
 /// known to be operational. At the end it returns them to their previous state if that was known.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -46,6 +46,7 @@ Examples:
   cangauge -b sim log 127 --duration 5s -o dps.csv
   cangauge -b sim log 1-3,127 pressure --poll 200ms --duration 5s --format json
   cangauge -b sim log 1,127 --sync 10ms --layout wide --duration 5s -o wide.csv
+  cangauge log 5 --request 100ms --count 20
   cangauge log 1 --sync 10ms -o run.csv --rotate 1h --events events.csv
   cangauge log 5 --passive --device mh4 -o run.csv --append")]
 pub(crate) struct Log {
@@ -65,6 +66,9 @@ pub(crate) struct Log {
     /// Read by SDO at this interval
     #[arg(long, value_name = "DUR", conflicts_with = "passive", value_parser = poll_interval)]
     poll: Option<Duration>,
+    /// Request TPDOs by remote frames (RTR) at this interval; whether the values are new is not proven, prefer --poll
+    #[arg(long, value_name = "DUR", conflicts_with_all = ["sync", "poll", "passive"], value_parser = request_interval)]
+    request: Option<Duration>,
     /// Send nothing at all
     #[arg(long)]
     passive: bool,
@@ -95,10 +99,11 @@ impl Log {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        refuse_to_send(global, self.sync.or(self.poll))?;
+        let interval = self.sync.or(self.poll).or(self.request);
+        refuse_to_send(global, interval)?;
         self.check_expectations()?;
         let format = FileFormat::from(global.format);
-        self.files.check(format, self.sync.or(self.poll).is_some())?;
+        self.files.check(format, interval.is_some())?;
         let mut files = self.files.open(format, self.count, self.duration.map(|duration| duration.0))?;
         let finished = self.record(global, &mut files)?;
         print_verdicts(&global.console(), &finished.verdicts);
@@ -192,10 +197,11 @@ impl Log {
 
     /// A recording that is played back (`replay:`) is always passive.
     fn mode(&self, is_live: bool) -> Mode {
-        match (self.sync, self.poll, self.passive || !is_live) {
-            (Some(interval), _, _) => Mode::Sync(interval.0),
+        match (self.sync, self.poll, self.request) {
+            (Some(interval), ..) => Mode::Sync(interval.0),
             (_, Some(interval), _) => Mode::Poll(interval.0),
-            (_, _, true) => Mode::Passive,
+            (.., Some(interval)) => Mode::Request(interval.0),
+            _ if self.passive || !is_live => Mode::Passive,
             _ => Mode::AsSent,
         }
     }

@@ -32,6 +32,7 @@ mod scan;
 mod sdo;
 mod sim;
 mod store;
+mod tare;
 mod unit;
 
 use crate::bus::claim::{Claim, Claims};
@@ -249,6 +250,7 @@ commands! {
     Pdo(pdo::Pdo): "pdo";
     Config(config::Config): "config";
     Autozero(autozero::Autozero): "autozero" | "zero";
+    Tare(tare::Tare): "tare";
     Store(store::Store): "store";
     Restore(store::Restore): "restore";
     Sim(sim::Sim): "sim";
@@ -282,7 +284,7 @@ impl Command {
             Command::Errors(errors) => errors.clear,
             Command::Pdo(pdo) => pdo.writes(),
             Command::Nmt(nmt) => nmt.writes(),
-            Command::Lss(_) | Command::Autozero(_) | Command::Store(_) | Command::Restore(_) => true,
+            Command::Lss(_) | Command::Autozero(_) | Command::Tare(_) | Command::Store(_) | Command::Restore(_) => true,
             _ => false,
         };
         if writes { OnTwoDevices::RefuseWrites } else { OnTwoDevices::Fail }

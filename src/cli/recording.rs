@@ -8,7 +8,7 @@ use crate::output::events::{EventText, Weight};
 use crate::output::failure::ErrorMessage;
 use crate::output::verdict;
 
-/// The shortest interval of SYNC and polling.
+/// The shortest interval of SYNC, polling and remote requests.
 const SHORTEST_INTERVAL: std::time::Duration = std::time::Duration::from_millis(1);
 
 /// Parses an interval of SYNC.
@@ -21,6 +21,11 @@ pub(super) fn poll_interval(text: &str) -> Result<Duration, String> {
     interval(text, "polling")
 }
 
+/// Parses an interval of remote requests.
+pub(super) fn request_interval(text: &str) -> Result<Duration, String> {
+    interval(text, "remote requests")
+}
+
 fn interval(text: &str, purpose: &str) -> Result<Duration, String> {
     let interval: Duration = text.parse()?;
     if interval.0 < SHORTEST_INTERVAL {
@@ -30,10 +35,10 @@ fn interval(text: &str, purpose: &str) -> Result<Duration, String> {
     }
 }
 
-/// Refuses `--sync` and `--poll` for a recording (`replay:`), which cannot send.
+/// Refuses `--sync`, `--poll` and `--request` for a recording (`replay:`), which cannot send.
 pub(super) fn refuse_to_send(global: &Global, interval: Option<Duration>) -> Result<(), ErrorMessage> {
     if matches!(global.bus, Some(BusSpec::Replay(_))) && interval.is_some() {
-        return Err(ErrorMessage::usage("a recording (replay:) is receive-only: --sync and --poll send"));
+        return Err(ErrorMessage::usage("a recording (replay:) is receive-only: --sync, --poll and --request send"));
     }
     Ok(())
 }

@@ -44,6 +44,9 @@ impl Layout<'_> {
         if self.signals.iter().any(|signal| signal.name == *name) {
             return item.clone();
         }
+        if let Some(object) = self.part(name) {
+            return Wanted::Named(name.clone(), object);
+        }
         let Some(object) = self.object(name) else { return item.clone() };
         let named = |signal: &&Signal| !signal.has_channel() && signal.value.0 == object;
         match self.signals.iter().find(named) {

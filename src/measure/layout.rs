@@ -115,6 +115,10 @@ pub const PROCESS_VALUES: [(u16, DataType); 4] = [
     (0x7130, DataType::Integer(2)),
 ];
 
+/// The parts of a signal that are objects of their own, besides its status: the name and the index without its first
+/// digit.
+pub const PARTS: [(&str, u16); 2] = [("field", 0x100), ("net", 0x140)];
+
 /// The parameters and the mapping of a TPDO.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tpdo {
@@ -180,6 +184,24 @@ impl Layout<'_> {
         let standard = |name: &str| standard::find(name).map(|entry| entry.object);
         let known = |name: &str| of_profile(name).or_else(|| standard(name));
         described.or_else(|| known(name)).or_else(|| spellings(name).iter().find_map(|name| known(name)))
+    }
+
+    /// An object of a signal in one of the families of CiA 404: `low` is the index without its first digit. It is in the
+    /// family of the process value if the device has it there.
+    pub fn find_in_family(&self, signal: &Signal, low: u16) -> Option<ObjectId> {
+        let own = signal.value.0.index & 0xf000;
+        let families =
+            [own, 0x6000, 0x9000, 0x8000, 0x7000].into_iter().filter(|family| (0x6000..=0x9000).contains(family));
+        let mut objects = families.map(|family| ObjectId::new(family | low, signal.channel));
+        let known = self.model.map(|model| &model.dictionary).filter(|dictionary| !dictionary.is_empty());
+        objects.find(|object| signal.has_channel() && known.is_none_or(|known| known.get(*object).is_some()))
+    }
+
+    /// The object of a part of a signal: `pressure.field` (x100h), `pressure.net` (x140h).
+    pub fn part(&self, name: &str) -> Option<ObjectId> {
+        let (signal, part) = name.rsplit_once('.')?;
+        let (_, low) = PARTS.into_iter().find(|(known, _)| *known == part)?;
+        self.find_in_family(self.signals.iter().find(|known| known.name == signal)?, low)
     }
 
     /// The unit of an object: that of its channel, else the fixed one of the description.

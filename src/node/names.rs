@@ -221,12 +221,13 @@ pub fn word(node: &Node, object: ObjectId, data_type: DataType, text: &str) -> O
     signature(node, object, text).or_else(number)
 }
 
-/// The bytes of the signature of an object, if `text` is its word: `save`, `load`, `zero`.
+/// The bytes of the signature of an object, if `text` is its word: `save`, `load`, `zero`, `tara`.
 fn signature(node: &Node, object: ObjectId, text: &str) -> Option<Vec<u8>> {
     let standard = match object.index {
         0x1010 if object.sub > 0 => Some(Signature::Save),
         0x1011 if object.sub > 0 => Some(Signature::Load),
         0x6125 if object.sub > 0 => Some(Signature::Zero),
+        0x6139 if object.sub > 0 => Some(Signature::Tare),
         _ => None,
     };
     let signature = node.described(object).and_then(|entry| entry.signature).or(standard)?;

@@ -9,7 +9,7 @@
 //!    rejected as well, the first abort code is reported.
 //! 4. Before a value is sent without its size, the width of the object is checked. If the object is wider, the node
 //!    would add zero bytes: -5 as INTEGER16 would become 65531 in an INTEGER32.
-//! 5. A signature ("save", "load", "zero", a number with "set") starts an action. It is sent once and never repeated.
+//! 5. A signature ("save", "load", "zero", "tara", a number with "set") starts an action. It is sent once and never repeated.
 //! 6. If no answer comes, a plain value is read back. A signature cannot be read back, so its result is unknown.
 
 use super::Node;
@@ -155,11 +155,11 @@ pub fn write_and_verify(
     Err(Error::NotKept { node: node.id, object, written: wanted, found })
 }
 
-/// Whether these bytes are a signature: "save", "load", "zero", or a number with "set".
+/// Whether these bytes are a signature: "save", "load", "zero", "tara", or a number with "set".
 ///
 /// A signature starts an action. A read of the object returns another value (2321h: the detected bit rate).
 pub fn is_signature(data: &[u8]) -> bool {
-    data == b"save" || data == b"load" || data == b"zero" || data.len() == 4 && data[1..] == *b"set"
+    [&b"save"[..], b"load", b"zero", b"tara"].contains(&data) || data.len() == 4 && data[1..] == *b"set"
 }
 
 impl<'a> WriteOptions<'a> {
@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn signatures_and_plain_values_are_distinguished() {
-        for signature in [&b"save"[..], b"load", b"zero", b"\x03set"] {
+        for signature in [&b"save"[..], b"load", b"zero", b"tara", b"\x03set"] {
             assert!(is_signature(signature));
         }
         for plain in [&b"sav"[..], b"evas", &[1, 2, 3, 4], b"set"] {

@@ -77,6 +77,7 @@ fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String
         TpdoCause::SteadyAtSync => format!(
             "{number} is sent at a SYNC only after a change ({communication:04X}h:2 is 0): its value is steady{also}"
         ),
+        TpdoCause::NotSentOnRequest => not_sent(number, "on each remote request", running),
         TpdoCause::NotSentAtSync => not_sent(number, "at SYNC, and SYNC was sent", running),
         TpdoCause::SlowEventTimer(timer) => {
             format!("the event timer of {number} is longer ({communication:04X}h:5 is {timer} ms)")
@@ -143,6 +144,9 @@ pub fn hint(silence: &Silence, node: NodeId) -> Option<String> {
         }
         SilenceCause::WrongLength { .. } | SilenceCause::NoTpdo => poll(),
         SilenceCause::Tpdo(number, cause) => match cause {
+            TpdoCause::OnlyOnRequest(_) => {
+                Some("read by SDO instead: add --poll 100ms (or request it: --request 100ms)".to_owned())
+            }
             TpdoCause::WaitsForSync(_) => Some(format!("add --sync 100ms, or read by SDO: --poll 100ms (node {node})")),
             TpdoCause::NotSentAtSync | TpdoCause::Due(_) if silence.running == Running::Operational => poll(),
             TpdoCause::NotSentAtSync | TpdoCause::Due(_) if silence.running == Running::NotStopped => {
@@ -158,7 +162,7 @@ pub fn hint(silence: &Silence, node: NodeId) -> Option<String> {
             }
             TpdoCause::Disabled
             | TpdoCause::NothingMapped(_)
-            | TpdoCause::OnlyOnRequest(_)
+            | TpdoCause::NotSentOnRequest
             | TpdoCause::SyncCounter { .. }
             | TpdoCause::TooFewSyncs { .. }
             | TpdoCause::SteadyAtSync

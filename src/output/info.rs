@@ -1,6 +1,7 @@
 //! The page of `cangauge info` as aligned text.
 
 use super::table::{self, Align};
+use crate::device::catalog::{self, MadeFor};
 use crate::measure::sample::Status;
 use crate::tasks::settings::errors::Errors;
 use crate::tasks::settings::info::{Channel, Date, Info, Meaning, Monitoring, Setting};
@@ -100,12 +101,24 @@ pub(super) fn monitoring(Monitoring { heartbeat_ms, guarding_ms }: Monitoring) -
     }
 }
 
+/// Where the description comes from: `built-in`, else its files.
+pub(super) fn source(info: &Info) -> Option<String> {
+    let model = info.node.model.as_ref()?;
+    let place = |device: &MadeFor| match catalog::text(&device.file) {
+        Some(_) => "built-in".to_owned(),
+        None => super::text::safe(&device.file),
+    };
+    let places: Vec<String> = model.made_for.iter().map(place).collect();
+    (!places.is_empty()).then(|| places.join(", "))
+}
+
 fn identity(info: &Info) -> Rows {
     let identity = &info.node.identity;
     let described = info.node.model.as_ref().map(|model| &model.description);
     let mut rows: Rows = Vec::new();
     rows.extend(identity.name.as_ref().map(|name| row("name", super::text::safe(name))));
-    rows.extend(described.map(|description| row("description", &description.name)));
+    let source = source(info).map(|source| format!(" ({source})")).unwrap_or_default();
+    rows.extend(described.map(|description| row("description", format!("{}{source}", description.name))));
     rows.extend(
         identity.device_type.map(|number| row("device type", format!("0x{number:08X} profile {}", number & 0xffff))),
     );

@@ -216,7 +216,7 @@ fn head(report: &RecordingReport, written: Written) -> String {
         (events.heartbeat_losses, "heartbeat lost", "heartbeats lost"),
         (events.changes, "changed mapping or unit", "changed mappings or units"),
         (events.wrong_lengths, "TPDO of the wrong length", "TPDOs of the wrong length"),
-        (events.missing, "value due after SYNC is missing", "values due after SYNC are missing"),
+        (events.missing, "value due after SYNC or request is missing", "values due after SYNC or request are missing"),
         (events.link_losses, "interface loss", "interface losses"),
         (events.bus_offs, "bus-off", "bus-offs"),
         (report.skipped, "poll skipped", "polls skipped"),

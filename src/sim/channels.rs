@@ -1,6 +1,7 @@
 //! The measuring channels of a simulated device: the quantity of each, and the objects that contain its value (CiA 404:
 //! x100h, x130h, 6150h and related objects).
 
+use super::abort::Abort;
 use super::filter::{self, Filter};
 use super::model::{Direction, Quantity};
 use super::number;
@@ -21,6 +22,7 @@ const FAMILIES: [u16; 4] = [0x6000, 0x7000, 0x8000, 0x9000];
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shows {
     Value,
+    Net,
     Field,
     Status,
     Lowest,
@@ -37,7 +39,7 @@ enum Kind {
 }
 
 /// The objects of CiA 404 in the unit of 6131h, besides the value itself.
-const IN_PV_UNIT: [(u16, Kind); 9] = [
+const IN_PV_UNIT: [(u16, Kind); 10] = [
     (0x121, Kind::Point),
     (0x123, Kind::Point),
     (0x124, Kind::Distance),
@@ -45,6 +47,7 @@ const IN_PV_UNIT: [(u16, Kind); 9] = [
     (0x134, Kind::Point),
     (0x135, Kind::Point),
     (0x136, Kind::Distance),
+    (0x138, Kind::Distance),
     (0x148, Kind::Point),
     (0x149, Kind::Point),
 ];
@@ -180,6 +183,15 @@ impl Channels {
         true
     }
 
+    /// Makes the present value the tare zero (x138h).
+    pub(super) fn tare(&mut self, objects: &mut Objects, number: u8, time: Duration) -> Result<(), Abort> {
+        let channel = self.list.iter_mut().find(|channel| channel.signal.channel == number).ok_or(Abort::NOT_STORED)?;
+        let object = channel.tare_object(objects).ok_or(Abort::NOT_STORED)?;
+        let raw = channel.filtered(time);
+        channel.put_pv(objects, object, channel.value(objects, raw));
+        Ok(())
+    }
+
     /// Resets minimum and maximum.
     pub(super) fn reset_extremes(&mut self, number: u8) {
         self.list.iter_mut().filter(|channel| channel.signal.channel == number).for_each(|channel| channel.seen = None);
@@ -286,6 +298,7 @@ impl Channel {
         let mut shown: Vec<(ObjectId, Shows)> = Vec::new();
         for family in FAMILIES {
             shown.push((ObjectId::new(family | 0x130, sub), Shows::Value));
+            shown.push((ObjectId::new(family | 0x140, sub), Shows::Net));
             shown.push((ObjectId::new(family | 0x100, sub), Shows::Field));
         }
         shown.push((self.signal.value, Shows::Value));
@@ -314,6 +327,10 @@ impl Channel {
         match shows {
             Shows::Value if overload.is_some() && self.signal.marker => marker(data_type),
             Shows::Value => self.encode(objects, data_type, raw),
+            Shows::Net => {
+                let tare = self.tare_object(objects).and_then(|object| self.pv(objects, object)).unwrap_or(0.0);
+                number::to_bytes(self.scaled(objects, data_type, self.value(objects, raw) - tare), data_type)
+            }
             Shows::Lowest => self.encode(objects, data_type, low),
             Shows::Highest => self.encode(objects, data_type, high),
             Shows::Status => number::to_bytes(self.status(overload), data_type),
@@ -344,6 +361,12 @@ impl Channel {
         let sub = self.signal.channel;
         let candidates = [0x6127, 0x6124, 0x7124, 0x8124, 0x9124];
         candidates.into_iter().map(|index| ObjectId::new(index, sub)).find(|object| objects.has(*object))
+    }
+
+    /// The object with the tare zero.
+    fn tare_object(&self, objects: &Objects) -> Option<ObjectId> {
+        let candidates = FAMILIES.map(|family| ObjectId::new(family | 0x138, self.signal.channel));
+        candidates.into_iter().find(|object| objects.has(*object))
     }
 
     fn encode(&self, objects: &Objects, data_type: DataType, raw: f64) -> Vec<u8> {

@@ -61,6 +61,7 @@ impl Memory {
                     return Err(Abort::NOT_STORED);
                 }
             }
+            Some(Signature::Tare) => self.channels.tare(&mut self.objects, object.sub, time)?,
             Some(Signature::Zero) => self.channels.reset_extremes(object.sub),
             // Only the number is kept, without the signature.
             Some(Signature::Set) => {

@@ -34,6 +34,7 @@ fn is_signed(signature: Signature, bytes: &[u8]) -> bool {
         Signature::Save => b"save",
         Signature::Load => b"load",
         Signature::Zero => b"zero",
+        Signature::Tare => b"tara",
         Signature::Set => return bytes.get(1..) == Some(b"set"),
     };
     bytes == word

@@ -1,4 +1,5 @@
-//! Sets a measuring channel to zero (CiA 404, 6125h): measures, checks, writes the signature once, measures again.
+//! Sets a measuring channel (CiA 404, 6125h) or its net value (6139h) to zero: measures, checks, writes the signature
+//! once, measures again.
 //!
 //! By default the limits are parts of the measuring range: 1 % for the reading, 5 % for the total offset, 0.5 % for the
 //! variation of the readings. A larger limit from the user applies to the total offset, too.
@@ -18,17 +19,39 @@ use crate::device::unit::Unit;
 use crate::master::{Master, SdoFailure};
 use crate::measure::sample::Number;
 use crate::node::survey::survey_nodes;
-use crate::node::write::write;
+use crate::node::write::{write, write_and_verify};
 use crate::node::{Error as NodeError, Node, Overrides};
+use crate::tasks::failure::check_confirmed;
 use crate::tasks::store::{self, Group, StorePlan};
 use crate::tasks::{Effect, Failure, Kind, Note};
 use channel::{Channel, Offset};
 use safety::{Limits, Measured};
 use samples::Samples;
 
-/// The options of an autozero.
+/// What is set to zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// The process value, by the offset.
+    Autozero,
+    /// The net value (x140h), by the tare zero (x138h).
+    Tare,
+}
+
+impl Action {
+    /// The name of the command.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Action::Autozero => "autozero",
+            Action::Tare => "tare",
+        }
+    }
+}
+
+/// The options of an autozero or a tare.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
+    /// What is set to zero. A tare has no limit.
+    pub action: Action,
     /// The channel; `None`: the only one.
     pub channel: Option<u8>,
     /// The largest reading that is accepted as zero.
@@ -78,6 +101,7 @@ impl Zeroed {
 
 /// An autozero in progress.
 struct Procedure<'a> {
+    action: Action,
     device: &'a Node,
     channel: Channel,
     limits: Option<Limits>,
@@ -85,6 +109,35 @@ struct Procedure<'a> {
     offsets: Vec<Offset>,
     before: Samples,
     group: Group,
+}
+
+/// Sets the tare zero of a channel to 0, so that the net value is the process value again.
+///
+/// # Errors
+/// The device has no tare, or its tare zero cannot be written; it rejects a request or does not answer; bus errors and
+/// Ctrl-C.
+pub fn undo_tare(
+    master: &mut Master<'_>,
+    node: NodeId,
+    overrides: &Overrides,
+    options: &Options,
+) -> Result<Zeroed, Failure> {
+    let device = survey_nodes(master, &[node], overrides)?;
+    let mut device = device.into_iter().next().unwrap_or_else(|| Node::new(node));
+    check_confirmed(Some(node), device.model.as_deref())?;
+    let channel = channel::tare(master, &mut device, options.channel)?;
+    let procedure = Procedure::prepare(master, &device, channel, options)?;
+    let Some(old) = procedure.offsets.first().filter(|old| !device.is_read_only(old.object)) else {
+        let cause = AutozeroFailure::NoTareZero { channel: procedure.channel.signal.channel };
+        return Err(Failure::at(node, cause));
+    };
+    let zero = vec![0; old.data_type.width().unwrap_or(4)];
+    write_and_verify(master, &device, old.object, &zero, old.data_type)?;
+    let after = samples::take(master, &device, &procedure.channel.signal.name, options.samples)?;
+    let offsets = channel::offsets(master, &device, &procedure.channel)?;
+    let undo = Note::of_node(node, AutozeroFact::Undo(procedure.undo(&offsets, false)));
+    let notes = procedure.moved(&offsets).map(|_| undo).into_iter().collect();
+    Ok(procedure.report(Some(&Written { offsets, after, is_offset_proof: None }), notes))
 }
 
 /// What the device showed after the signature.
@@ -111,8 +164,13 @@ pub fn autozero(
         _ => failure,
     };
     let device = survey_nodes(master, &[node], overrides).map_err(|error| unchanged(error.into()))?;
-    let device = device.into_iter().next().unwrap_or_else(|| Node::new(node));
-    let procedure = Procedure::prepare(master, &device, options).map_err(unchanged)?;
+    let mut device = device.into_iter().next().unwrap_or_else(|| Node::new(node));
+    check_confirmed(Some(node), device.model.as_deref())?;
+    let channel = match options.action {
+        Action::Autozero => channel::find(master, &device, options.channel),
+        Action::Tare => channel::tare(master, &mut device, options.channel),
+    };
+    let procedure = Procedure::prepare(master, &device, channel.map_err(unchanged)?, options).map_err(unchanged)?;
     let mut notes = procedure.check(options)?;
     if options.dry_run {
         notes.push(Note::of_node(node, AutozeroFact::NothingChanged));
@@ -134,8 +192,12 @@ pub fn autozero(
 
 impl<'a> Procedure<'a> {
     /// Reads what the checks need.
-    fn prepare(master: &mut Master<'_>, device: &'a Node, options: &Options) -> Result<Procedure<'a>, Failure> {
-        let channel = channel::find(master, device, options.channel)?;
+    fn prepare(
+        master: &mut Master<'_>,
+        device: &'a Node,
+        channel: Channel,
+        options: &Options,
+    ) -> Result<Procedure<'a>, Failure> {
         let unit = channel.signal.unit;
         let limits = Limits::new(options.limit, channel.range, unit);
         if let (Limit::Value(_, Some(named)), None) = (options.limit, limits) {
@@ -146,7 +208,7 @@ impl<'a> Procedure<'a> {
         let group = group(master, device, &channel, options.store)?;
         let before = samples::take(master, device, &channel.signal.name, options.samples)?;
         let decimals = decimals(channel.range, channel.signal.digits);
-        Ok(Procedure { device, channel, limits, decimals, offsets, before, group })
+        Ok(Procedure { action: options.action, device, channel, limits, decimals, offsets, before, group })
     }
 
     /// Runs the safety checks: a failure, or notes with `force`.
@@ -164,11 +226,16 @@ impl<'a> Procedure<'a> {
             offset: self.offsets.first().map(|offset| offset.number.as_f64()),
         };
         let mut objections = measured.objections(self.limits.as_ref());
+        objections.retain(|objection| options.action == Action::Autozero || objection.concerns_tare());
         if objections.is_empty() || options.force {
             let forced = |objection| Note::of_node(node, AutozeroFact::Forced(objection));
             return Ok(objections.into_iter().map(forced).collect());
         }
-        let cause = AutozeroFailure::Unsafe { objection: objections.swap_remove(0), channel: options.channel };
+        let cause = AutozeroFailure::Unsafe {
+            action: options.action,
+            objection: objections.swap_remove(0),
+            channel: options.channel,
+        };
         Err(Failure::at(node, cause))
     }
 
@@ -271,7 +338,8 @@ impl<'a> Procedure<'a> {
     ) -> Result<(), Failure> {
         let node = self.device.id;
         let Some(plan) = plan else {
-            report.notes.push(Note::of_node(node, AutozeroFact::NotStored { group: self.group }));
+            let note = Note::of_node(node, AutozeroFact::NotStored { group: self.group });
+            report.notes.extend((self.action == Action::Autozero).then_some(note));
             return Ok(());
         };
         let moved = AutozeroEffect::Moved(report.shift().map(|shift| self.quantity(shift)));

@@ -112,6 +112,8 @@ pub enum TpdoCause {
     },
     /// It is sent at a SYNC after a change only, and its value is steady.
     SteadyAtSync,
+    /// It was requested, and was not received.
+    NotSentOnRequest,
     /// It is sent at SYNC; SYNC was sent, and it was not received.
     NotSentAtSync,
     /// Its event timer in milliseconds is longer than the time waited.
@@ -162,6 +164,8 @@ pub struct Situation {
     pub waited: Duration,
     /// SYNC messages that the program sent; `None` if it sends no SYNC.
     pub syncs_sent: Option<u64>,
+    /// Whether the program requests TPDOs by remote frames.
+    pub requests: bool,
     /// Whether the program started the node.
     pub was_started: bool,
 }
@@ -226,8 +230,12 @@ fn setup_cause(
     let causes: Vec<(TpdoNumber, TpdoCause)> =
         candidates.iter().map(|tpdo| (tpdo.number, tpdo_cause(node, tpdo, heard, known, situation))).collect();
     // A TPDO that is due and is not sent shows that the parameters of the others are not the cause.
-    let is_due =
-        |cause: &TpdoCause| matches!(cause, TpdoCause::Due(_) | TpdoCause::NotSentAtSync | TpdoCause::SyncRejected);
+    let is_due = |cause: &TpdoCause| {
+        matches!(
+            cause,
+            TpdoCause::Due(_) | TpdoCause::NotSentAtSync | TpdoCause::NotSentOnRequest | TpdoCause::SyncRejected
+        )
+    };
     let cause = causes.iter().find(|(_, cause)| is_due(cause)).or(causes.first());
     cause.map_or(SilenceCause::NoTpdo, |&(number, cause)| SilenceCause::Tpdo(number, cause))
 }
@@ -241,6 +249,7 @@ fn tpdo_cause(node: &Node, tpdo: &Tpdo, heard: &Heard, findings: &Findings, situ
     let seen = situation.syncs_sent.unwrap_or(0) + received;
     let is_expected = node.sync_overflow.is_some();
     match tpdo.transmission {
+        _ if situation.requests => TpdoCause::NotSentOnRequest,
         None => TpdoCause::UnknownType,
         Some(Transmission::Rtr(code)) => TpdoCause::OnlyOnRequest(code),
         Some(Transmission::AcyclicSync | Transmission::Sync(_)) if seen == 0 && situation.syncs_sent.is_none() => {

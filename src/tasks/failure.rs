@@ -12,6 +12,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::lss::Service;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
+use crate::device::catalog::Model;
 use crate::master::Error;
 use crate::node::{self, Node};
 use std::fmt;
@@ -70,6 +71,8 @@ pub enum Cause {
     Interrupted,
     /// An expression of `check` or `log --expect` is wrong.
     Expression(Box<ExpressionError>),
+    /// No manual page supports the description with this name, and the user did not name it.
+    Unconfirmed(String),
     /// Measured values could not be read.
     Read(read::ReadFailure),
     /// A scan did not find or identify nodes.
@@ -121,7 +124,7 @@ impl Cause {
             Cause::Node(error) => node_kind(error),
             Cause::Host(cause) => cause.kind(),
             Cause::Interrupted => Kind::Interrupted,
-            Cause::Expression(_) => Kind::Usage,
+            Cause::Expression(_) | Cause::Unconfirmed(_) => Kind::Usage,
             Cause::Read(cause) => cause.kind(),
             Cause::Scan(cause) => cause.kind(),
             Cause::Nmt(cause) => cause.kind(),
@@ -233,6 +236,15 @@ impl Failure {
     /// The abort code, if the device rejected an SDO request.
     pub fn abort(&self) -> Option<AbortCode> {
         self.cause.abort()
+    }
+}
+
+/// Refuses to change a device by a description that no manual page supports, unless the user named it.
+pub fn check_confirmed(node: Option<NodeId>, model: Option<&Model>) -> Result<(), Failure> {
+    let unconfirmed = model.map(|model| &model.description).filter(|description| description.unconfirmed);
+    match unconfirmed {
+        Some(description) => Err(Failure { node, ..Failure::general(Cause::Unconfirmed(description.name.clone())) }),
+        None => Ok(()),
     }
 }
 

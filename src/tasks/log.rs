@@ -1,4 +1,4 @@
-//! Records measurements: TPDOs as the nodes send them, TPDOs on SYNC, or values polled by SDO.
+//! Records measurements: TPDOs as the nodes send them, TPDOs on SYNC or on remote request, or values polled by SDO.
 //!
 //! Samples and events go to an [`Observer`]; nothing is printed or written here. At its end, also after a failure, the
 //! recording returns the nodes that it started to their previous NMT states.
@@ -75,6 +75,8 @@ pub enum Mode {
     Sync(Duration),
     /// SDO reads at this interval.
     Poll(Duration),
+    /// TPDOs on remote request (RTR) at this interval. Type 252 needs a SYNC before each request.
+    Request(Duration),
     /// TPDOs as the nodes send them. The program sends nothing.
     Passive,
 }
@@ -240,10 +242,10 @@ pub fn log(
             recording.poll = Some(poll);
         }
         _ => recording.nodes.iter().for_each(|node| {
-            let wanted = node.all_wanted(&options.wanted);
-            recording.decoder.add(node.layout(), &wanted);
+            recording.decoder.add(node.layout(), &node.all_wanted(&options.wanted));
         }),
     }
+    recording.refuse_without_rtr()?;
     recording.take_overloads();
     recording.update_sources();
     recording.ignore_nodes_without_signals();
@@ -255,9 +257,9 @@ pub fn log(
     master.listen(&recording.filters())?;
     // Nodes may restart between their survey and the recording.
     let mut restarted = BTreeSet::new();
-    if let Mode::Sync(period) = options.mode {
+    if let Some(period) = recording.sync_interval() {
         refuse_second_sync(master, &recording.nodes, period, &mut restarted)?;
-        if let Some(share) = sync_share(master, &recording.nodes, period) {
+        if let (Mode::Sync(_), Some(share)) = (options.mode, sync_share(master, &recording.nodes, period)) {
             observer.event(&LogEvent::Share(period, share), master.bus().now());
         }
     }

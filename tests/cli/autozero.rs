@@ -101,11 +101,7 @@ fn unsteady_or_invalid_reading_is_refused() {
     let restless = "[[device]]\nkind = \"mh4\"\nnode = 1\n[[device.channel]]\nchannel = 1\nbase = 0.0\namplitude = 0.0\n\
                     noise = 0.09\n";
     let done = Bench::described(restless).run("autozero 1").exit(1);
-    assert!(
-        done.stderr.contains("(limit 0.050 bar, 0.5 % of the range): the pressure is not steady"),
-        "{}",
-        done.stderr
-    );
+    assert!(done.stderr.contains("(limit 0.050 bar, 0.5 % of the range): the value is not steady"), "{}", done.stderr);
     let overloaded = "[[device]]\nkind = \"mh4\"\nnode = 1\n[[device.overload]]\nchannel = 1\nfrom = \"0s\"\n\
                       direction = \"low\"\n";
     refuses(
@@ -176,4 +172,135 @@ fn arguments_are_checked_before_the_bus_is_opened() {
     bench.run("autozero 1 --samples 1").exit(2);
     let done = bench.run("autozero 1 --limit 5degC").exit(2);
     assert!(done.stderr.contains("the limit in degC cannot be converted: pressure is in bar"), "{}", done.stderr);
+}
+
+/// A load cell with a tare on each of `channels`, in the family of REAL32 (6xxxh) or INTEGER32 (9xxxh).
+fn load_cell(family: u16, channels: u8) -> String {
+    let data_type = if family == 0x6000 { "r32" } else { "i32" };
+    let mut text = "name = \"cell\"\ntitle = \"Load cell\"\nvendor = \"Maker\"\n".to_owned();
+    let mut object = |at: String, name: &str, data_type: &str, rest: &str| {
+        text += &format!("[[object]]\nat = \"{at}\"\nname = \"{name}\"\ntype = \"{data_type}\"\n{rest}\n");
+    };
+    object("0x1000".to_owned(), "device-type", "u32", "access = \"ro\"\ndefault = 0x020194");
+    let count = format!("access = \"ro\"\ndefault = {channels}");
+    object(format!("{:#06x}:0", family | 0x130), "ai-input-pv-entries", "u8", &count);
+    let at = |index: u16| format!("{index:#06x}:1-{channels}");
+    object(at(family | 0x130), "ai-input-pv", data_type, "access = \"ro\"");
+    object(at(family | 0x140), "ai-net-pv", data_type, "access = \"ro\"");
+    object(at(family | 0x100), "ai-input-fv", data_type, "access = \"ro\"");
+    object(at(family | 0x138), "ai-tare-zero", data_type, "access = \"rw\"\ndefault = 0");
+    object(at(0x6131), "ai-physical-unit-pv", "u32", "access = \"rw\"\ndefault = 0x00020000");
+    object(at(0x6132), "ai-decimal-digits-pv", "u8", "access = \"rw\"\ndefault = 2");
+    object(at(0x6139), "ai-autotare", "u32", "access = \"wo\"\nsignature = \"tara\"");
+    for channel in 1..=channels {
+        let at = |index: u16| format!("\"{index:#06x}:{channel}\"");
+        text += &format!(
+            "[[signal]]\nname = \"load{channel}\"\nchannel = {channel}\nvalue = {}\nunit = {}\ndigits = {}\n",
+            at(family | 0x130),
+            at(0x6131),
+            at(0x6132)
+        );
+    }
+    text
+}
+
+/// A bench with load cells that show a constant 50 kg.
+fn load_cells(family: u16, channels: u8) -> Bench {
+    let mut text = "[[device]]\nkind = \"cell.toml\"\nnode = 5\n".to_owned();
+    for channel in 1..=channels {
+        text += &format!("[[device.channel]]\nchannel = {channel}\nbase = 50.0\namplitude = 0.0\nnoise = 0.0\n");
+    }
+    let bench = Bench::described(&text);
+    std::fs::write(bench.path("cell.toml"), load_cell(family, channels)).expect("a file");
+    bench
+}
+
+#[test]
+fn tare_sets_the_net_value_to_zero_and_back() {
+    for (family, zero, one) in [(0x6000, "0x6138:1", "0x6138:2"), (0x9000, "0x9138:1", "0x9138:2")] {
+        let state = "--device cell.toml";
+        let bench = load_cells(family, 2);
+        let done = bench.run(&format!("{state} tare 5")).exit(2);
+        assert!(
+            done.stderr.contains("several channels: choose one\nhint: --channel with one of 1, 2\n"),
+            "{}",
+            done.stderr
+        );
+        let done = bench.run(&format!("{state} tare 5 --channel 3")).exit(2);
+        assert!(done.stderr.contains("no tare of channel 3\nhint: it has one of: 1, 2\n"), "{}", done.stderr);
+        let done = bench.run(&format!("{state} tare 5 --channel 2")).exit(0);
+        assert!(done.stdout.starts_with("5  load2  50.00"), "{}", done.stdout);
+        assert!(done.stdout.contains(" -> 0.00"), "{}", done.stdout);
+        let data_type = if family == 0x6000 { "r32" } else { "i32" };
+        let undo = format!("undo: cangauge sdo write 5 {one} 0 --type {data_type}\n");
+        assert_eq!(done.stderr, format!("node 5: the previous offset is known; {undo}"), "{zero}");
+        let frames = done.frames_of("605");
+        assert_eq!(frames.iter().filter(|frame| frame[2..] == *"39610274617261").count(), 1, "{frames:?}");
+        assert_eq!(frames.iter().filter(|frame| frame.starts_with('2')).count(), 1, "nothing is stored: {frames:?}");
+    }
+}
+
+#[test]
+fn tare_without_a_description_of_it_is_refused() {
+    for bench in [Bench::of("mh4@1"), Bench::of("jumo@1")] {
+        bench.run("tare 1").fails(
+            2,
+            "cangauge: node 1: no description or EDS of it has a tare (0x6139) and a net value (0x6140)\n\
+             hint: use one that has: --device FILE or --eds FILE\n",
+        );
+    }
+}
+
+#[test]
+fn tare_is_undone() {
+    let text = load_cells(0x6000, 1);
+    let with_default =
+        load_cell(0x6000, 1).replace("access = \"rw\"\ndefault = 0\n[", "access = \"rw\"\ndefault = 20.0\n[");
+    std::fs::write(text.path("cell.toml"), with_default).expect("a file");
+    let done = text.run("--device cell.toml tare 5 --undo -f json").exit(0);
+    let row = &done.json()[0];
+    assert_eq!((row["before"].as_f64(), row["after"].as_f64()), (Some(30.0), Some(50.0)));
+    assert_eq!((row["offset_before"].as_f64(), row["offset"].as_f64()), (Some(20.0), Some(0.0)));
+    assert_eq!(row["notes"][0]["command"], "cangauge sdo write 5 0x6138:1 20 --type r32");
+    // Net value and field value are parts of the signal.
+    text.run("--device cell.toml read 5 load1.net").prints("30\n");
+    text.run("--device cell.toml read 5 load1.field").prints("5000\n");
+    text.run("--device cell.toml check 5 load1.net>29.9kg").exit(0);
+    let done = text.run("--device cell.toml log 5 load1.field load1.net --poll 100ms --count 2").exit(0);
+    assert!(
+        done.stdout.contains(",5,load1.net,30,kg,") && done.stdout.contains(",5,load1.field,5000,,"),
+        "{}",
+        done.stdout
+    );
+}
+
+#[test]
+fn tare_works_with_an_eds_and_refuses_an_unsteady_value() {
+    let noisy = load_cells(0x6000, 1);
+    let bench =
+        std::fs::read_to_string(noisy.path("bench.toml")).expect("a file").replace("noise = 0.0", "noise = 3.0");
+    std::fs::write(noisy.path("bench.toml"), bench).expect("a file");
+    let mut eds = "[DeviceInfo]\nVendorName=Maker\n".to_owned();
+    for (index, name, data_type, access) in [
+        (0x6130, "AI input PV", 8, "ro"),
+        (0x6140, "AI net PV", 8, "ro"),
+        (0x6138, "AI tare zero", 8, "rw"),
+        (0x6139, "AI autotare", 7, "wo"),
+        (0x6148, "AI span start", 8, "ro"),
+        (0x6149, "AI span end", 8, "ro"),
+    ] {
+        eds += &format!("[{index:04X}]\nParameterName={name}\nObjectType=8\nSubNumber=2\n");
+        eds += &format!("[{index:04X}sub0]\nParameterName=entries\nDataType=5\nAccessType=ro\n");
+        eds += &format!("[{index:04X}sub1]\nParameterName={name}\nDataType={data_type}\nAccessType={access}\n");
+    }
+    std::fs::write(noisy.path("cell.eds"), &eds).expect("a file");
+    let done = noisy.run("--eds cell.eds tare 5").exit(0);
+    assert!(done.stdout.starts_with("5  ch1  "), "without a range, the readings may vary: {}", done.stdout);
+    let spans = "[[object]]\nat = \"0x6148:1-1\"\nname = \"start\"\ntype = \"r32\"\naccess = \"ro\"\ndefault = 0.0\n\
+                 [[object]]\nat = \"0x6149:1-1\"\nname = \"end\"\ntype = \"r32\"\naccess = \"ro\"\ndefault = 100.0\n";
+    let cell = load_cell(0x6000, 1).replacen("[[signal]]", &format!("{spans}[[signal]]"), 1);
+    std::fs::write(noisy.path("cell.toml"), cell).expect("a file");
+    let done = noisy.run("--eds cell.eds tare 5").exit(1);
+    assert!(done.stderr.contains("the value is not steady"), "{}", done.stderr);
+    assert!(done.stderr.contains("hint: wait until the value is steady\n"), "{}", done.stderr);
 }

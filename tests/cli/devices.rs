@@ -175,3 +175,38 @@ fn descriptions_of_the_user_are_found_and_have_priority() {
     assert!(done.stderr.contains("not used: ") && done.stderr.contains("broken.toml:1:1: "), "{}", done.stderr);
     assert!(run_as_user(&bench, "objects mh4 1008").exit(0).stdout.contains("device-name"));
 }
+
+#[test]
+fn description_without_a_manual_page_allows_reading_only() {
+    let refusal = |name: &str, unchanged: &str| {
+        format!(
+            "cangauge: node 1: no manual page supports the description {name}{unchanged}\n\
+             hint: if it fits, name it: --device {name}\n"
+        )
+    };
+    for (name, signal) in [("hydronautics", "pressure"), ("epson-a552", "acceleration-x"), ("epson-g552", "")] {
+        let bench = Bench::of(&format!("{name}@1"));
+        bench.run(&format!("read 1 {signal}")).exit(0);
+        for line in ["store 1", "autozero 1", "tare 1", "lss set-id 1 9", "lss set-bitrate 1 250k"] {
+            let done = bench.run(line).exit(2);
+            let unchanged = if line.starts_with("lss") { "; nothing was changed" } else { "" };
+            assert_eq!(done.stderr, refusal(name, unchanged), "{line}");
+            let done = bench.run(&format!("{line} --device {name}"));
+            assert!(!done.stderr.contains("no manual page"), "{line}: {}", done.stderr);
+        }
+        let info = bench.run("info 1 -f json").exit(0).json();
+        assert_eq!((info[0]["device"].as_str(), info[0]["source"].as_str()), (Some(name), Some("built-in")));
+    }
+    Bench::of("mh4@1").run("store 1").exit(0);
+}
+
+#[test]
+fn info_names_the_file_of_a_description() {
+    let bench = Bench::of("mh4@1");
+    let text = bench.run("devices show mh4").exit(0).stdout;
+    std::fs::write(bench.path("mine.toml"), text.replacen("name = \"mh4\"", "name = \"mine\"", 1)).expect("a file");
+    let done = bench.run("info 1 --device mine.toml").exit(0);
+    assert!(done.stdout.contains("description  mine (mine.toml)\n"), "{}", done.stdout);
+    let info = bench.run("info 1 --device mine.toml -f json").exit(0).json();
+    assert_eq!(info[0]["source"], "mine.toml");
+}

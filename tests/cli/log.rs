@@ -383,3 +383,49 @@ fn trace_and_rows_have_the_same_times() {
     assert_eq!(rows(&done.stdout).iter().map(|row| row.at).collect::<Vec<_>>(), on_the_wire[..20]);
     assert_eq!(since_epoch("1767225601.000002"), 1_000_002);
 }
+
+/// An MH-4 whose TPDO1 has this COB-ID and this transmission type.
+fn on_request(cob_id: u32, transmission: u8) -> Bench {
+    Bench::described(&format!(
+        "[[device]]\nkind = \"mh4\"\nnode = 1\nset = {{ \"0x1800:1\" = {cob_id}, \"0x1800:2\" = {transmission}, \"0x1801:1\" = 0x80000281 }}\n"
+    ))
+}
+
+#[test]
+fn tpdos_are_requested_by_remote_frames() {
+    for (transmission, syncs) in [(252, true), (253, false)] {
+        let done = on_request(0x181, transmission).run("log 1 --request 100ms --count 6").exit(0);
+        assert_eq!(done.stdout.lines().count(), 7, "{}", done.stdout);
+        let frames = done.frames_of("181");
+        let (requests, answers): (Vec<&str>, Vec<&str>) = frames.iter().partition(|frame| frame.starts_with('R'));
+        let length = answers[0].len() / 2;
+        assert_eq!(requests[0], format!("R{length}"), "the length of the mapping");
+        assert!(requests.len() <= answers.len() + 1, "{frames:?}");
+        assert_eq!(!done.frames_of("080").is_empty(), syncs, "{:?}", done.frames);
+        if syncs {
+            let at = |frame: &str| done.frames.iter().position(|sent| sent.starts_with(frame)).expect("a frame");
+            assert!(at("080#") < at("181#R"), "{:?}", done.frames);
+        }
+        assert!(done.stderr.contains("that each one is new is not proven"), "{}", done.stderr);
+        assert!(!done.stderr.contains("missing"), "{}", done.stderr);
+    }
+}
+
+#[test]
+fn tpdo_that_answers_no_request_is_refused_or_named() {
+    let done = on_request(0x4000_0181, 253).run("log 1 --request 100ms --count 4");
+    assert!(done.frames_of("000").is_empty(), "{:?}", done.frames);
+    done.fails(
+        4,
+        "cangauge: node 1: TPDO1 does not answer remote requests (bit 30 of 1800h:1): nothing was started\n\
+         hint: read by SDO instead: --poll 100ms\n",
+    );
+    let done = on_request(0x181, 253).run("log 1 --request 100ms --no-nmt --duration 1s").exit(3);
+    assert!(done.stderr.contains("TPDO1 is due on each remote request, and no TPDO1 was received"), "{}", done.stderr);
+    let done = on_request(0x181, 253).run("log 1 --duration 1s").exit(3);
+    assert!(done.stderr.contains("--request 100ms"), "{}", done.stderr);
+    on_request(0x181, 253).run("log 1 --request 100ms --poll 1s").exit(2);
+    on_request(0x181, 253).run("log 1 --request 100us").refuses(
+        "invalid value '100us' for '--request <DUR>': \"100us\" is too short for remote requests (1ms or more)",
+    );
+}

@@ -148,7 +148,7 @@ fn separators_and_times_for_spreadsheets() {
 #[test]
 fn contradicting_options_are_refused() {
     let bench = Bench::of("mh4@1");
-    let wide = "--layout wide needs --sync or --poll: each row is one of their cycles";
+    let wide = "--layout wide needs --sync, --poll or --request: each row is one of their cycles";
     bench.run("log 1 --layout wide").refuses(wide);
     bench.run("log 1 --layout wide --passive --device mh4").refuses(wide);
     bench.run("log 1 --sync 10ms --decimal ,").refuses("the decimal sign and the delimiter must differ");

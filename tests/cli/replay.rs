@@ -132,9 +132,9 @@ fn commands_that_send_are_refused() {
          hint: commands that only listen work on it: log, check, pdo watch, scan --passive, nmt watch\n"
     );
     replay(&bench, "t.log", "log 1 --sync 10ms")
-        .refuses("a recording (replay:) is receive-only: --sync and --poll send");
+        .refuses("a recording (replay:) is receive-only: --sync, --poll and --request send");
     replay(&bench, "t.log", "log 1 --poll 10ms")
-        .refuses("a recording (replay:) is receive-only: --sync and --poll send");
+        .refuses("a recording (replay:) is receive-only: --sync, --poll and --request send");
 }
 
 /// A recording: another program reads the setup of node 5 (pressure in bar, 2 digits), then five values follow. `form`

@@ -13,7 +13,7 @@ use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Bench, Device, State};
 use cangauge::tasks::Fact;
 use cangauge::tasks::autozero::AutozeroFact;
-use cangauge::tasks::autozero::{Limit, Options, Zeroed, autozero};
+use cangauge::tasks::autozero::{Action, Limit, Options, Zeroed, autozero};
 use cangauge::tasks::store::{self, Group, StoreReport, Verified};
 use cangauge::tasks::{Failure, Kind, restore};
 use std::path::Path;
@@ -172,7 +172,15 @@ fn frames(run: impl Fn(&mut FaultyBus), kind: &str, settings: &str) -> usize {
 const STILL: &str = "[[device.channel]]\nchannel = 1\nbase = 0.0625\namplitude = 0.0\nnoise = 0.0\n";
 
 fn zero(bus: &mut FaultyBus, store: bool) -> Result<Zeroed, Failure> {
-    let options = Options { channel: None, limit: Limit::Default, samples: 2, force: false, store, dry_run: false };
+    let options = Options {
+        action: Action::Autozero,
+        channel: None,
+        limit: Limit::Default,
+        samples: 2,
+        force: false,
+        store,
+        dry_run: false,
+    };
     with(bus, |master| autozero(master, node(), &Default::default(), &options))
 }
 

@@ -164,7 +164,7 @@ impl Files {
         let refuse = |message: &str, hint: &str| Err(ErrorMessage::usage(message).hint(hint));
         if self.is_wide() && !has_cycles {
             return refuse(
-                "--layout wide needs --sync or --poll: each row is one of their cycles",
+                "--layout wide needs --sync, --poll or --request: each row is one of their cycles",
                 "add --sync 100ms or --poll 100ms, or omit --layout wide",
             );
         }

@@ -37,7 +37,7 @@ pub fn read_with_notes(text: &str) -> (Result<Description, Vec<DescriptionError>
 /// Reads every table of the file, then checks what they state about each other.
 fn description<'t>(file: &mut Table<'t>) -> Option<Description> {
     let (name, title, vendor) = (file.required("name"), file.required("title"), file.required("vendor"));
-    let source = file.or_default("source");
+    let (source, unconfirmed) = (file.or_default("source"), file.or_default("unconfirmed"));
     let (quirks, error_history) = (file.list("quirks"), file.or_default("error_history"));
     let (error_counters, repeating_average_ms) = (file.list("error_counters"), file.optional("repeating_average_ms"));
     let auto_bit_rate = file.optional("auto_bit_rate");
@@ -60,6 +60,7 @@ fn description<'t>(file: &mut Table<'t>) -> Option<Description> {
         title: title?,
         vendor: vendor?,
         source,
+        unconfirmed,
         factory,
         sdo,
         pdo,

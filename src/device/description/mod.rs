@@ -53,6 +53,9 @@ pub struct Description {
     pub vendor: String,
     /// The documents that the facts come from.
     pub source: String,
+    /// Whether no manual page supports it. It then allows reading; to store, set a zero, a node-ID or a bit rate, the user
+    /// must name it.
+    pub unconfirmed: bool,
     /// The answers by which the device is recognised.
     pub identify: Identify,
     /// Node-ID and bit rate of a new device.

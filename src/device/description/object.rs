@@ -160,6 +160,8 @@ pub enum Signature {
     Load,
     /// "zero": autozero (CiA 404, 6125h), or a reset of minimum and maximum.
     Zero,
+    /// "tara": autotare (CiA 404, 6139h).
+    Tare,
     /// "set" after the value: node-ID and bit rate of some devices. Byte 0 is the value.
     Set,
 }
@@ -171,6 +173,7 @@ impl Signature {
             Signature::Save => "save",
             Signature::Load => "load",
             Signature::Zero => "zero",
+            Signature::Tare => "tara",
             Signature::Set => "set",
         }
     }

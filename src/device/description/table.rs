@@ -352,7 +352,7 @@ macro_rules! words {
 }
 
 words!(super::Access { "ro" => Ro, "wo" => Wo, "rw" => Rw, "const" => Const });
-words!(super::Signature { "save" => Save, "load" => Load, "zero" => Zero, "set" => Set });
+words!(super::Signature { "save" => Save, "load" => Load, "zero" => Zero, "tara" => Tare, "set" => Set });
 words!(super::StoreGroup { "all" => All, "comm" => Communication, "app" => Application });
 words!(super::SizeIndication { "indicated" => Indicated, "omitted" => Omitted });
 words!(super::Remap { "invalidate" => Invalidate, "count-only" => CountOnly });

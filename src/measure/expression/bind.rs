@@ -9,7 +9,7 @@ use crate::device::dictionary::{Dictionary, spellings};
 use crate::device::nearest::distance;
 use crate::device::unit::Unit;
 use crate::measure::decode::Wanted;
-use crate::measure::layout::Layout;
+use crate::measure::layout::{Layout, PARTS};
 use crate::measure::sample::Source;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -65,8 +65,14 @@ impl AvailableSignals {
         self.objects.entry((node, name.to_lowercase())).or_insert(signal);
     }
 
-    /// Adds every named object of the description or EDS, and the names in the spelling of the EDS.
+    /// Adds every named object of the description or EDS, the names in the spelling of the EDS, and the parts of signals.
     fn add_objects(&mut self, layout: Layout<'_>) {
+        for (signal, (part, low)) in layout.signals.iter().flat_map(|signal| PARTS.map(|part| (signal, part))) {
+            let (node, name) = (layout.node, format!("{}.{part}", signal.name));
+            let unit = layout.find_in_family(signal, low).map(|object| layout.unit_of(object));
+            let entry = unit.map(|unit| ((node, name.clone()), AvailableSignal { node, name, unit }));
+            self.objects.extend(entry);
+        }
         let dictionary = layout.model.map(|model| &model.dictionary);
         for (name, object) in dictionary.into_iter().flat_map(Dictionary::names) {
             let resolved = layout.resolve(&Wanted::Signal(name.to_owned())).name();

@@ -6,6 +6,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::DataType;
 use crate::measure::decode::Wanted;
+use crate::measure::layout::PARTS;
 
 /// A token of an expression.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,13 +67,14 @@ fn token(text: &str, at: Position) -> Result<(Token, usize), LocatedError> {
             let what = Wanted::Signal(text[..length].to_owned());
             return Ok((Token::Signal(SignalName { node: None, what, at }), length));
         }
-        let status = text[word.len()..].starts_with(".status") && name(&text[word.len() + 1..]) == "status";
-        return Ok(if status {
-            let what = Wanted::Status(word.to_owned());
-            (Token::Signal(SignalName { node: None, what, at }), word.len() + ".status".len())
-        } else {
-            (Token::Word(word.to_owned()), word.len())
-        });
+        let part = text[word.len()..].strip_prefix('.').map_or("", name);
+        let length = word.len() + 1 + part.len();
+        let what = match part {
+            "status" => Wanted::Status(word.to_owned()),
+            _ if PARTS.iter().any(|(known, _)| *known == part) => Wanted::Signal(text[..length].to_owned()),
+            _ => return Ok((Token::Word(word.to_owned()), word.len())),
+        };
+        return Ok((Token::Signal(SignalName { node: None, what, at }), length));
     }
     if let Some(sign) = SIGNS.into_iter().find(|sign| text.starts_with(sign)) {
         let ascii = match sign {

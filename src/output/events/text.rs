@@ -134,6 +134,9 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::SharedCobId(id, [one, other]) => {
             format!("nodes {one} and {other} both send TPDOs with COB-ID {id}: these TPDOs make no rows")
         }
+        Remark::FreshnessNotProven => {
+            "values were sent on remote request: that each one is new is not proven (--poll reads new ones)".to_owned()
+        }
         Remark::PollFailed(error) => format!("node {}: {error}", error.node),
         Remark::ChangedWhileFramesLost(node, before) => {
             let before = format_duration(*before);

@@ -4,7 +4,9 @@ use super::Words;
 use crate::canopen::id::NodeId;
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
-use crate::tasks::autozero::{AutozeroEffect, AutozeroFact, AutozeroFailure, Objection, OffsetChange, Quantity, Undo};
+use crate::tasks::autozero::{
+    Action, AutozeroEffect, AutozeroFact, AutozeroFailure, Objection, OffsetChange, Quantity, Undo,
+};
 use crate::tasks::store::Group;
 
 /// The message and the hint for a cause.
@@ -16,11 +18,23 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
             Words::new(format!("{title} has no autozero of channel {channel}"))
                 .hint(format!("it has one of: {}", list(available)))
         }
-        AutozeroFailure::WhichChannel { available } if available.is_empty() => {
+        AutozeroFailure::WhichChannel { action, available } if available.is_empty() => {
             Words::new("the device has several channels: choose one")
-                .hint(format!("cangauge autozero {node} --channel 1"))
+                .hint(format!("cangauge {} {node} --channel 1", action.as_str()))
         }
-        AutozeroFailure::WhichChannel { available } => Words::new("the device has several channels: choose one")
+        AutozeroFailure::NoTare => {
+            Words::new("no description or EDS of it has a tare (0x6139) and a net value (0x6140)")
+                .hint("use one that has: --device FILE or --eds FILE")
+        }
+        AutozeroFailure::NoTareOfChannel { channel, available } => {
+            Words::new(format!("it has no tare of channel {channel}"))
+                .hint(format!("it has one of: {}", list(available)))
+        }
+        AutozeroFailure::NoTareZero { channel } => {
+            Words::new(format!("it has no tare zero (0x6138:{channel}) that can be written"))
+                .hint(format!("a reset may clear it: cangauge nmt reset {node}"))
+        }
+        AutozeroFailure::WhichChannel { available, .. } => Words::new("the device has several channels: choose one")
             .hint(format!("--channel with one of {}", list(available))),
         AutozeroFailure::NoMeasuredValueOnChannel { channel } => {
             Words::new(format!("it has no measured value on channel {channel}"))
@@ -35,10 +49,10 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
         AutozeroFailure::RestartedBefore => {
             Words::new("the device restarted during the measurement: nothing was changed")
         }
-        AutozeroFailure::Unsafe { objection, channel } => {
+        AutozeroFailure::Unsafe { action, objection, channel } => {
             let words = Words::new(format!("{}: nothing was changed", reason(objection)));
             let choice = channel.map(|channel| format!(" --channel {channel}")).unwrap_or_default();
-            words.hint(remedy(objection, &node, &choice))
+            words.hint(remedy(*action, objection, &node, &choice))
         }
         AutozeroFailure::RestartedAfter => Words::new(
             "the device accepted the signature, then restarted: the zero is lost unless the device stored it",
@@ -49,16 +63,19 @@ pub(super) fn words(failure: &Failure, cause: &AutozeroFailure) -> Words {
                 Some(mean) => format!("nothing has changed: {signal} reads {}", quantity(*mean)),
                 None => format!("{signal} has no valid value afterwards"),
             };
-            let offset = match offset {
-                OffsetChange::Changed(old, new) => format!("the offset went from {old} to {new}"),
-                OffsetChange::Unchanged => "the offset is unchanged".to_owned(),
-                OffsetChange::Unreadable => "the offset cannot be read".to_owned(),
-            };
-            Words::new(format!("the device accepted the signature, and {reads}; {offset}"))
+            Words::new(format!("the device accepted the signature, and {reads}; {}", offset_change(offset)))
         }
         AutozeroFailure::OtherOffsetStored => {
             Words::new("the offset changed between the zero and the store: another offset was stored")
         }
+    }
+}
+
+fn offset_change(offset: &OffsetChange) -> String {
+    match offset {
+        OffsetChange::Changed(old, new) => format!("the offset went from {old} to {new}"),
+        OffsetChange::Unchanged => "the offset is unchanged".to_owned(),
+        OffsetChange::Unreadable => "the offset cannot be read".to_owned(),
     }
 }
 
@@ -88,7 +105,7 @@ fn reason(objection: &Objection) -> String {
             format!("{signal} is {}, limit {} ({})", quantity(*reading), quantity(*limit), part(percent, "--limit"))
         }
         Objection::Unsteady { signal, spread, limit, percent } => format!(
-            "the readings of {signal} vary by {} (limit {}, {}): the pressure is not steady",
+            "the readings of {signal} vary by {} (limit {}, {}): the value is not steady",
             quantity(*spread),
             quantity(*limit),
             part(percent, "half of --limit")
@@ -103,7 +120,7 @@ fn reason(objection: &Objection) -> String {
 }
 
 /// What to do about an objection.
-fn remedy(objection: &Objection, node: &str, choice: &str) -> String {
+fn remedy(action: Action, objection: &Objection, node: &str, choice: &str) -> String {
     match objection {
         Objection::Absolute => "apply a vacuum and use --force".to_owned(),
         Objection::Invalid { .. } => format!("show the errors of the device: cangauge errors {node}"),
@@ -113,7 +130,8 @@ fn remedy(objection: &Objection, node: &str, choice: &str) -> String {
                 "vent or isolate the line; if the limit is too low: cangauge autozero {node}{choice} --limit {enough}"
             )
         }
-        Objection::Unsteady { .. } => "wait until the pressure is steady, or use --force".to_owned(),
+        Objection::Unsteady { .. } if action == Action::Tare => "wait until the value is steady".to_owned(),
+        Objection::Unsteady { .. } => "wait until the value is steady, or use --force".to_owned(),
         Objection::TotalOffset { .. } => {
             "several small offsets have added up: check the sensor, or use --force".to_owned()
         }

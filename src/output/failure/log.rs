@@ -4,6 +4,7 @@ use super::Words;
 use crate::bus::time::format_duration;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
+use crate::canopen::pdo::TpdoNumber;
 use crate::output::diagnosis;
 use crate::tasks::Failure;
 use crate::tasks::diagnosis::Silence;
@@ -39,6 +40,7 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
         }
         LogFailure::SecondSyncProducer => Words::new("another node sends SYNC on this bus: nothing was started")
             .hint("omit --sync: the nodes send on the SYNC that is already there"),
+        LogFailure::NoRtr { number } => no_rtr(*number),
         LogFailure::UnknownMapping => {
             let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
             Words::new("it sends TPDOs, and their mapping is unknown").hint(format!(
@@ -66,6 +68,12 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
         }
         LogFailure::EventsLost { output } => Words::new(format!("events lost: {output} could not keep up")),
     }
+}
+
+fn no_rtr(number: TpdoNumber) -> Words {
+    let index = number.communication(1).index;
+    Words::new(format!("{number} does not answer remote requests (bit 30 of {index:04X}h:1): nothing was started"))
+        .hint("read by SDO instead: --poll 100ms")
 }
 
 fn nodes_lost(nodes: &[NodeId]) -> String {

@@ -219,6 +219,8 @@ fn words(failure: &Failure) -> Words {
         Cause::Host(cause) => host::words(cause),
         Cause::Interrupted => Words::new("interrupted"),
         Cause::Expression(error) => below::expression(error),
+        Cause::Unconfirmed(name) => Words::new(format!("no manual page supports the description {name}"))
+            .hint(format!("if it fits, name it: --device {name}")),
         Cause::Read(cause) => read::words(failure, cause),
         Cause::Scan(cause) => scan::words(failure, cause),
         Cause::Nmt(cause) => nmt::words(failure, cause),

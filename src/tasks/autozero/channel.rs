@@ -1,10 +1,11 @@
 //! The objects that set the zero of a channel: signature, offset, measuring range. From the description or CiA 404.
 
+use super::Action;
 use super::failure::AutozeroFailure;
 use crate::canopen::object::ObjectId;
 use crate::canopen::sdo::AbortCode;
 use crate::canopen::value::{DataType, Value};
-use crate::device::description::{Autozero, Range};
+use crate::device::description::{Autozero, Range, Signature};
 use crate::device::unit::Unit;
 use crate::master::{Master, Request, SdoError, SdoFailure};
 use crate::measure::layout::Signal;
@@ -60,7 +61,9 @@ pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
     let available = || described.iter().map(|entry| entry.channel).collect::<Vec<_>>();
     let entry = match (number, described) {
         (None, [only]) => only,
-        (None, _) => return Err(fail(AutozeroFailure::WhichChannel { available: available() })),
+        (None, _) => {
+            return Err(fail(AutozeroFailure::WhichChannel { action: Action::Autozero, available: available() }));
+        }
         (Some(number), _) => described.iter().find(|entry| entry.channel == number).ok_or_else(|| {
             fail(AutozeroFailure::NoSuchChannel { title: title.clone(), channel: number, available: available() })
         })?,
@@ -74,6 +77,45 @@ pub(super) fn find(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
     Ok(Channel { signal, object: entry.object, signature, offsets, is_described, absolute, range })
 }
 
+/// Finds the channel with a tare: its description or EDS has 6139h:n and the net value. The net value becomes the value
+/// of the signal.
+///
+/// # Errors
+/// No channel has a tare, or not this one; several have one and none was chosen; no answer.
+pub(super) fn tare(master: &mut Master<'_>, device: &mut Node, number: Option<u8>) -> Result<Channel, Failure> {
+    let fail = |cause| Failure::at(device.id, cause);
+    let layout = device.layout();
+    let known = |object: &ObjectId| layout.model.is_some_and(|model| model.dictionary.get(*object).is_some());
+    let object = |signal: &Signal| Some(ObjectId::new(0x6139, signal.channel)).filter(known);
+    let net = |signal: &Signal| layout.find_in_family(signal, 0x140).filter(known);
+    let candidates: Vec<(&Signal, ObjectId, ObjectId)> =
+        device.channels().into_iter().filter_map(|signal| Some((signal, object(signal)?, net(signal)?))).collect();
+    let available = candidates.iter().map(|(signal, ..)| signal.channel).collect();
+    let (signal, object, net) = match (number, candidates.as_slice()) {
+        (_, []) => return Err(fail(AutozeroFailure::NoTare)),
+        (None, [only]) => *only,
+        (None, _) => return Err(fail(AutozeroFailure::WhichChannel { action: Action::Tare, available })),
+        (Some(number), _) => {
+            let found = candidates.iter().find(|(signal, ..)| signal.channel == number);
+            *found.ok_or_else(|| fail(AutozeroFailure::NoTareOfChannel { channel: number, available }))?
+        }
+    };
+    let signature = device.described(object).and_then(|entry| entry.signature).unwrap_or(Signature::Tare);
+    let offsets: Vec<ObjectId> = layout.find_in_family(signal, 0x138).into_iter().collect();
+    let signal = Signal { value: (net, layout.data_type(net)), ..signal.clone() };
+    let range = range(master, device, &signal, None)?;
+    device.signals.iter_mut().filter(|known| known.name == signal.name).for_each(|known| *known = signal.clone());
+    Ok(Channel {
+        signal,
+        object,
+        signature: signature.as_str().as_bytes().to_vec(),
+        is_described: !offsets.is_empty(),
+        offsets,
+        absolute: None,
+        range,
+    })
+}
+
 /// 6125h:n, if the device has it.
 fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -> Result<Channel, Failure> {
     let node = device.id;
@@ -82,7 +124,10 @@ fn by_the_standard(master: &mut Master<'_>, device: &Node, number: Option<u8>) -
         (None, [only]) => *only,
         (None, []) => return Err(Failure::at(node, ReadFailure::NoMeasuredValue)),
         (None, _) => {
-            return Err(Failure::at(node, AutozeroFailure::WhichChannel { available: Vec::new() }));
+            return Err(Failure::at(
+                node,
+                AutozeroFailure::WhichChannel { action: Action::Autozero, available: Vec::new() },
+            ));
         }
     }
     .clone();

@@ -1,5 +1,6 @@
 //! Causes, effects and notes: a channel was not set to zero, and what to report about a zero that was set.
 
+use super::Action;
 use super::channel::Offset;
 use super::safety::Objection;
 use crate::canopen::object::ObjectId;
@@ -40,8 +41,24 @@ pub enum AutozeroFailure {
     },
     /// The device has several channels, and none was chosen.
     WhichChannel {
-        /// The channels that have an autozero; empty if they are unknown.
+        /// What is set to zero.
+        action: Action,
+        /// The channels that have one; empty if they are unknown.
         available: Vec<u8>,
+    },
+    /// Neither description nor EDS states a tare.
+    NoTare,
+    /// Neither description nor EDS states a tare of this channel.
+    NoTareOfChannel {
+        /// The channel.
+        channel: u8,
+        /// The channels that have one.
+        available: Vec<u8>,
+    },
+    /// The device has no tare zero that can be read and written.
+    NoTareZero {
+        /// The channel.
+        channel: u8,
     },
     /// The channel has no measured value.
     NoMeasuredValueOnChannel {
@@ -70,6 +87,8 @@ pub enum AutozeroFailure {
     RestartedBefore,
     /// A safety check stopped it.
     Unsafe {
+        /// What is set to zero.
+        action: Action,
         /// The reason.
         objection: Objection,
         /// The channel, if the user chose one.
@@ -109,10 +128,12 @@ impl AutozeroFailure {
         match self {
             AutozeroFailure::NoAutozero { .. }
             | AutozeroFailure::NoSuchChannel { .. }
+            | AutozeroFailure::NoTare
+            | AutozeroFailure::NoTareOfChannel { .. }
             | AutozeroFailure::WhichChannel { .. }
             | AutozeroFailure::NoMeasuredValueOnChannel { .. }
             | AutozeroFailure::LimitUnit { .. } => Kind::Usage,
-            AutozeroFailure::NoObject { .. } => Kind::Refused,
+            AutozeroFailure::NoObject { .. } | AutozeroFailure::NoTareZero { .. } => Kind::Refused,
             AutozeroFailure::Unsafe { .. } => Kind::CheckFailed,
             AutozeroFailure::RestartedBefore
             | AutozeroFailure::RestartedAfter

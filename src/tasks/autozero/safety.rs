@@ -108,6 +108,13 @@ pub enum Objection {
     },
 }
 
+impl Objection {
+    /// Whether it is a reason not to tare: the process value may have any distance from zero.
+    pub(super) fn concerns_tare(&self) -> bool {
+        matches!(self, Objection::Invalid { .. } | Objection::Unsteady { .. })
+    }
+}
+
 /// What the safety checks need.
 pub(super) struct Measured<'a> {
     pub(super) signal: &'a str,

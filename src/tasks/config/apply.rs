@@ -19,6 +19,7 @@ use crate::master::Master;
 use crate::node::Overrides;
 use crate::node::state::{command, state};
 use crate::node::write::write_and_verify;
+use crate::tasks::failure::check_confirmed;
 use crate::tasks::lss::{Descriptions, Job, RequestedRate, Target, Via, assign};
 use crate::tasks::pdo;
 use crate::tasks::settings::open;
@@ -132,6 +133,9 @@ pub fn apply(
     overrides: &Overrides,
     journal: &mut dyn Journal,
 ) -> Result<Applied, Failure> {
+    if options.store || options.sections.address {
+        check_confirmed(Some(before.node.id), before.node.model.as_deref())?;
+    }
     check_device(wishes, &before, options.sections.calibration)?;
     let (targets, notes) = targets(wishes, &before, options);
     let mut work = Work {

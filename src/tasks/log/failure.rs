@@ -88,6 +88,11 @@ pub enum LogFailure {
         /// The name of the file or stream.
         output: String,
     },
+    /// The TPDO does not answer remote requests (bit 30 of its COB-ID).
+    NoRtr {
+        /// The TPDO.
+        number: TpdoNumber,
+    },
     /// Another program deleted the file while it was written.
     FileDeleted {
         /// The name of the file.
@@ -109,6 +114,7 @@ impl LogFailure {
             | LogFailure::UnknownMapping
             | LogFailure::OtherColumns { .. } => Kind::Usage,
             LogFailure::NotMapped { .. } => Kind::Unexpected,
+            LogFailure::NoRtr { .. } => Kind::Refused,
             LogFailure::DifferentSyncIds(_) | LogFailure::DifferentSyncCounters(_) | LogFailure::SecondSyncProducer => {
                 Kind::CheckFailed
             }

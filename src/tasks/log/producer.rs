@@ -1,4 +1,4 @@
-//! The SYNC producer: sends SYNC without drift, and measures how late each one was.
+//! The SYNC producer: sends SYNC without drift, and measures how late each one was. It also paces remote requests.
 
 use super::nth;
 use crate::bus::Mono;
@@ -23,7 +23,8 @@ pub struct SyncStatistics {
 /// Sends SYNC at an interval.
 pub(super) struct Producer {
     interval: Duration,
-    id: CanId,
+    /// The COB-ID of SYNC; `None`: it only paces remote requests.
+    id: Option<CanId>,
     /// 1019h: the counter in the SYNC message runs from 1 to this value. `None`: SYNC has no counter.
     overflow: Option<u8>,
     start: Mono,
@@ -34,7 +35,7 @@ pub(super) struct Producer {
 }
 
 impl Producer {
-    pub(super) fn new(interval: Duration, id: CanId, overflow: Option<u8>, start: Mono) -> Producer {
+    pub(super) fn new(interval: Duration, id: Option<CanId>, overflow: Option<u8>, start: Mono) -> Producer {
         Producer { interval, id, overflow, start, slot: 0, waiting: None, statistics: SyncStatistics::default() }
     }
 
@@ -44,12 +45,12 @@ impl Producer {
     }
 
     /// The next SYNC message. Its counter goes on only if the previous message was sent.
-    fn frame(&self) -> Frame {
+    fn frame(&self, id: CanId) -> Frame {
         match self.overflow {
-            None => Frame::empty(self.id),
+            None => Frame::empty(id),
             Some(overflow) => {
                 let counter = self.statistics.sent % u64::from(overflow.max(1)) + 1;
-                Frame::byte(self.id, u8::try_from(counter).unwrap_or(1))
+                Frame::byte(id, u8::try_from(counter).unwrap_or(1))
             }
         }
     }
@@ -67,7 +68,9 @@ impl Producer {
     /// Sends the SYNC that is due.
     pub(super) fn send(&mut self, master: &mut Master<'_>) {
         self.check_sent(master);
-        if master.send_first(self.frame()) {
+        if let Some(id) = self.id
+            && master.send_first(self.frame(id))
+        {
             self.waiting = Some(self.slot);
         }
         self.slot = next_slot(self.start, master.now(), self.interval, self.slot);
@@ -87,7 +90,8 @@ impl Producer {
     pub(super) fn finish(mut self, master: &mut Master<'_>) -> SyncStatistics {
         self.check_sent(master);
         let unsent = u64::from(master.remove_first());
-        self.statistics.left_out = self.slot - self.statistics.sent - unsent;
+        let due = self.id.map_or(0, |_| self.slot);
+        self.statistics.left_out = due.saturating_sub(self.statistics.sent + unsent);
         self.statistics
     }
 }

@@ -13,13 +13,16 @@ use super::poll::Poll;
 use super::rereads::Rereads;
 use super::silence::Questions;
 use super::states::NmtStates;
-use super::{LogEvent, LogOptions, Observer, Remark};
+use super::{LogEvent, LogFailure, LogOptions, Mode, Observer, Remark};
 use crate::bus::{Bus, Filters, Mono, ReceiveBuffer, Received, TimestampSource};
 use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::pdo::Transmission;
 use crate::master::{Answer, Error, Master, SdoError, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
+use crate::measure::layout::Tpdo;
 use crate::measure::sample::{Doubt, Sample};
 use crate::node::Node;
+use crate::tasks::Failure;
 use crate::tasks::diagnosis::Heard;
 use due::DueTpdos;
 use emergencies::Emergencies;
@@ -103,6 +106,33 @@ impl<'o> Recording<'o> {
             doubts: BTreeSet::new(),
             interrupted: false,
             samples: Vec::new(),
+        }
+    }
+
+    /// The TPDOs with values that are recorded.
+    fn recorded_tpdos(&self) -> impl Iterator<Item = (&Node, &Tpdo)> {
+        let tpdos = self.nodes.iter().flat_map(|node| node.tpdos.iter().map(move |tpdo| (node, tpdo)));
+        tpdos.filter(|(_, tpdo)| tpdo.cob_id.is_valid() && self.decoder.values_of(tpdo.cob_id.can_id()) > 0)
+    }
+
+    /// The interval at which this program sends SYNC; `None` if it sends none. Requests of type 252 need SYNC.
+    pub(super) fn sync_interval(&self) -> Option<Duration> {
+        let mut kinds = self.recorded_tpdos().map(|(_, tpdo)| tpdo.transmission);
+        match self.options.mode {
+            Mode::Sync(interval) => Some(interval),
+            Mode::Request(interval) if kinds.any(|kind| kind == Some(Transmission::Rtr(252))) => Some(interval),
+            _ => None,
+        }
+    }
+
+    /// Refuses to request a TPDO that answers no requests (bit 30 of its COB-ID).
+    pub(super) fn refuse_without_rtr(&self) -> Result<(), Failure> {
+        let mut without = self.recorded_tpdos().filter(|(_, tpdo)| !tpdo.cob_id.allows_rtr());
+        match (self.options.mode, without.next()) {
+            (Mode::Request(_), Some((node, tpdo))) => {
+                Err(Failure::at(node.id, LogFailure::NoRtr { number: tpdo.number }))
+            }
+            _ => Ok(()),
         }
     }
 

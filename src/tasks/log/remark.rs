@@ -16,6 +16,8 @@ pub enum Remark {
     NoRequestedSignal(NodeId),
     /// Both nodes send TPDOs with this COB-ID: they make no rows.
     SharedCobId(CanId, [NodeId; 2]),
+    /// The values were sent on remote request: it is not proven that each is new.
+    FreshnessNotProven,
     /// A value could not be polled.
     PollFailed(SdoError),
     /// The node's setup changed while frames were lost. The rows of this time before the change was found may be wrong.

@@ -115,6 +115,7 @@ impl Recording<'_> {
         let situation = Situation {
             waited: self.waited(),
             syncs_sent: matches!(self.options.mode, Mode::Sync(_)).then(|| self.syncs()),
+            requests: matches!(self.options.mode, Mode::Request(_)),
             was_started: self.states.has_started(id),
         };
         diagnose(node, &carries, &heard, self.questions.findings.get(&id), &situation)

@@ -20,6 +20,7 @@ use crate::canopen::lss::LssAddress;
 use crate::device::assign::{AssignEntry, AssignKind, RateSource, RateTable};
 use crate::device::catalog::Model;
 use crate::master::{Lss, LssError, Master};
+use crate::tasks::failure::check_confirmed;
 use crate::tasks::{Failure, Kind};
 use std::sync::Arc;
 use std::time::Duration;
@@ -100,6 +101,7 @@ fn prepare(
     notify: Notify<'_>,
 ) -> Result<(LssDevice, AssignEntry, Option<PlannedRate>), Failure> {
     let device = resolve(master, &job.target, &job.descriptions, (job.via, job.force), notify)?;
+    check_confirmed(device.node, device.model.as_deref())?;
     let method = choose_method(&device, job.via, job.store, notify)?;
     let plan = |rate| plan_rate(device.description(), rate, method.way).map_err(|cause| device.failure(cause));
     let rate = job.rate.map(plan).transpose()?;

@@ -18,6 +18,7 @@ use crate::node::read::read_values;
 use crate::node::survey::identify;
 use crate::node::write::write_with;
 use crate::node::{self, Node, Overrides, WriteOptions};
+use crate::tasks::failure::check_confirmed;
 use crate::tasks::{Failure, Note};
 use std::time::Duration;
 
@@ -145,6 +146,7 @@ pub struct StorePlan {
 /// # Errors
 /// The device does not store this group on command; no answer, protocol errors, bus errors and Ctrl-C.
 pub fn plan(master: &mut Master<'_>, device: &Node, group: Group) -> Result<StorePlan, Failure> {
+    check_confirmed(Some(device.id), device.model.as_deref())?;
     let objects = || device.model.iter().flat_map(|model| &model.description.objects);
     let note = |fact| Note::of_node(device.id, fact);
     let resets_cob_ids =

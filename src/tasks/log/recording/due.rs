@@ -1,4 +1,4 @@
-//! Counts the values that were due after a SYNC and did not arrive.
+//! Counts the values that were due after a SYNC or a remote request and did not arrive.
 
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
@@ -6,10 +6,11 @@ use crate::canopen::id::CanId;
 use crate::canopen::pdo::Transmission;
 use crate::measure::decode::Decoder;
 use crate::node::Node;
+use crate::tasks::log::Mode;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A TPDO that is sent at every n-th SYNC.
+/// A TPDO that is sent at every n-th SYNC, or on each remote request.
 #[derive(Debug, Default)]
 struct DueTpdo {
     /// n, 1 to 240.
@@ -34,9 +35,14 @@ pub(super) struct DueTpdos {
 
 impl DueTpdos {
     /// Takes the present setup of the nodes. The counts stay.
-    pub(super) fn set_up(&mut self, nodes: &[Node], decoder: &Decoder) {
+    pub(super) fn set_up(&mut self, nodes: &[Node], decoder: &Decoder, mode: Mode) {
         for tpdo in nodes.iter().flat_map(|node| &node.tpdos).filter(|tpdo| tpdo.cob_id.is_valid()) {
-            if let Some(Transmission::Sync(every)) = tpdo.transmission {
+            let every = match (mode, tpdo.transmission) {
+                (Mode::Request(_), _) => Some(1),
+                (_, Some(Transmission::Sync(every))) => Some(every),
+                _ => None,
+            };
+            if let Some(every) = every {
                 let id = tpdo.cob_id.can_id();
                 let due = self.tpdos.entry(id).or_default();
                 (due.every, due.values) = (every, decoder.values_of(id));

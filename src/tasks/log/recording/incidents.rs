@@ -259,7 +259,7 @@ impl Recording<'_> {
         self.liveness.watch_heartbeat(&node, self.options.mode, at.mono);
         self.liveness.restart(id, at.mono);
         self.nodes[place] = node;
-        self.due.set_up(&self.nodes, &self.decoder);
+        self.due.set_up(&self.nodes, &self.decoder, self.options.mode);
         master.listen(&self.filters())?;
         if may_need_start {
             self.states.start_again(id, master);

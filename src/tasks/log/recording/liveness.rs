@@ -126,7 +126,9 @@ fn sends_on_change(node: &Node, mode: Mode) -> bool {
         }
         _ => true,
     };
-    !matches!(mode, Mode::Poll(_) | Mode::Passive) && valid.peek().is_some() && valid.all(|tpdo| !is_due(tpdo))
+    !matches!(mode, Mode::Poll(_) | Mode::Request(_) | Mode::Passive)
+        && valid.peek().is_some()
+        && valid.all(|tpdo| !is_due(tpdo))
 }
 
 #[cfg(test)]

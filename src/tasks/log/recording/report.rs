@@ -6,7 +6,7 @@ use crate::canopen::nmt::NmtState;
 use crate::node::state::Proof;
 use crate::tasks::diagnosis::{Running, Silence, SilenceCause};
 use crate::tasks::log::silence::{Silent, why_nothing};
-use crate::tasks::log::{RecordingReport, Remark};
+use crate::tasks::log::{Mode, RecordingReport, Remark};
 
 impl Recording<'_> {
     /// Ends the recording.
@@ -45,6 +45,8 @@ impl Recording<'_> {
         self.remarks.extend(self.rereads.held().map(Remark::NotReadAgain));
         self.remarks.extend(self.not_operational());
         if self.tally.rows > 0 {
+            let requests = matches!(self.options.mode, Mode::Request(_));
+            self.remarks.extend(requests.then_some(Remark::FreshnessNotProven));
             let remarks = self.silence_remarks();
             self.remarks.extend(remarks);
         }

@@ -2,6 +2,7 @@
 
 use super::Recording;
 use crate::bus::Mono;
+use crate::canopen::frame::Frame;
 use crate::canopen::id::CanId;
 use crate::master::{Error, Happening, Master};
 use crate::node::wait::{self, Policy, Until, Waiter};
@@ -70,10 +71,11 @@ impl Recording<'_> {
             self.liveness.watch_heartbeat(node, self.options.mode, start);
         }
         let mut producer = match self.options.mode {
-            Mode::Sync(interval) => {
+            Mode::Sync(interval) | Mode::Request(interval) => {
                 let id = self.nodes.first().map_or(CanId::SYNC, |first| first.sync);
+                let id = self.sync_interval().map(|_| id);
                 let overflow = self.nodes.first().and_then(|first| first.sync_overflow);
-                self.due.set_up(&self.nodes, &self.decoder);
+                self.due.set_up(&self.nodes, &self.decoder, self.options.mode);
                 Some(Producer::new(interval, id, overflow, start))
             }
             _ => None,
@@ -84,7 +86,7 @@ impl Recording<'_> {
         self.timestamps = master.bus().timestamps();
         if let Some(producer) = producer {
             self.tally.syncs = producer.finish(master);
-            if let Mode::Sync(interval) = self.options.mode {
+            if let Mode::Sync(interval) | Mode::Request(interval) = self.options.mode {
                 self.tally.events.missing = std::mem::take(&mut self.due).missing(self.tally.end(), interval);
             }
         }
@@ -133,7 +135,11 @@ impl Recording<'_> {
             }
             observer.cycle(producer.slot(), master.bus().now())?;
             self.due.sync(now);
+            let is_free = !master.is_sending();
             producer.send(master);
+            if is_free {
+                self.send_requests(master);
+            }
         }
         if let Some(poll) = &mut self.poll {
             if poll.due(schedule.start) <= now {
@@ -154,6 +160,18 @@ impl Recording<'_> {
         }
         self.report_repeated(master.bus().now(), false, observer);
         observer.tick(master.bus().now(), self.tally.rows)
+    }
+
+    /// Sends a remote request (RTR) for each TPDO that is recorded.
+    fn send_requests(&self, master: &mut Master<'_>) {
+        if !matches!(self.options.mode, Mode::Request(_)) {
+            return;
+        }
+        for (_, tpdo) in self.recorded_tpdos() {
+            let bits: usize = tpdo.mapping.iter().map(|entry| usize::from(entry.bits)).sum();
+            let length = u8::try_from(bits.div_ceil(8)).unwrap_or(u8::MAX);
+            Frame::remote(tpdo.cob_id.can_id(), length).into_iter().for_each(|frame| master.send(frame));
+        }
     }
 
     /// Ctrl-C. After the first one, the frames received before it are still recorded. The second one does not wait.
