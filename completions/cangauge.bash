@@ -6289,7 +6289,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__tare)
-            opts="-b -t -f -q -v -h -V --channel --undo --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            opts="-b -t -f -q -v -h -V --channel --undo --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -6337,6 +6337,10 @@ _cangauge() {
                     ;;
                 -f)
                     COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
+                    return 0
+                    ;;
+                --wait)
+                    COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
                 --trace)

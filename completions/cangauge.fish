@@ -1450,7 +1450,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s v -l verbose 
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l channel -d 'Channel [default: the only one with a tare]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5,dps@127, sim:FILE.toml, replay:FILE (candump -L log, receive only) [default: the only CAN interface that is up]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
@@ -1459,7 +1459,8 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l sdo -d 'The C
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l trace -d 'Write every frame sent and received to FILE in candump -L format; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1468,6 +1469,7 @@ always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l undo -d 'Set the tare zero to 0: the net value is the process value again'
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
+complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l ignore-lock -d 'Continue although another program uses the same nodes'
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s q -l quiet -d 'Print less on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s v -l verbose -d 'Print more on stderr'
