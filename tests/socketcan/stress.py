@@ -27,6 +27,8 @@ BENCH = """device = [
 ]"""
 SETTINGS = 'heartbeat = "300ms"\n[tpdo.1]\nevent-timer = "250ms"\n[tpdo.2]\nevent-timer = "350ms"\n'
 DISK = 65536
+# After this time the machine counts as hung.
+GIVE_UP = 120
 
 
 class Stress:
@@ -64,7 +66,7 @@ class Stress:
 
     def check(self, rows, path):
         """The rows are frames of candump without a gap."""
-        give_up, frames = time.monotonic() + 20, []
+        give_up, frames = time.monotonic() + GIVE_UP, []
         while rows and rows[-1] not in frames and time.monotonic() < give_up:
             time.sleep(0.1)
             with open(self.candump, encoding="ascii") as file:
@@ -77,9 +79,9 @@ class Stress:
         return self.popen("log", 5, "pressure", "--passive", "--device", "mh4", "-o", path, *more)
 
     def await_rows(self, path, count, process):
-        give_up = time.monotonic() + 20
+        give_up = time.monotonic() + GIVE_UP
         while len(rows_of(path)[0]) < count:
-            assert process.poll() is None and time.monotonic() < give_up, f"{path}: no {count} rows"
+            assert process.poll() is None and time.monotonic() < give_up, f"{path}: no {count} rows {process.poll()}"
             time.sleep(0.02)
 
     def signals(self, path):
