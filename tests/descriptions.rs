@@ -29,10 +29,10 @@ const GENERAL: u32 = 0x0800_0000;
 const MEASURED: [&str; 4] = ["minimum-pv", "maximum-pv", "process-value-integer", "pressure-float"];
 
 /// Incomplete descriptions: they cover one procedure only and say so.
-const PARTS: [&str; 6] = ["hydac-old", "baumer", "danfoss-p92c", "epson-a552", "epson-g552", "hydronautics"];
+const INCOMPLETE: [&str; 6] = ["hydac-old", "baumer", "danfoss-p92c", "epson-a552", "epson-g552", "hydronautics"];
 
 fn complete() -> impl Iterator<Item = &'static Arc<Model>> {
-    built_in().iter().filter(|model| !PARTS.contains(&model.description.name.as_str()))
+    built_in().iter().filter(|model| !INCOMPLETE.contains(&model.description.name.as_str()))
 }
 
 fn node() -> NodeId {
