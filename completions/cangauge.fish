@@ -477,7 +477,7 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l type -d 'Encode the value as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l sdo-size -d 'Whether the request contains the size: auto follows the description, and retries with the other form if the device rejects it' -r -f -a "indicated\t'With the size: 2Fh, 2Bh, 27h, 23h'
 omit\t'Without the size: 22h'
-auto\t'As the description says'"
+auto\t'As in the description of the device'"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l input -d 'Write the bytes of a file; - for stdin' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l block -d 'When to use block transfer: auto for long objects if the device supports it' -r -f -a "always\t'For every object'
 never\t'Never'
@@ -499,7 +499,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sync -d 'Send 
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l poll -d 'Read by SDO at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l request -d 'Request TPDOs by remote frames (RTR) at this interval; whether the values are new is not proven, prefer --poll' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l max-gap -d 'Report longer intervals as gaps [default: 3 times the usual interval]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l expect -d 'Exit with 1 at the end unless this was true: \'pressure in 9..11 bar\', see cangauge check --help' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l expect -d 'Exit with 1 at the end if this expression failed: \'pressure in 9..11 bar\' (see cangauge check --help)' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s o -l output -d 'Write to a file instead of stdout' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l layout -d 'One row per value, or one per cycle of --sync or --poll' -r -f -a "long\t''
 wide\t''"
@@ -1344,8 +1344,8 @@ never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l table -d 'Set many devices, one row each: vendor, product, serial, node (with --address), and columns that fill in "{column}" in the file. A device that is not in the table is not changed' -r -F
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l record -d 'Write a record: when, which devices, before, after, how it was verified; HTML if the name ends with .html, else JSON' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l table -d 'Set many devices, one row each: vendor, product, serial, node (with --address), and a column for each "{column}" in the file. A device that is not in the table is not changed' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l record -d 'Write a record with time, devices, old and new values and verification; HTML if the name ends with .html, else JSON' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l ignore-lock -d 'Continue although another program uses the same nodes'
@@ -1656,7 +1656,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fis
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "show" -d 'Print a description as TOML'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "new" -d 'Print a first description of a device, from the device and its EDS (--eds), with comments for what to fill in'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "new" -d 'Print a first description of a device, made from the device and its EDS (--eds); comments show what to complete'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "check" -d 'Report each mistake in a description file with its line'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
@@ -1732,7 +1732,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "show" -d 'Print a description as TOML'
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "new" -d 'Print a first description of a device, from the device and its EDS (--eds), with comments for what to fill in'
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "new" -d 'Print a first description of a device, made from the device and its EDS (--eds); comments show what to complete'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "check" -d 'Report each mistake in a description file with its line'
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
@@ -1816,5 +1816,5 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "schema" -d 'Print the JSON Schema of the file, for editors'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from export" -f -a "dbc" -d 'Print a DBC of the TPDOs as they are mapped now'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "show" -d 'Print a description as TOML'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "new" -d 'Print a first description of a device, from the device and its EDS (--eds), with comments for what to fill in'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "new" -d 'Print a first description of a device, made from the device and its EDS (--eds); comments show what to complete'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "check" -d 'Report each mistake in a description file with its line'
