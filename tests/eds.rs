@@ -86,9 +86,9 @@ fn unusable_files_give_line_and_reason() {
     for (name, expected) in [
         ("empty.eds", "line 1: the file is empty"),
         ("xdd.eds", "line 2: this is XML, perhaps an XDD or XDC file; expected an EDS or DCF file"),
-        ("text.eds", "line 1: no section such as [DeviceInfo] follows: not an EDS or DCF file"),
-        ("binary.eds", "line 1: no section such as [DeviceInfo] follows: not an EDS or DCF file"),
-        ("no-objects.eds", "line 51: the file ends, and no section such as [1000] describes an object"),
+        ("text.eds", "line 1: this is not an EDS or DCF file: it has no section such as [DeviceInfo]"),
+        ("binary.eds", "line 1: this is not an EDS or DCF file: it has no section such as [DeviceInfo]"),
+        ("no-objects.eds", "line 51: the file has no object: a section such as [1000] is missing"),
     ] {
         let bytes = std::fs::read(data().join("refused").join(name)).expect("a file");
         let error = eds::read(&bytes).expect_err(name);

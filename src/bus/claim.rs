@@ -21,7 +21,7 @@ use std::time::Duration;
 #[cfg(target_os = "linux")]
 pub use linux::Claims;
 
-/// What no other process may use while a command runs.
+/// The part of the bus that no other process may use while a command runs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Claim {
     /// Nothing: the command only listens, or its bus belongs to this process.
@@ -61,7 +61,7 @@ impl fmt::Display for Part {
     }
 }
 
-/// What happens if another process holds a part of the claim.
+/// The reaction if another process holds a part of the claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IfHeld {
     /// Wait for it, up to this time for the whole claim.

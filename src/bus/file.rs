@@ -51,7 +51,7 @@ fn holder_in(line: &str, inode: u64) -> Option<u32> {
     process.parse().ok().filter(|&process| found == inode && process != 0)
 }
 
-/// What happened to the name of an open file.
+/// A change of the name of an open file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NameChange {
     /// The file has another name now.
@@ -60,7 +60,7 @@ pub enum NameChange {
     Deleted,
 }
 
-/// What happened to the name of an open file, from its metadata; `None` if `path` is still its name.
+/// The change of the name of an open file, from its metadata; `None` if `path` is still its name.
 pub fn name_change(metadata: &Metadata, path: &Path) -> Option<NameChange> {
     let found = path.metadata().ok().and_then(|metadata| identity(&metadata));
     match identity(metadata) {
@@ -128,7 +128,7 @@ pub fn wait_for_reader(path: &Path, limit: Option<Duration>) -> io::Result<(Dura
     }
 }
 
-/// Opening blocks without a reader on other systems.
+/// On other systems, the caller waits when it opens a FIFO without a reader.
 ///
 /// # Errors
 /// None.

@@ -69,7 +69,8 @@ pub fn survive_file_size_limit() -> io::Result<()> {
     Ok(())
 }
 
-/// Whether SIGHUP was ignored when the program started, as `nohup` does. Asked once: watching changes the answer.
+/// Whether SIGHUP was ignored when the program started, as `nohup` does. Read once, because the handlers change the
+/// answer.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "the standard library cannot read the action of a signal")]
 fn ignores_hangup() -> bool {

@@ -344,7 +344,7 @@ pub enum BusError {
         file: String,
         /// The line, counted from 1, if the error is in one line.
         line: Option<u64>,
-        /// What is wrong.
+        /// The mistake.
         error: replay::RecordingError,
     },
     /// Another error of the operating system.

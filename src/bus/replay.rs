@@ -27,7 +27,7 @@ use std::mem;
 use std::time::{Duration, Instant};
 use text::FrameOrFault;
 
-/// Lines that show no format, after which the file is not a recording.
+/// After this many lines that show no format, the file is not a recording.
 const MAX_UNKNOWN: u64 = 100;
 
 /// Lines that are read ahead to see whether times without a date increase.
@@ -88,7 +88,7 @@ pub enum ReplayNote {
         line: u64,
         /// Its size.
         by: Duration,
-        /// Whether it leads back.
+        /// Whether it is a step backwards.
         is_backwards: bool,
     },
 }
@@ -329,7 +329,8 @@ impl Replay {
     }
 
     /// Reads further lines of a candump log whose times have no date. If one of ten times or more is not later than the
-    /// time before, they are intervals: the sum is not taken, since a low resolution looks the same.
+    /// time before, the times are taken as intervals, and the recording is rejected. The intervals are not added up,
+    /// because times of a low resolution look the same.
     fn look_ahead(&mut self, first: u64, wall: Wall) -> Result<(), BusError> {
         let Some((RecordingFormat::Candump, parser)) = &mut self.format else { return Ok(()) };
         let (mut last, mut steps, mut not_later) = (wall, 0, 0);

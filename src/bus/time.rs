@@ -5,7 +5,7 @@ use std::time::{Duration, SystemTime};
 
 /// A moment on a bus's monotonic time line, counted from when the bus was opened.
 ///
-/// Its own type rather than [`std::time::Instant`], because a simulated bus has a virtual clock.
+/// This is not a [`std::time::Instant`], because a simulated bus has a virtual clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Mono(Duration);
 

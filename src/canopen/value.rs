@@ -117,7 +117,7 @@ fn sign_extend(unsigned: u64, width: u8) -> i64 {
     (unsigned << unused).cast_signed() >> unused
 }
 
-/// Decodes a VISIBLE_STRING. The standard says ISO 646, but devices send Latin-1, where each byte is a character.
+/// Decodes a VISIBLE_STRING. The standard requires ISO 646, but devices send Latin-1, where each byte is a character.
 /// Trailing zeros are removed: an expedited answer has four bytes even if the string is shorter.
 fn latin1(bytes: &[u8]) -> String {
     let end = bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
@@ -322,7 +322,7 @@ pub enum ValueError {
     /// Not of the type's form.
     #[error("\"{text}\" is not a value of type {data_type}")]
     Form {
-        /// What was typed.
+        /// The typed text.
         text: String,
         /// The type asked for.
         data_type: DataType,
@@ -330,7 +330,7 @@ pub enum ValueError {
     /// A number outside the type's range.
     #[error("{text} does not fit {data_type} ({low} to {high})")]
     Range {
-        /// What was typed.
+        /// The typed text.
         text: String,
         /// The type asked for.
         data_type: DataType,

@@ -24,6 +24,7 @@ impl FromStr for Duration {
         match humantime::parse_duration(text) {
             Ok(duration) if duration.is_zero() => Err("a duration must be longer than 0".to_owned()),
             Ok(duration) => Ok(Duration(duration)),
+            Err(_) if text.parse::<f64>().is_ok() => Err(format!("\"{text}\" has no unit (500ms, 10s, 1h30m)")),
             Err(_) => Err(format!("\"{text}\" is not a duration (500ms, 10s, 1h30m)")),
         }
     }

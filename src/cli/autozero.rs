@@ -2,7 +2,7 @@
 
 use super::Global;
 use super::args::Nodes;
-use super::each::each;
+use super::nodes::on_each_node;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::device::unit::Unit;
@@ -92,15 +92,15 @@ pub(super) fn run_each(
     nodes: &Nodes,
     work: impl FnMut(&mut Master<'_>, NodeId, &Overrides) -> Result<Zeroed, Failure>,
 ) -> anyhow::Result<()> {
-    let mut each = each(global, nodes, work)?;
+    let mut results = on_each_node(global, nodes, work)?;
     let reports: Vec<ZeroReport<'_>> =
-        each.done.iter().map(|(node, zeroed)| ZeroReport { node: *node, zeroed }).collect();
+        results.done.iter().map(|(node, zeroed)| ZeroReport { node: *node, zeroed }).collect();
     global.print(&reports)?;
-    for (_, zeroed) in &each.done {
+    for (_, zeroed) in &results.done {
         zeroed.notes.iter().for_each(|note| notes::print(&global.console(), note));
     }
     if *nodes == Nodes::All {
-        each.excuse(global, |failure| failure.kind() == Kind::Usage);
+        results.tolerate(global, |failure| failure.kind() == Kind::Usage);
     }
-    each.end()
+    results.end()
 }

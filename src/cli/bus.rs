@@ -71,7 +71,7 @@ struct Detect {
     active: bool,
     /// Time per bit rate; the default is longer than a heartbeat interval of 1 s
     #[arg(long = "for", value_name = "DUR", default_value = "1500ms")]
-    each: Duration,
+    time_per_rate: Duration,
 }
 
 impl BusCommand {
@@ -113,7 +113,7 @@ impl Detect {
         let mut bus = open::open_as(global, spec, true)?;
         let console = global.console();
         let mut is_asking = false;
-        let detection = detect(&mut *bus, self.active, self.each.0, &mut |tried| {
+        let detection = detect(&mut *bus, self.active, self.time_per_rate.0, &mut |tried| {
             if tried.how == How::Asking && !std::mem::replace(&mut is_asking, true) {
                 console.note("no valid frame: now asking, which disturbs nodes at other bit rates");
             }

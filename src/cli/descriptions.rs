@@ -62,7 +62,7 @@ pub(super) fn overrides(global: &Global, nodes: &[NodeId]) -> anyhow::Result<Ove
 /// The descriptions that the user named, for those of the `nodes` that they fit.
 ///
 /// # Errors
-/// A file is for another device than its node; for no node in particular: than all nodes.
+/// A file is not for the device of its node. A file without a node fits none of the nodes.
 pub(super) fn overrides_on(master: &mut Master<'_>, global: &Global, nodes: &[NodeId]) -> anyhow::Result<Overrides> {
     let named = named(global)?;
     let misfits = misfits(master, global, &named, nodes)?;
@@ -77,7 +77,8 @@ pub(super) fn check_pending(master: &mut Master<'_>, global: &Global) -> anyhow:
     }
 }
 
-/// One description for each node: of its own before the one for all nodes, and the description before the EDS.
+/// One description for each node. A description for this node has priority over one for all nodes, and a description
+/// has priority over an EDS.
 fn combine(named: &[Named], nodes: &[NodeId], misfits: &Misfits) -> Overrides {
     let mut overrides = Overrides::new();
     for &node in nodes {
@@ -128,7 +129,7 @@ fn misfits(master: &mut Master<'_>, global: &Global, named: &[Named], nodes: &[N
             continue;
         }
         let message = mismatch(named.file(), **node, device, *vendor, *product);
-        // No description is for a device of this vendor: the user names the one that comes nearest.
+        // No description is for a device of this vendor: the user names the most similar one.
         let is_nearest = named.is_built_in()
             && !vendor.is_some_and(catalog::has_vendor)
             && named.model.has_standard_values()

@@ -15,7 +15,8 @@ use std::sync::Arc;
 
 /// List device descriptions; show one as TOML, check a file, or describe a new device
 ///
-/// A description is a TOML file with the objects, signals and behaviour of one kind of device. Start your own with a copy.
+/// A description is a TOML file with the objects, signals and behaviour of one kind of device. To describe
+/// another device, edit a copy of one.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge devices\n  cangauge devices show mh4 > mine.toml\n  cangauge devices check mine.toml\n  cangauge -b sim devices new 1"
@@ -32,7 +33,7 @@ enum Action {
         /// Its name: mh4
         name: String,
     },
-    /// Print a first description of a device, from the device and its EDS (--eds), with comments for what to fill in
+    /// Print a first description of a device, made from the device and its EDS (--eds); comments show what to complete
     New {
         /// Which node: 5, 0x7f
         node: NodeId,

@@ -1,7 +1,7 @@
 //! `cangauge errors`.
 
 use super::Global;
-use super::each::on_node;
+use super::nodes::on_node;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::errors::{ErrorReport, clear, read};
@@ -9,7 +9,7 @@ use clap::Args;
 
 /// Show the errors of a device: register (1001h) and history (1003h) in words, or clear the history
 ///
-/// Error codes are explained by the table of the device, otherwise by their class in CiA 301.
+/// The meaning of an error code comes from the description of the device, otherwise from its class in CiA 301.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b sim errors 1\n  cangauge -b sim errors 1 --clear")]
 pub(crate) struct Errors {

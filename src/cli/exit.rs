@@ -12,6 +12,7 @@ use clap::CommandFactory;
 use clap::error::{ContextKind, ErrorKind};
 use std::ffi::OsString;
 use std::io;
+use std::num::{IntErrorKind, ParseIntError};
 
 /// Several failures, each with its own kind, and the kind that decides the exit code of the process.
 #[derive(Debug, thiserror::Error)]
@@ -69,7 +70,7 @@ fn combined(asked: usize, kinds: &[Kind]) -> Option<Kind> {
 #[derive(Debug, thiserror::Error)]
 #[error("{what}: {source}")]
 pub(super) struct FileError {
-    /// What was to be done: `open run.csv`.
+    /// The failed operation: `open run.csv`.
     pub(super) what: String,
     /// The error of the operating system.
     pub(super) source: io::Error,
@@ -95,7 +96,7 @@ fn code(kind: Kind) -> u8 {
     }
 }
 
-/// Prints what the argument parser returned and returns the exit code: help and version unchanged, an error on one
+/// Prints the result of the argument parser and returns the exit code: help and version unchanged, an error on one
 /// line with a hint. `words` are the words of the command line.
 pub fn usage(error: &clap::Error, words: impl Iterator<Item = OsString>) -> u8 {
     let words: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
@@ -135,7 +136,12 @@ fn one_line(text: &str) -> String {
 
 /// The message of the value's own parser, with the value if the parser does not name it.
 fn wrong_value(error: &clap::Error) -> Option<String> {
-    let inner = std::error::Error::source(error)?.to_string();
+    let source = std::error::Error::source(error)?;
+    let inner = match source.downcast_ref::<ParseIntError>().map(ParseIntError::kind) {
+        Some(IntErrorKind::PosOverflow | IntErrorKind::NegOverflow) => "the number is out of range".to_owned(),
+        Some(_) => "not a whole number".to_owned(),
+        None => source.to_string(),
+    };
     let (argument, value) = (error.get(ContextKind::InvalidArg)?, error.get(ContextKind::InvalidValue)?);
     let named = inner.contains(&format!("\"{value}\""));
     Some(if named { inner } else { format!("\"{value}\" for {argument}: {inner}") })

@@ -2,7 +2,7 @@
 
 use super::Global;
 use super::args::Duration;
-use super::each::{on_channels, print_notes};
+use super::nodes::{on_channels, print_notes};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::filter::{FilterRequest, FilterType, has_filter, set, show};

@@ -1,7 +1,7 @@
 //! `cangauge info`.
 
 use super::Global;
-use super::each::on_node;
+use super::nodes::on_node;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::info::read;
@@ -9,9 +9,9 @@ use clap::Args;
 
 /// Show everything about a device on one page
 ///
-/// Shows identity, versions, bit rate, NMT state (if the node sends a heartbeat), monitoring and errors. Then the
-/// signals with unit, range, status and settings, the TPDOs and the manufacturer-specific objects. At the end, the
-/// settings that 1010h stores. Missing objects are omitted.
+/// The page shows identity, versions, bit rate, NMT state (if the node sends a heartbeat), monitoring and errors; then
+/// signals with unit, range, status and settings, TPDOs and manufacturer-specific objects; last, the settings that
+/// 1010h stores. Missing objects are omitted.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b sim info 1\n  cangauge -b sim info 127 --format json")]
 pub(crate) struct Info {

@@ -86,8 +86,8 @@ impl Journal for FileJournal {
     }
 }
 
-/// Writes a file, whatever it contained. When this returns, the file and its name are on the disk. The file is locked
-/// until it is closed.
+/// Writes a file and replaces its contents. When this returns, the file and its name are on the disk. The file is
+/// locked until it is closed.
 ///
 /// # Errors
 /// The file cannot be written, or another process has locked it.

@@ -1,7 +1,7 @@
 //! `cangauge limits`.
 
 use super::Global;
-use super::each::{on_channels, print_notes};
+use super::nodes::{on_channels, print_notes};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::output::failure::ErrorMessage;

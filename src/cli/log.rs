@@ -78,7 +78,7 @@ pub(crate) struct Log {
     /// Report longer intervals as gaps [default: 3 times the usual interval]
     #[arg(long, value_name = "DUR")]
     max_gap: Option<Duration>,
-    /// Exit with 1 at the end unless this was true: 'pressure in 9..11 bar', see cangauge check --help
+    /// Exit with 1 at the end if this expression failed: 'pressure in 9..11 bar' (see cangauge check --help)
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     expect: Vec<Expression>,
     #[command(flatten)]

@@ -22,9 +22,9 @@ use std::sync::Arc;
 
 /// Set the node-ID and bit rate of devices (LSS, CiA 305, or objects of the device)
 ///
-/// TARGET is a node-ID, an identity (VENDOR:PRODUCT:REVISION:SERIAL), "only" or "unconfigured". A node-ID is replaced by
-/// the identity that the node reports. "only" is rejected if there is more than one device. "unconfigured" is a device
-/// without a node-ID, found by fastscan.
+/// TARGET is a node-ID, an identity (VENDOR:PRODUCT:REVISION:SERIAL), "only" or "unconfigured". For a node-ID, the
+/// identity is read first, and the device is addressed by it. "only" is rejected if there is more than one device.
+/// "unconfigured" is a device without a node-ID, found by fastscan.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim lss scan\n  cangauge -b sim:dps@127 lss set-id 127 12\n  cangauge -b sim:mh4@1 lss set-bitrate 1 500k --retime"

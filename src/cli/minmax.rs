@@ -1,7 +1,7 @@
 //! `cangauge minmax`.
 
 use super::Global;
-use super::each::on_node;
+use super::nodes::on_node;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::tasks::settings::minmax::{reset, show};

@@ -8,7 +8,6 @@ mod completions;
 mod config;
 mod descriptions;
 mod devices;
-mod each;
 mod errors;
 pub mod exit;
 mod export;
@@ -21,6 +20,7 @@ mod log;
 mod lss;
 mod minmax;
 mod nmt;
+mod nodes;
 mod objects;
 mod open;
 mod own;
@@ -171,7 +171,7 @@ pub struct Global {
     #[arg(skip)]
     pub(crate) only_reads: bool,
 
-    /// What the command does if two devices have one node-ID.
+    /// The reaction of the command if two devices have one node-ID.
     #[arg(skip)]
     pub(crate) on_two_devices: OnTwoDevices,
 
@@ -272,7 +272,7 @@ impl Command {
         }
     }
 
-    /// What it does if two devices have one node-ID.
+    /// The reaction if two devices have one node-ID.
     fn on_two_devices(&self) -> OnTwoDevices {
         let writes = match self {
             Command::Scan(_) => return OnTwoDevices::Report,
@@ -355,7 +355,7 @@ impl Global {
         render(reports, self.format, &mut exit::open_stdout()?.lock()).map_err(exit::stdout)
     }
 
-    /// Prints reports if the format is for programs, else what `text` writes.
+    /// Prints reports if the format is for programs, else the output of `text`.
     pub(crate) fn print_or<R: Report>(
         &self,
         reports: &[R],
@@ -404,7 +404,7 @@ impl Global {
         // The last frames of a command are still sent: an abort, an NMT state to restore.
         master.settle();
         for (node, answers) in master.second_answers() {
-            // If the answers differ, the failure of the command says so, except in a scan.
+            // If the answers differ, the failure of the command reports it, except in a scan.
             if !answers.differs() || self.on_two_devices == OnTwoDevices::Report {
                 self.console().warn(&output::failure::second_answer(node, answers));
             }
@@ -423,7 +423,7 @@ impl Global {
 }
 
 impl Global {
-    /// Undoes what a killed program left behind on the nodes of this command.
+    /// Undoes the temporary writes of a killed program on the nodes of this command.
     fn undo_left_behind(&self, master: &mut Master<'_>, bus: &BusSpec) -> anyhow::Result<()> {
         let is_ours = |node: NodeId| match &self.claim {
             Claim::Nothing => false,

@@ -20,9 +20,9 @@ use std::ops::ControlFlow;
 
 /// Send NMT commands and show NMT states
 ///
-/// After a command the state is confirmed by a heartbeat, a boot-up message or node guarding. A node that no longer
-/// answers SDO is stopped. Node guarding is not used if it would start life guarding, or if another master uses it.
-/// Unconfirmed states are shown as "none".
+/// After a command the state is confirmed by a heartbeat, a boot-up message or node guarding. After "stop", a node that
+/// no longer answers SDO is stopped. Node guarding is not used if it would start life guarding, or if another master
+/// uses it. Unconfirmed states are shown as "none".
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim nmt start 1\n  cangauge -b sim nmt reset 127\n  cangauge -b sim nmt state 1-3"
@@ -157,7 +157,7 @@ impl Targets {
             Ok(command(master, kind, &nodes, self.nodes == Nodes::All).or_fail()?)
         })?;
         global.print(&reports)?;
-        let failures = reports.iter().filter_map(|report| self.judge(kind, report, global)).collect();
+        let failures = reports.iter().filter_map(|report| self.failure_of(kind, report, global)).collect();
         Ok(several(reports.len(), failures)?)
     }
 
@@ -170,7 +170,7 @@ impl Targets {
     }
 
     /// Why the command failed for a node. An unconfirmed state is a failure only with `--confirm`.
-    fn judge(&self, kind: NmtCommand, report: &StateReport, global: &Global) -> Option<Failure> {
+    fn failure_of(&self, kind: NmtCommand, report: &StateReport, global: &Global) -> Option<Failure> {
         let wanted = kind.target();
         let cause = match report.state {
             // A device that starts by itself leaves PRE-OPERATIONAL at once after a reset.

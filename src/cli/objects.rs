@@ -26,7 +26,7 @@ pub(crate) struct Objects {
     /// Node-ID, the name of a description (mh4), or a file (FILE.toml, FILE.eds); omit it with --device or --eds
     #[arg(value_name = "NODE|DEVICE")]
     what: Option<String>,
-    /// Show only these: address, index, name, or a word in name or meaning
+    /// Show only objects with this address, index or name, or with this word in their name or meaning
     #[arg(value_name = "OBJECT|WORD")]
     queries: Vec<String>,
 }

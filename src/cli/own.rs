@@ -76,7 +76,7 @@ fn read(path: &Path) -> Result<Model, String> {
     Ok(model)
 }
 
-/// Prints what a user must know: files that are not used, and built-in descriptions that are replaced.
+/// Prints notes about files that are not used, and built-in descriptions that are replaced.
 pub(super) fn report(broken: &[String], global: &Global) {
     let console = global.console();
     match broken {

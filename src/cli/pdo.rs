@@ -142,21 +142,22 @@ fn transmission(text: &str) -> Result<Trigger, String> {
 
 /// A duration as a number of `unit`s that fits 16 bits.
 fn units(text: &str, unit: std::time::Duration, form: &str) -> Result<u16, String> {
+    let wrong = || format!("\"{text}\" is not {form}");
     let duration = match text {
         "0" => std::time::Duration::ZERO,
-        _ => humantime::parse_duration(text).map_err(|_| format!("\"{text}\" is not a duration ({form})"))?,
+        _ => humantime::parse_duration(text).map_err(|_| wrong())?,
     };
     let whole = duration.as_nanos() % unit.as_nanos() == 0;
     let number = u16::try_from(duration.as_nanos() / unit.as_nanos()).ok().filter(|_| whole);
-    number.ok_or_else(|| format!("\"{text}\" is not {form}"))
+    number.ok_or_else(wrong)
 }
 
 fn event_timer(text: &str) -> Result<u16, String> {
-    units(text, std::time::Duration::from_millis(1), "a number of milliseconds, 0 to 65535ms")
+    units(text, std::time::Duration::from_millis(1), "a duration in whole milliseconds (0ms to 65535ms)")
 }
 
 fn inhibit(text: &str) -> Result<u16, String> {
-    units(text, std::time::Duration::from_micros(100), "a multiple of 100us, 0 to 6553500us")
+    units(text, std::time::Duration::from_micros(100), "a duration in steps of 100us (0us to 6553500us)")
 }
 
 fn identifier(text: &str) -> Result<u16, String> {

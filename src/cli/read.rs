@@ -38,7 +38,7 @@ pub(super) fn parse_unit(text: &str) -> Result<Unit, String> {
 }
 
 impl Read {
-    /// What it does not share with another cangauge.
+    /// The nodes that it does not share with another cangauge process.
     pub(super) fn claim(&self) -> Claim {
         self.nodes.claim()
     }

@@ -124,7 +124,7 @@ enum SdoSize {
     Indicated,
     /// Without the size: 22h
     Omit,
-    /// As the description says
+    /// As in the description of the device
     Auto,
 }
 
@@ -139,7 +139,7 @@ impl From<SdoSize> for Form {
 }
 
 impl Sdo {
-    /// What it does not share with another cangauge.
+    /// The nodes that it does not share with another cangauge process.
     pub(super) fn claim(&self) -> Claim {
         match &self.action {
             Action::Read(ReadArgs { node, .. }) | Action::Write(WriteArgs { node, .. }) => Claim::Nodes(vec![*node]),

@@ -11,7 +11,7 @@ use clap::Args;
 
 /// Simulate devices on a bus until Ctrl-C
 ///
-/// The devices answer, send and fail as their manuals describe. Other programs can be tested with them.
+/// The devices answer, send and fail as described in their manuals. Use them to test other programs.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b vcan0 sim mh4@5 dps@127\n  cangauge -b vcan0 sim bench.toml")]
 pub(crate) struct Sim {

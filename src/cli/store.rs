@@ -2,7 +2,7 @@
 
 use super::Global;
 use super::args::Nodes;
-use super::each::{Each, each};
+use super::nodes::{NodeResults, on_each_node};
 use crate::bus::claim::Claim;
 use crate::output::notes;
 use crate::output::report::Report;
@@ -74,11 +74,11 @@ impl Store {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let each = each(global, &self.nodes, |master, node, overrides| {
+        let results = on_each_node(global, &self.nodes, |master, node, overrides| {
             let device = store::device(master, node, overrides)?;
             store::store(master, &device, self.group.into(), self.verify)
         })?;
-        print(each, global, Stored)
+        print(results, global, Stored)
     }
 }
 
@@ -89,20 +89,24 @@ impl Restore {
     }
 
     pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
-        let each = each(global, &self.nodes, |master, node, overrides| {
+        let results = on_each_node(global, &self.nodes, |master, node, overrides| {
             let device = store::device(master, node, overrides)?;
             restore::restore(master, &device, self.group.into(), self.reset)
         })?;
-        print(each, global, Restored)
+        print(results, global, Restored)
     }
 }
 
 /// Prints the reports, the notes and the failures.
-fn print<R: Report>(each: Each<StoreReport>, global: &Global, report: fn(StoreReport) -> R) -> anyhow::Result<()> {
-    let reports: Vec<R> = each.done.iter().map(|(_, done)| report(done.clone())).collect();
+fn print<R: Report>(
+    results: NodeResults<StoreReport>,
+    global: &Global,
+    report: fn(StoreReport) -> R,
+) -> anyhow::Result<()> {
+    let reports: Vec<R> = results.done.iter().map(|(_, done)| report(done.clone())).collect();
     global.print(&reports)?;
-    for note in each.done.iter().flat_map(|(_, done)| &done.notes) {
+    for note in results.done.iter().flat_map(|(_, done)| &done.notes) {
         notes::print(&global.console(), note);
     }
-    each.end()
+    results.end()
 }

@@ -1,7 +1,7 @@
 //! `cangauge unit`.
 
 use super::Global;
-use super::each::{on_channels, print_notes};
+use super::nodes::{on_channels, print_notes};
 use super::read::parse_unit;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;

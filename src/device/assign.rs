@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssignEntry {
     /// The method.
-    pub way: AssignKind,
+    pub kind: AssignKind,
     /// The NMT state that the method requires; `None` for any.
     pub state: Option<AssignState>,
     /// Whether to retry in STOPPED if the device does not answer LSS.
@@ -27,7 +27,7 @@ pub struct AssignEntry {
     pub unverified: bool,
     /// Page or table of the manual.
     pub page: String,
-    /// What the manual contradicts or leaves open.
+    /// Contradictions and gaps in the manual.
     pub doubt: String,
 }
 
@@ -35,7 +35,7 @@ impl AssignEntry {
     /// LSS as in CiA 305, for devices of which nothing else is known.
     pub fn lss() -> AssignEntry {
         AssignEntry {
-            way: AssignKind::Lss,
+            kind: AssignKind::Lss,
             state: None,
             retry_stopped: false,
             node_id: None,
@@ -174,8 +174,8 @@ impl Description {
     }
 
     /// The method of this kind, if the device has it.
-    pub fn assign_of_kind(&self, way: AssignKind) -> Option<&AssignEntry> {
-        self.assign.iter().find(|entry| entry.way == way)
+    pub fn assign_of_kind(&self, kind: AssignKind) -> Option<&AssignEntry> {
+        self.assign.iter().find(|entry| entry.kind == kind)
     }
 }
 
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn numbers_are_written_with_their_signature() {
         let mh4 = description("mh4");
-        assert_eq!(mh4.preferred_assign().map(|entry| entry.way), Some(AssignKind::Lss));
+        assert_eq!(mh4.preferred_assign().map(|entry| entry.kind), Some(AssignKind::Lss));
         let objects = mh4.assign_of_kind(AssignKind::Objects).expect("2320h and 2321h");
         assert_eq!(objects.node_id.map(|place| place.encode(3)), Some(Ok(b"\x03set".to_vec())));
         // HYDAC and Baumer take plain numbers without a signature.
@@ -218,7 +218,10 @@ mod tests {
     #[test]
     fn unverified_methods_are_not_preferred() {
         let d20 = description("d20");
-        assert_eq!(d20.preferred_assign().map(|entry| (entry.way, entry.retry_stopped)), Some((AssignKind::Lss, true)));
+        assert_eq!(
+            d20.preferred_assign().map(|entry| (entry.kind, entry.retry_stopped)),
+            Some((AssignKind::Lss, true))
+        );
         assert_eq!(d20.assign_of_kind(AssignKind::Objects).map(|entry| entry.unverified), Some(true));
     }
 
@@ -230,7 +233,7 @@ mod tests {
             assert!(!assign.is_empty() || !signals.is_empty(), "{name}");
             for entry in assign {
                 let places: Vec<AssignObject> = entry.node_id.into_iter().chain(entry.bit_rate).collect();
-                assert_eq!(places.is_empty(), entry.way == AssignKind::Lss, "{name}");
+                assert_eq!(places.is_empty(), entry.kind == AssignKind::Lss, "{name}");
                 for place in places {
                     // An unverified object may be missing.
                     let described = model.dictionary.get(place.object);

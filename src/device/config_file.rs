@@ -50,7 +50,7 @@ pub enum Item {
 }
 
 impl Item {
-    /// What the value is, for mistakes: `text`, `an integer`.
+    /// The type of the value, for messages: `text`, `an integer`.
     pub fn kind(&self) -> &'static str {
         match self {
             Item::Text(_) => "text",
@@ -103,7 +103,7 @@ pub struct Document {
 pub struct SyntaxError {
     /// Where the parser stopped.
     pub place: Place,
-    /// What it expected.
+    /// Its message.
     pub message: String,
 }
 

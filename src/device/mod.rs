@@ -1,4 +1,4 @@
-//! What is known of measuring devices: descriptions as data, units, and the objects of CiA 404.
+//! Facts about measuring devices: descriptions as data, units, and the objects of CiA 404.
 
 pub mod assign;
 pub mod catalog;

@@ -279,7 +279,7 @@ const FAMILY_OBJECTS: &[(u16, Meaning)] = &[
     (0x149, Meaning::Process),
 ];
 
-/// CiA 404: objects that exist once, whatever the family.
+/// CiA 404: objects that exist once for all families.
 const MEASURING_OBJECTS: &[Row] = &[
     (0x6110, 0x6110, U16),
     (0x6111, 0x6111, U32),
@@ -294,10 +294,10 @@ const MEASURING_OBJECTS: &[Row] = &[
     (0x61a1, 0x61a1, U16),
 ];
 
-/// What a number of a family of CiA 404 means.
+/// The meaning of an object in a family of CiA 404.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Meaning {
-    /// A field value: what the sensor element delivers.
+    /// A field value: the output of the sensor element.
     Field,
     /// A process value: it has the unit (6131h) and the decimal digits (6132h) of its channel.
     Process,

@@ -48,11 +48,11 @@ pub(super) struct Active {
     pub(super) is_repeated: bool,
 }
 
-/// What follows from the end of a read.
-pub(super) enum Verdict {
+/// The result of [`Active::check_length`].
+pub(super) enum LengthCheck {
     /// The bytes are the answer.
     Accepted,
-    /// The object is read once more.
+    /// The length is doubtful: the object is read once more.
     Again,
     /// The length is wrong.
     WrongLength,
@@ -85,19 +85,19 @@ impl Active {
         }
     }
 
-    /// Judges the length of the bytes read. If it contradicts the announced one, the object is read once more. The same
+    /// Checks the length of the bytes read. If it contradicts the announced one, the object is read once more. The same
     /// bytes are then accepted, with a note.
-    pub(super) fn judge(&mut self, uploaded: Option<&Uploaded>, accept_60: bool) -> Verdict {
-        let Some(uploaded) = uploaded else { return Verdict::Accepted };
+    pub(super) fn check_length(&mut self, uploaded: Option<&Uploaded>, accept_60: bool) -> LengthCheck {
+        let Some(uploaded) = uploaded else { return LengthCheck::Accepted };
         match self.doubtful.take() {
             None if uploaded.has_doubtful_length() => {
                 self.doubtful = Some(uploaded.bytes.clone());
                 self.machine = self.request.machine(accept_60);
                 self.asked_at = None;
-                Verdict::Again
+                LengthCheck::Again
             }
-            Some(first) if first != uploaded.bytes || self.request.is_exact => Verdict::WrongLength,
-            None | Some(_) => Verdict::Accepted,
+            Some(first) if first != uploaded.bytes || self.request.is_exact => LengthCheck::WrongLength,
+            None | Some(_) => LengthCheck::Accepted,
         }
     }
 
@@ -218,7 +218,7 @@ impl Active {
         refused && self.request.falls_back() && !self.machine.has_begun()
     }
 
-    pub(super) fn way(&self) -> TransferKind {
+    pub(super) fn kind(&self) -> TransferKind {
         if self.machine.is_in_blocks() {
             TransferKind::Blocks
         } else if self.request.refused_blocks {

@@ -1,4 +1,4 @@
-//! What was received instead of an answer: it explains why a request failed.
+//! Frames that were received instead of an answer. They explain why a request failed.
 
 use crate::bus::Mono;
 use crate::canopen::frame::Frame;
@@ -14,7 +14,7 @@ const START_TIME: Duration = Duration::from_secs(5);
 /// How long requests are repeated without success in all. A bus with random traffic has boot-up messages of many nodes.
 const WASTE_LIMIT: Duration = Duration::from_secs(10);
 
-/// What was received from a node that did not answer a request.
+/// Facts about a node that did not answer a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clue {
     /// The first frame that looks like an answer: with another index, or with another COB-ID.
@@ -31,10 +31,10 @@ pub(super) struct Clues {
     states: BTreeMap<NodeId, NmtState>,
     answered: BTreeSet<NodeId>,
     /// When the nodes sent their boot-up messages.
-    booted: BTreeMap<NodeId, Mono>,
+    boot_times: BTreeMap<NodeId, Mono>,
     /// How long requests were repeated after a boot-up message without success.
     wasted: Duration,
-    /// The object of the request that waits for the first frame of its answer, and what came instead.
+    /// The object of each request that waits for the first frame of its answer, and a frame that came instead.
     open: BTreeMap<NodeId, (ObjectId, Option<Frame>)>,
     /// Nodes whose request was repeated. Their answers may have another COB-ID.
     repeated: BTreeSet<NodeId>,
@@ -42,17 +42,17 @@ pub(super) struct Clues {
 
 impl Clues {
     /// A request was sent.
-    pub(super) fn asked(&mut self, node: NodeId, object: ObjectId) {
+    pub(super) fn on_request(&mut self, node: NodeId, object: ObjectId) {
         self.open.insert(node, (object, None));
     }
 
     /// A request without an answer is repeated.
-    pub(super) fn repeated(&mut self, node: NodeId) {
+    pub(super) fn on_repeat(&mut self, node: NodeId) {
         self.repeated.insert(node);
     }
 
     /// Requests were repeated for this time after a boot-up message, without an answer.
-    pub(super) fn on_wasted(&mut self, time: Duration) {
+    pub(super) fn add_wasted(&mut self, time: Duration) {
         self.wasted += time;
     }
 
@@ -60,7 +60,7 @@ impl Clues {
     /// `asked_at` is when the request was sent first: further boot-up messages do not extend its time.
     pub(super) fn is_starting(&self, node: NodeId, asked_at: Option<Mono>, now: Mono) -> bool {
         let is_recent = |moment: Mono| now.since(moment) < START_TIME;
-        let has_started = self.booted.get(&node).copied().is_some_and(is_recent);
+        let has_started = self.boot_times.get(&node).copied().is_some_and(is_recent);
         has_started && asked_at.is_none_or(is_recent) && self.wasted < WASTE_LIMIT
     }
 
@@ -70,12 +70,12 @@ impl Clues {
     }
 
     /// A node answered.
-    pub(super) fn answered(&mut self, node: NodeId) {
+    pub(super) fn on_answer(&mut self, node: NodeId) {
         self.answered.insert(node);
         self.end(node);
     }
 
-    /// A transfer of a node has ended. Returns what was received instead of an answer.
+    /// A transfer of a node has ended. Returns the facts that explain a missing answer.
     pub(super) fn end(&mut self, node: NodeId) -> Clue {
         self.repeated.remove(&node);
         let frame = self.open.remove(&node).and_then(|(_, frame)| frame);
@@ -96,12 +96,12 @@ impl Clues {
         } else if let Some((_, odd)) = self.open.get_mut(&node) {
             odd.get_or_insert(*frame);
         } else if !self.answered.contains(&node) {
-            self.elsewhere(frame, now);
+            self.on_other_cob_id(frame, now);
         }
     }
 
     /// A frame with another COB-ID.
-    pub(super) fn elsewhere(&mut self, frame: &Frame, now: Mono) {
+    pub(super) fn on_other_cob_id(&mut self, frame: &Frame, now: Mono) {
         if let Some((node, life)) = Life::parse(frame) {
             match life {
                 Life::State(state) => {
@@ -109,7 +109,7 @@ impl Clues {
                 }
                 Life::BootUp => {
                     self.states.remove(&node);
-                    self.booted.insert(node, now);
+                    self.boot_times.insert(node, now);
                 }
             }
             return;
@@ -133,12 +133,12 @@ mod tests {
     fn clue(frames: &[&str]) -> Clue {
         let node = NodeId::new(5).expect("a node-ID");
         let mut clues = Clues::default();
-        clues.asked(node, OBJECT);
+        clues.on_request(node, OBJECT);
         for text in frames {
             let frame: Frame = text.parse().expect("a frame");
             match frame.id().sdo_response_node().or_else(|| frame.id().sdo_request_node()) {
                 Some(other) => clues.on_channel(other, &frame, Mono::START),
-                None => clues.elsewhere(&frame, Mono::START),
+                None => clues.on_other_cob_id(&frame, Mono::START),
             }
         }
         clues.end(node)

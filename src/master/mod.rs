@@ -99,7 +99,7 @@ pub struct Master<'bus> {
     timing: Timing,
     sdo: SdoClient,
     filters: Filters,
-    /// Whether the bus delivers all frames, whatever the filters are.
+    /// Whether the bus delivers all frames, independently of the filters.
     receives_all: bool,
     outgoing: Outgoing,
     /// A frame that was received after the deadline. It is handled next.
@@ -207,7 +207,7 @@ impl<'bus> Master<'bus> {
         self.sdo.accept_60(node, quirks.contains(&Quirk::UploadAnswered60));
     }
 
-    /// Sets what happens if two devices answer with one node-ID.
+    /// Sets the reaction if two devices answer with one node-ID.
     pub fn set_on_two_devices(&mut self, reaction: OnTwoDevices) {
         self.sdo.set_on_two_devices(reaction);
     }

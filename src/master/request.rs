@@ -74,7 +74,7 @@ impl Request {
         self
     }
 
-    /// Sets how many bytes a read object has at most, if the caller knows more than its index says.
+    /// Sets how many bytes a read object has at most, if the caller knows more than its index shows.
     pub fn up_to(mut self, limit: usize) -> Request {
         self.limit = limit;
         self
@@ -94,7 +94,7 @@ impl Request {
 
     /// The same request with the time-out of another one. It is repeated even if the other one must not be, but not
     /// after a rejected block request, which counts as the first attempt.
-    pub(super) fn with_patience_of(mut self, other: &Request) -> Request {
+    pub(super) fn with_timing_of(mut self, other: &Request) -> Request {
         (self.timeout, self.repeatable) = (other.timeout, !other.refused_blocks);
         self
     }
@@ -179,7 +179,7 @@ pub struct Answer {
     /// When the last frame of the answer was received.
     pub at: Stamp,
     /// The kind of transfer that carried the data.
-    pub way: TransferKind,
+    pub kind: TransferKind,
 }
 
 /// A failed transfer.
@@ -209,7 +209,7 @@ pub enum SdoFailure {
         waited: Duration,
         /// Whether the device answered before and then stopped.
         started: bool,
-        /// What was received instead.
+        /// The facts that explain the missing answer.
         clue: Clue,
     },
     /// The answer violates the protocol.
@@ -267,7 +267,7 @@ fn two_devices(answers: Option<&SecondAnswer>) -> String {
     }
 }
 
-/// What was received instead of an answer.
+/// Describes the frames that were received instead of an answer.
 fn received(clue: &Clue) -> String {
     let heard = clue.frame.map(|frame| format!("; heard {frame}")).unwrap_or_default();
     let state = clue.state.map(|state| format!("; its heartbeat says {state}")).unwrap_or_default();

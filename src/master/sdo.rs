@@ -134,7 +134,7 @@ impl SdoClient {
             let has_stale_request = node.stale.iter().any(|stale| stale.object == request.object);
             let mut active = if has_stale_request {
                 let other = node.barrier(request.object);
-                let barrier = Request::read(request.node, other).with_patience_of(&request);
+                let barrier = Request::read(request.node, other).with_timing_of(&request);
                 Active { deferred: Some((ticket, request)), ..Active::new(ticket, barrier, node.accept_60, timing) }
             } else {
                 Active::new(ticket, request, node.accept_60, timing)
@@ -150,7 +150,7 @@ impl SdoClient {
         if let Some(active) = active.filter(|active| active.ticket == ticket) {
             active.machine.on_sent();
             if active.asked_at.replace(active.asked_at.unwrap_or(now)).is_none() {
-                self.clues.asked(ticket.node, active.request.object);
+                self.clues.on_request(ticket.node, active.request.object);
             }
             active.unsent = active.unsent.saturating_sub(1);
             if active.unsent == 0 {
@@ -206,14 +206,14 @@ impl SdoClient {
         let id = received.frame.id();
         let known = id.sdo_response_node().or_else(|| id.sdo_request_node());
         let Some(number) = known.filter(|node| self.nodes.contains_key(node)) else {
-            self.clues.elsewhere(&received.frame, received.at.mono);
+            self.clues.on_other_cob_id(&received.frame, received.at.mono);
             return false;
         };
         let Some(node) = self.nodes.get_mut(&number) else { return false };
         let is_stale = node.has_stale(&received.frame);
         let is_ours = node.on_frame(received, timing, outgoing, &mut self.finished);
         if is_ours {
-            self.clues.answered(number);
+            self.clues.on_answer(number);
         } else if !is_stale {
             self.clues.on_channel(number, &received.frame, received.at.mono);
         }
@@ -269,7 +269,7 @@ impl SdoClient {
                 if active.attempts_left > 0 || is_starting {
                     active.is_repeated = true;
                     active.attempts_left = active.attempts_left.saturating_sub(1);
-                    self.clues.repeated(active.request.node);
+                    self.clues.on_repeat(active.request.node);
                     out.push(active.machine.request());
                     active.enqueue(out, outgoing);
                     continue;
@@ -283,7 +283,7 @@ impl SdoClient {
                 node.waiting.push_front((active.ticket, active.request));
                 continue;
             }
-            self.clues.on_wasted(active.overtime(now, timing));
+            self.clues.add_wasted(active.overtime(now, timing));
             let clue = self.clues.end(active.request.node);
             let failure = match active.request.operation() {
                 _ if is_over => SdoFailure::Overtime(active.time(timing)),

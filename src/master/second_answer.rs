@@ -19,13 +19,13 @@ const LONGEST_WAIT: Duration = Duration::from_millis(20);
 /// The number of earlier answers that are recognised if they arrive once more.
 const HISTORY: usize = 16;
 
-/// What happens if two devices answer with one node-ID.
+/// The reaction if two devices answer with one node-ID.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnTwoDevices {
     /// Transfers with it fail.
     #[default]
     Fail,
-    /// The same, and the failure says that nothing was written: for commands that write.
+    /// The same for commands that write: the failure states that nothing was written.
     RefuseWrites,
     /// Transfers continue, and the object with two answers is unknown: for scans, which report it.
     Report,
@@ -55,7 +55,7 @@ impl SecondAnswer {
 /// The answers of one node.
 #[derive(Debug, Default)]
 pub(super) struct Answers {
-    /// The first frame of the latest answer, and what it answers.
+    /// The first frame of the latest answer, and the operation that it answers.
     initial: Option<(Frame, Operation)>,
     /// The latest frame that was used.
     latest: Option<Frame>,

@@ -38,7 +38,8 @@ impl Wanted {
 }
 
 impl Layout<'_> {
-    /// A requested value as this node has it: a name that no signal has, and that an object has, means the object.
+    /// The signal or object that a requested value means on this node. A name that is no signal may be the name of an
+    /// object.
     pub fn resolve(&self, item: &Wanted) -> Wanted {
         let Wanted::Signal(name) = item else { return item.clone() };
         if self.signals.iter().any(|signal| signal.name == *name) {
@@ -72,15 +73,15 @@ struct TpdoDecoder {
     length: usize,
     values: Vec<MappedValue>,
     /// Makes no samples at present.
-    is_held: bool,
+    is_paused: bool,
     /// TPDOs received with another length.
     wrong_lengths: u64,
     /// The length of the first TPDO with another length.
     other_length: Option<usize>,
     /// A TPDO with the length of the mapping was received.
-    has_exact: bool,
+    has_mapped_length: bool,
     /// TPDOs had more than one length.
-    is_mixed: bool,
+    has_mixed_lengths: bool,
     /// TPDOs of [`TpdoDecoder::other_length`] are used up to the mapped length.
     uses_longer: bool,
 }
@@ -96,19 +97,19 @@ pub struct Decoder {
     overloads: BTreeSet<(NodeId, Option<u8>)>,
 }
 
-/// Lengths of TPDOs that differ from their mapping: the first one, and whether there were others.
+/// Lengths of TPDOs that differ from their mapping: the first such length, and whether there were others.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LengthsSeen(BTreeMap<CanId, (usize, bool)>);
 
-/// What a decoder did with a frame.
+/// The result of decoding a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decoded {
     /// It is not a known TPDO.
-    NotOurs,
+    OtherFrame,
     /// It is a TPDO of this node, and its samples were added.
     Tpdo(NodeId),
     /// It is a TPDO of this node that makes no samples at present.
-    Held(NodeId),
+    Paused(NodeId),
     /// It is a TPDO of this node with another length than its mapping. It made no samples.
     WrongLength(NodeId),
 }
@@ -130,7 +131,7 @@ impl Decoder {
             let id = tpdo.cob_id.can_id();
             // Two nodes send with one COB-ID: the sender of a frame is unknown.
             if let Some(other) = self.tpdos.get(&id).filter(|other| other.node != layout.node) {
-                decoder.is_held = true;
+                decoder.is_paused = true;
                 self.shared.insert(id, (other.node, layout.node));
             }
             self.tpdos.insert(id, decoder);
@@ -149,9 +150,9 @@ impl Decoder {
     pub fn use_longer(&mut self, node: NodeId, before: &LengthsSeen) -> Vec<(CanId, usize, usize)> {
         let mut used = Vec::new();
         for (&id, tpdo) in self.tpdos.iter_mut().filter(|(_, tpdo)| tpdo.node == node) {
-            let Some(&(length, is_mixed)) = before.0.get(&id) else { continue };
-            (tpdo.other_length, tpdo.is_mixed) = (Some(length), is_mixed);
-            tpdo.uses_longer = !is_mixed && length > tpdo.length;
+            let Some(&(length, has_mixed_lengths)) = before.0.get(&id) else { continue };
+            (tpdo.other_length, tpdo.has_mixed_lengths) = (Some(length), has_mixed_lengths);
+            tpdo.uses_longer = !has_mixed_lengths && length > tpdo.length;
             if tpdo.uses_longer {
                 used.push((id, tpdo.length, length));
             }
@@ -162,7 +163,9 @@ impl Decoder {
     /// The lengths that the TPDOs of a node had, if they differ from the mapping.
     pub fn lengths_seen(&self, node: NodeId) -> LengthsSeen {
         let of_node = self.tpdos.iter().filter(|(_, tpdo)| tpdo.node == node);
-        LengthsSeen(of_node.filter_map(|(&id, tpdo)| Some((id, (tpdo.other_length?, tpdo.is_mixed)))).collect())
+        LengthsSeen(
+            of_node.filter_map(|(&id, tpdo)| Some((id, (tpdo.other_length?, tpdo.has_mixed_lengths)))).collect(),
+        )
     }
 
     /// The mapped and the received length in bytes of the first TPDO of a node whose length differs from its mapping.
@@ -181,7 +184,7 @@ impl Decoder {
         self.overloads.insert((node, channel));
     }
 
-    /// Takes what the error register of a node says about an overload.
+    /// Sets or ends the overload of a node, as its error register shows it.
     pub fn set_overload(&mut self, node: NodeId, has_overload: bool) {
         self.end_overload(node);
         if has_overload {
@@ -189,20 +192,20 @@ impl Decoder {
         }
     }
 
-    /// A node reports no overload any more.
+    /// A node reports that its overloads have ended.
     pub fn end_overload(&mut self, node: NodeId) {
         self.overloads.retain(|(of, _)| *of != node);
     }
 
-    /// Gives a sample the status of the overloads that its node reports.
+    /// Sets the status of a sample from the overloads that its node reports.
     pub fn report_overloads(&self, node: NodeId, reading: &Reading, sample: &mut Sample) {
         let of_node = self.overloads.iter().filter(|(of, _)| *of == node);
         of_node.for_each(|(_, channel)| reading.report_overload(sample, *channel));
     }
 
     /// The setup of a node may have changed: its TPDOs make no samples until [`Decoder::replace`].
-    pub fn hold(&mut self, node: NodeId) {
-        self.tpdos.values_mut().filter(|tpdo| tpdo.node == node).for_each(|tpdo| tpdo.is_held = true);
+    pub fn pause(&mut self, node: NodeId) {
+        self.tpdos.values_mut().filter(|tpdo| tpdo.node == node).for_each(|tpdo| tpdo.is_paused = true);
     }
 
     fn tpdo_decoder(&mut self, layout: Layout<'_>, tpdo: &Tpdo, wanted: &[Wanted]) -> TpdoDecoder {
@@ -222,7 +225,7 @@ impl Decoder {
                     let status = fields.iter().find(|other| Some(other.entry.object) == signal.status).copied();
                     add(
                         &signal.name,
-                        words(signal.unit),
+                        unit_text(signal.unit),
                         &|source| Reading::of_signal(signal, data_type, source),
                         status,
                     );
@@ -234,7 +237,7 @@ impl Decoder {
                 }
             } else if wanted.is_empty() && !is_dummy(object) {
                 let reading = |source| Reading::of_object(layout, object, data_type, source);
-                add(&layout.name_of(object), words(layout.unit_of(object)), &reading, None);
+                add(&layout.name_of(object), unit_text(layout.unit_of(object)), &reading, None);
             }
             for item in wanted {
                 if let Wanted::Object(wanted, _) | Wanted::Named(_, wanted) = item
@@ -248,7 +251,7 @@ impl Decoder {
                         None => Reading::of_object(layout, object, data_type, source),
                     };
                     let unit = if stated.is_none() { layout.unit_of(object) } else { None };
-                    add(&item.name(), words(unit), &reading, None);
+                    add(&item.name(), unit_text(unit), &reading, None);
                 }
             }
         }
@@ -256,11 +259,11 @@ impl Decoder {
             node: layout.node,
             length: bits.div_ceil(8),
             values,
-            is_held: false,
+            is_paused: false,
             wrong_lengths: 0,
             other_length: None,
-            is_mixed: false,
-            has_exact: false,
+            has_mixed_lengths: false,
+            has_mapped_length: false,
             uses_longer: false,
         }
     }
@@ -301,24 +304,25 @@ impl Decoder {
     pub fn decode(&mut self, received: &Received, samples: &mut Vec<Sample>) -> Decoded {
         let frame = &received.frame;
         let Some(tpdo) = self.tpdos.get_mut(&frame.id()).filter(|_| !frame.is_remote()) else {
-            return Decoded::NotOurs;
+            return Decoded::OtherFrame;
         };
-        if tpdo.is_held {
-            return Decoded::Held(tpdo.node);
+        if tpdo.is_paused {
+            return Decoded::Paused(tpdo.node);
         }
         let data = frame.data();
-        let is_exact = data.len() == tpdo.length;
-        tpdo.has_exact |= is_exact;
-        if !is_exact {
+        let is_mapped_length = data.len() == tpdo.length;
+        tpdo.has_mapped_length |= is_mapped_length;
+        if !is_mapped_length {
             tpdo.wrong_lengths += 1;
         }
-        let other = if is_exact { tpdo.other_length } else { Some(*tpdo.other_length.get_or_insert(data.len())) };
-        if other.is_some_and(|other| tpdo.has_exact || other != data.len()) {
+        let other =
+            if is_mapped_length { tpdo.other_length } else { Some(*tpdo.other_length.get_or_insert(data.len())) };
+        if other.is_some_and(|other| tpdo.has_mapped_length || other != data.len()) {
             // Two devices send with this COB-ID, or the mapping has changed.
-            tpdo.is_mixed = true;
+            tpdo.has_mixed_lengths = true;
             tpdo.uses_longer = false;
         }
-        if !is_exact && !tpdo.uses_longer {
+        if !is_mapped_length && !tpdo.uses_longer {
             return Decoded::WrongLength(tpdo.node);
         }
         for value in &tpdo.values {
@@ -342,11 +346,11 @@ fn is_dummy(object: ObjectId) -> bool {
 
 /// The source of a value of a node.
 pub fn source(node: NodeId, name: &str, unit: Option<Unit>) -> Source {
-    Source { node, signal: Arc::from(name), unit: Arc::from(words(unit)) }
+    Source { node, signal: Arc::from(name), unit: Arc::from(unit_text(unit)) }
 }
 
 /// A unit in words; empty if it is unknown.
-fn words(unit: Option<Unit>) -> String {
+fn unit_text(unit: Option<Unit>) -> String {
     unit.map(|unit| unit.to_string()).unwrap_or_default()
 }
 

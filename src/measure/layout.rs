@@ -1,4 +1,4 @@
-//! What decoding needs to know of a node: its signals and the layout of its TPDOs.
+//! The facts about a node for decoding: its signals and the layout of its TPDOs.
 
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -65,13 +65,13 @@ impl Default for Rules {
 }
 
 impl Rules {
-    /// For a number that is the value.
+    /// The rules for a value without factor, offset and decimal digits.
     pub fn plain() -> Rules {
         Rules { scaling: Scaling::Plain, ..Rules::default() }
     }
 }
 
-/// What is known of the measuring range of a signal.
+/// The measuring range of a signal, as far as it is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MeasuringRange {
     /// Nothing.

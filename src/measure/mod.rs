@@ -1,4 +1,4 @@
-//! From TPDOs and SDO answers to samples: what a device measures, decoded, with unit and status.
+//! Decodes TPDOs and SDO answers to samples with unit and status.
 //!
 //! Nothing here reads a clock: every sample has the stamp of the frame it came with.
 

@@ -1,12 +1,12 @@
-//! One node that the program talks to: what is known of it, and the only ways to read it, write it and wait for it.
+//! A node: its known facts, and the only functions to read it, write it and wait for it.
 //!
 //! A task gets a [`Node`] from [`survey`] (identity only, or everything that decoding needs), and passes it to
 //! - [`read`]: reads values, several nodes in parallel;
-//! - [`mod@write`]: writes an object in the form that the node accepts, and says how it was confirmed;
+//! - [`mod@write`]: writes an object in the form that the node accepts, and returns how it was confirmed;
 //! - [`wait`]: receives frames until a deadline, with one policy for Ctrl-C, link down and the end of a recording;
 //! - [`state`]: NMT states, commands, reset and the restart;
 //! - [`scan`] and [`targets`]: the nodes on the bus, and those that `all` means;
-//! - [`overheard`]: what other masters read and write;
+//! - [`overheard`]: the objects that other masters read and write;
 //! - [`mod@offline`]: a node as its description has it, without a bus;
 //! - [`names`]: the objects, types and signals behind names.
 //!

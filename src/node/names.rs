@@ -38,7 +38,7 @@ impl Node {
         described.or_else(|| standard::find(name)).or_else(spelled)
     }
 
-    /// What the description says about an object beyond its type.
+    /// The facts about an object in the description, beyond its type.
     pub fn described(&self, object: ObjectId) -> Option<&ObjectEntry> {
         self.model.as_ref()?.description.object(object)
     }
@@ -54,7 +54,7 @@ impl Node {
         model.is_none_or(|model| model.dictionary.is_empty() || model.dictionary.get(object).is_some())
     }
 
-    /// Whether the description says that an object cannot be written.
+    /// Whether an object is read-only according to the description.
     pub fn is_read_only(&self, object: ObjectId) -> bool {
         let described = self.model.as_ref().and_then(|model| model.dictionary.get(object));
         described.is_some_and(|entry| !entry.access.is_writable())

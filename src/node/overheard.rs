@@ -72,7 +72,7 @@ impl Overheard {
         }
     }
 
-    /// The built-in description that fits what is known of a node.
+    /// The built-in description that fits the known identity of a node.
     pub fn recognise(&self, node: NodeId) -> Option<Arc<Model>> {
         let mut traits = self.identity(node).traits();
         let answers = self.known.iter().filter(|((of, _), _)| *of == node);

@@ -49,7 +49,7 @@ type OptionalAnswers = (Vec<Option<Answer>>, Option<SdoError>);
 /// After a silent sub-index, the other sub-indices of its object are not read. If a node is silent twice in a row, the rest of its objects is `None` as well, and the error is returned beside.
 ///
 /// # Errors
-/// What stops everything.
+/// Failures of the bus, and Ctrl-C.
 pub(super) fn ask_optional<A: Ask>(master: &mut A, objects: &[(NodeId, ObjectId)]) -> Result<OptionalAnswers, A::Stop> {
     let mut answers: Vec<Option<Answer>> = objects.iter().map(|_| None).collect();
     let mut open: Vec<usize> = (0..objects.len()).collect();

@@ -30,7 +30,7 @@ pub struct Presence {
     pub states: BTreeMap<NodeId, Option<NmtState>>,
     /// Frames with the identifier of a TPDO of the predefined connection set, by the node that it belongs to there.
     pub tpdos: BTreeMap<NodeId, BTreeSet<CanId>>,
-    /// What other masters read and wrote, if only listened.
+    /// The objects that other masters read and wrote, in a passive scan.
     pub overheard: Overheard,
     booted: BTreeSet<NodeId>,
 }

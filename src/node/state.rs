@@ -28,7 +28,7 @@ const OTHER_GUARD_TIMEOUT: Duration = Duration::from_millis(200);
 /// The longest wait for a boot-up message. No manual gives a time; a device may write its memory first.
 pub const BOOT_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// What confirmed a state.
+/// The evidence for a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Proof {
     /// A heartbeat.
@@ -56,14 +56,14 @@ impl Proof {
     }
 }
 
-/// The state of a node, and what confirmed it.
+/// The state of a node, and the evidence for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StateReport {
     /// The node.
     pub node: NodeId,
     /// Its state; `None` if it is unknown.
     pub state: Option<NmtState>,
-    /// What confirmed it.
+    /// The evidence for it.
     pub by: Proof,
     /// Whether the node showed any sign of life.
     pub is_present: bool,
@@ -88,17 +88,17 @@ impl StateReport {
     }
 }
 
-/// How the state of a node can be found out.
+/// The sources from which the state of a node can be read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Means {
+struct StateSources {
     answers_sdo: bool,
     heartbeat: Option<Duration>,
     /// 100Ch and 100Dh were read as 0: a guarding request does not start life guarding.
     may_guard: bool,
 }
 
-impl Means {
-    /// Whether a heartbeat may come. 1017h of a stopped node cannot be read.
+impl StateSources {
+    /// Whether the node may send a heartbeat. 1017h of a stopped node cannot be read.
     fn may_send_heartbeat(&self) -> bool {
         self.heartbeat.is_some() || !self.answers_sdo
     }
@@ -160,18 +160,19 @@ impl LifeWatch {
     }
 }
 
-/// Finds out how the state of each node can be found out. A node without an answer may be stopped: that is no error.
-fn means(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId, Means>, MasterError> {
-    let mut found: BTreeMap<NodeId, Means> = BTreeMap::new();
+/// Finds out from which sources the state of each node can be read. A node without an answer may be stopped: that is no
+/// error.
+fn sources(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId, StateSources>, MasterError> {
+    let mut found: BTreeMap<NodeId, StateSources> = BTreeMap::new();
     // The heartbeat time first: a node that does not answer is not asked for the others.
     let items: Vec<_> = nodes.iter().map(|&node| (node, HEARTBEAT_TIME, DataType::Unsigned(2))).collect();
     for (&node, value) in nodes.iter().zip(read_values(master, &items)?) {
-        let mut means = Means { answers_sdo: true, ..Means::default() };
+        let mut sources = StateSources { answers_sdo: true, ..StateSources::default() };
         match value {
-            Ok(value) => means.heartbeat = value.as_u64().filter(|&time| time > 0).map(Duration::from_millis),
-            Err(error) => means.answers_sdo = !matches!(error.failure, SdoFailure::NoAnswer { .. }),
+            Ok(value) => sources.heartbeat = value.as_u64().filter(|&time| time > 0).map(Duration::from_millis),
+            Err(error) => sources.answers_sdo = !matches!(error.failure, SdoFailure::NoAnswer { .. }),
         }
-        found.insert(node, means);
+        found.insert(node, sources);
     }
     let answering: Vec<NodeId> = nodes.iter().copied().filter(|node| found[node].answers_sdo).collect();
     let guarding = [(GUARD_TIME, DataType::Unsigned(2)), (LIFE_TIME_FACTOR, DataType::Unsigned(1))];
@@ -181,8 +182,8 @@ fn means(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId, M
         .collect();
     let values = read_values(master, &items)?;
     for (node, values) in answering.iter().zip(values.chunks(guarding.len())) {
-        if let Some(means) = found.get_mut(node) {
-            means.may_guard = values.iter().all(|value| value.as_ref().is_ok_and(|value| value.as_u64() == Some(0)));
+        if let Some(sources) = found.get_mut(node) {
+            sources.may_guard = values.iter().all(|value| value.as_ref().is_ok_and(|value| value.as_u64() == Some(0)));
         }
     }
     Ok(found)
@@ -194,18 +195,18 @@ fn means(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<NodeId, M
 /// Bus errors and Ctrl-C. A node without a sign of life has `is_present: false`.
 pub fn states(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<Vec<StateReport>, MasterError> {
     let mut watch = LifeWatch::default();
-    let means = means(master, nodes)?;
+    let sources = sources(master, nodes)?;
     let timeout = master.timing().timeout;
-    let longest = nodes.iter().filter_map(|node| means[node].heartbeat).max();
-    let expected: Vec<NodeId> = nodes.iter().copied().filter(|node| means[node].may_send_heartbeat()).collect();
+    let longest = nodes.iter().filter_map(|node| sources[node].heartbeat).max();
+    let expected: Vec<NodeId> = nodes.iter().copied().filter(|node| sources[node].may_send_heartbeat()).collect();
     let wait = if expected.is_empty() { Duration::ZERO } else { longest.unwrap_or_default() + timeout };
     let until = master.now() + wait;
     watch.wait(master, until, &|watch| expected.iter().all(|node| watch.lives.contains_key(node)))?;
-    let guarded = guard(master, nodes, &means, &mut watch)?;
+    let guarded = guard(master, nodes, &sources, &mut watch)?;
     let report = |&node: &NodeId| match (guarded.get(&node), watch.lives.get(&node)) {
         (Some(&state), _) => StateReport::known(node, state, Proof::Guarding),
         (None, Some(&life)) => StateReport::of_life(node, life),
-        (None, None) => StateReport::unknown(node, means[&node].answers_sdo),
+        (None, None) => StateReport::unknown(node, sources[&node].answers_sdo),
     };
     Ok(nodes.iter().map(report).collect())
 }
@@ -233,10 +234,10 @@ pub fn by_heartbeat(master: &mut Master<'_>, node: NodeId, period: Duration) -> 
 fn guard(
     master: &mut Master<'_>,
     nodes: &[NodeId],
-    means: &BTreeMap<NodeId, Means>,
+    sources: &BTreeMap<NodeId, StateSources>,
     watch: &mut LifeWatch,
 ) -> Result<BTreeMap<NodeId, NmtState>, MasterError> {
-    let may_guard = |node: &NodeId| means[node].may_guard && means[node].heartbeat.is_none();
+    let may_guard = |node: &NodeId| sources[node].may_guard && sources[node].heartbeat.is_none();
     let asked: Vec<NodeId> = nodes.iter().copied().filter(may_guard).collect();
     let mut states = BTreeMap::new();
     if asked.is_empty() {
@@ -270,7 +271,7 @@ pub fn command(
     broadcast: bool,
 ) -> Result<Vec<StateReport>, MasterError> {
     let mut watch = LifeWatch::default();
-    let before = means(master, nodes)?;
+    let before = sources(master, nodes)?;
     if broadcast {
         master.send(command.frame(None));
     } else {
@@ -294,7 +295,7 @@ fn wait_for_boot_ups(master: &mut Master<'_>, nodes: &[NodeId], watch: &mut Life
 fn after_reset(
     master: &mut Master<'_>,
     nodes: &[NodeId],
-    before: &BTreeMap<NodeId, Means>,
+    before: &BTreeMap<NodeId, StateSources>,
     watch: &mut LifeWatch,
 ) -> Result<Vec<StateReport>, MasterError> {
     let expected: Vec<NodeId> = nodes.iter().copied().filter(|node| watch.booted.contains(node)).collect();
@@ -318,7 +319,7 @@ fn after_change(
     master: &mut Master<'_>,
     command: NmtCommand,
     nodes: &[NodeId],
-    before: &BTreeMap<NodeId, Means>,
+    before: &BTreeMap<NodeId, StateSources>,
     watch: &mut LifeWatch,
 ) -> Result<Vec<StateReport>, MasterError> {
     let sent = master.now();

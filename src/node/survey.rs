@@ -27,8 +27,8 @@ const U8: DataType = DataType::Unsigned(1);
 const U16: DataType = DataType::Unsigned(2);
 const U32: DataType = DataType::Unsigned(4);
 
-/// TPDOs looked for on a device without a description. JUMO's temperature probe sends TPDO5.
-const TPDOS_TRIED: u16 = 8;
+/// How many TPDOs are read from a device without a description. JUMO's temperature probe sends TPDO5.
+const UNDESCRIBED_TPDOS: u16 = 8;
 
 /// The descriptions that the user named, by node.
 pub type Overrides = BTreeMap<NodeId, Arc<Model>>;
@@ -44,7 +44,7 @@ pub trait Ask {
     /// Reads objects, and returns one result for each, in the same order.
     ///
     /// # Errors
-    /// Only what stops the whole survey. The failure of one device is in its result.
+    /// A failure that stops the whole survey. The failure of one device is in its result.
     fn ask(&mut self, objects: &[(NodeId, ObjectId)]) -> Result<Vec<Result<Answer, SdoError>>, Self::Stop>;
 
     /// Sets how a node's SDO server deviates from the standard.
@@ -68,15 +68,15 @@ fn number(value: Option<&Value>) -> Option<u64> {
     value.and_then(Value::as_u64)
 }
 
-fn small<T: TryFrom<u64>>(value: Option<&Value>) -> Option<T> {
+fn unsigned<T: TryFrom<u64>>(value: Option<&Value>) -> Option<T> {
     number(value).and_then(|number| T::try_from(number).ok())
 }
 
-/// Reads the identity of nodes. The name (1008h) is read only if `has_name` says so.
+/// Reads the identity of nodes. The name (1008h) is read only from the nodes for which `reads_name` is true.
 fn identities<A: Ask>(
     master: &mut A,
     nodes: &[NodeId],
-    has_name: impl Fn(NodeId, &Identity) -> bool,
+    reads_name: impl Fn(NodeId, &Identity) -> bool,
 ) -> Result<Vec<Identity>, A::Stop> {
     let objects = [
         (ObjectId::new(0x1018, 1), U32),
@@ -93,16 +93,16 @@ fn identities<A: Ask>(
         .chunks(objects.len())
         .zip(&device_types)
         .map(|(values, device_type)| Identity {
-            device_type: small(device_type.as_ref()),
-            vendor: small(values[0].as_ref()),
-            product: small(values[1].as_ref()),
-            revision: small(values[2].as_ref()),
-            serial: small(values[3].as_ref()),
+            device_type: unsigned(device_type.as_ref()),
+            vendor: unsigned(values[0].as_ref()),
+            product: unsigned(values[1].as_ref()),
+            revision: unsigned(values[2].as_ref()),
+            serial: unsigned(values[3].as_ref()),
             name: None,
         })
         .collect();
-    let is_named = |(node, identity): &(&NodeId, &Identity)| has_name(**node, identity);
-    let named: Vec<NodeId> = nodes.iter().zip(&identities).filter(is_named).map(|(node, _)| *node).collect();
+    let needs_name = |(node, identity): &(&NodeId, &Identity)| reads_name(**node, identity);
+    let named: Vec<NodeId> = nodes.iter().zip(&identities).filter(needs_name).map(|(node, _)| *node).collect();
     let items: Vec<Item> =
         named.iter().map(|&node| (node, ObjectId::new(0x1008, 0), DataType::VisibleString)).collect();
     let mut names: BTreeMap<NodeId, Option<Value>> = named.into_iter().zip(read_optional(master, &items)?).collect();
@@ -124,7 +124,7 @@ pub fn revisions(master: &mut Master<'_>, nodes: &[NodeId]) -> Result<BTreeMap<N
         nodes.iter().flat_map(|&node| subs.map(|sub| (node, ObjectId::new(0x1018, sub), U32))).collect();
     let values: Vec<Option<Value>> = read_values(master, &items)?.into_iter().map(Result::ok).collect();
     let devices = nodes.iter().zip(values.chunks(subs.len()));
-    Ok(devices.map(|(&node, values)| (node, [0, 1, 2].map(|at: usize| small(values[at].as_ref())))).collect())
+    Ok(devices.map(|(&node, values)| (node, [0, 1, 2].map(|at: usize| unsigned(values[at].as_ref())))).collect())
 }
 
 /// Reads everything of the nodes: identity, signals with unit and digits, TPDOs.
@@ -152,10 +152,10 @@ pub fn identify<A: Ask>(master: &mut A, nodes: &[NodeId], overrides: &Overrides)
     for (node, model) in overrides {
         master.set_quirks(*node, &model.description.quirks);
     }
-    let has_name = |node, identity: &Identity| {
+    let reads_name = |node, identity: &Identity| {
         overrides.get(&node).is_none_or(|model| model.description.signals.is_empty() && !identity.fits(model))
     };
-    let identities = identities(master, nodes, has_name)?;
+    let identities = identities(master, nodes, reads_name)?;
     let mut traits: Vec<Traits> = identities.iter().map(Identity::traits).collect();
     let questions: Vec<(usize, ObjectId)> = nodes
         .iter()
@@ -207,14 +207,14 @@ fn read_services<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::St
     let counting: Vec<usize> = (0..nodes.len()).filter(|&at| may_count(&nodes[at])).collect();
     let items: Vec<Item> = counting.iter().map(|&at| (nodes[at].id, objects[3].0, objects[3].1)).collect();
     for (&at, value) in counting.iter().zip(read_optional(master, &items)?) {
-        nodes[at].sync_overflow = small(value.as_ref()).filter(|overflow| (2..=240).contains(overflow));
+        nodes[at].sync_overflow = unsigned(value.as_ref()).filter(|overflow| (2..=240).contains(overflow));
     }
     for (node, values) in nodes.iter_mut().zip(values.chunks(3)) {
-        node.heartbeat_ms = small(values[0].as_ref());
-        if let Some(word) = small(values[1].as_ref()).map(CobId).filter(|word| word.is_valid()) {
+        node.heartbeat_ms = unsigned(values[0].as_ref());
+        if let Some(word) = unsigned(values[1].as_ref()).map(CobId).filter(|word| word.is_valid()) {
             node.emergency = word.can_id();
         }
-        if let Some(word) = small(values[2].as_ref()).map(CobId) {
+        if let Some(word) = unsigned(values[2].as_ref()).map(CobId) {
             node.sync = word.can_id();
         }
     }
@@ -227,7 +227,7 @@ fn tpdo_numbers(node: &Node) -> Vec<TpdoNumber> {
         node.model.as_ref().is_some_and(|model| model.dictionary.has_index(number.communication(0).index))
     };
     let described: Vec<TpdoNumber> = (1..=512).filter_map(TpdoNumber::new).filter(is_described).collect();
-    if described.is_empty() { (1..=TPDOS_TRIED).filter_map(TpdoNumber::new).collect() } else { described }
+    if described.is_empty() { (1..=UNDESCRIBED_TPDOS).filter_map(TpdoNumber::new).collect() } else { described }
 }
 
 fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop> {
@@ -241,7 +241,7 @@ fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
     let found: Vec<(usize, TpdoNumber, CobId)> = wanted
         .iter()
         .zip(&cob_ids)
-        .filter_map(|(&(at, number), value)| Some((at, number, CobId(small(value.as_ref())?))))
+        .filter_map(|(&(at, number), value)| Some((at, number, CobId(unsigned(value.as_ref())?))))
         .collect();
     let items: Vec<Item> = found
         .iter()
@@ -251,7 +251,7 @@ fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
         })
         .collect();
     let values = read_known(master, &items)?;
-    let counts: Vec<u8> = values.chunks(3).map(|values| small(values[2].as_ref()).unwrap_or(0)).collect();
+    let counts: Vec<u8> = values.chunks(3).map(|values| unsigned(values[2].as_ref()).unwrap_or(0)).collect();
     // FEh and FFh stand for multiplexed PDOs (CiA 301, 7.5.2.38), which measuring devices do not send.
     let entries = |count: u8| 1..=if count > 64 { 0 } else { count };
     let items: Vec<Item> = found
@@ -266,13 +266,13 @@ fn read_tpdos<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Stop>
     for ((&(at, number, cob_id), values), &count) in found.iter().zip(values.chunks(3)).zip(&counts) {
         let mapping: Option<Vec<MappingEntry>> = entries(count)
             .map(|_| words.next().flatten())
-            .map(|word| small(word.as_ref()).map(MappingEntry::from_word))
+            .map(|word| unsigned(word.as_ref()).map(MappingEntry::from_word))
             .collect();
         nodes[at].tpdos.push(Tpdo {
             number,
             cob_id,
-            transmission: small(values[0].as_ref()).map(Transmission::from_code),
-            event_timer_ms: small(values[1].as_ref()),
+            transmission: unsigned(values[0].as_ref()).map(Transmission::from_code),
+            event_timer_ms: unsigned(values[1].as_ref()),
             mapping: mapping.unwrap_or_default(),
         });
     }
@@ -311,11 +311,11 @@ fn find_signals<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Result<(), A::Sto
 
 /// The process value of each channel. `counts` are the answers of sub-index 0 of [`PROCESS_VALUES`].
 fn channel_values(node: &Node, counts: &[Option<Value>]) -> Vec<ObjectId> {
-    let channels = |value: &Option<Value>| small::<u8>(value.as_ref()).unwrap_or(0).min(199);
+    let channels = |value: &Option<Value>| unsigned::<u8>(value.as_ref()).unwrap_or(0).min(199);
     if let Some((&(index, _), count)) = PROCESS_VALUES.iter().zip(counts).find(|(_, count)| channels(count) > 0) {
         return (1..=channels(count)).map(|channel| ObjectId::new(index, channel)).collect();
     }
-    // Sub-index 0 may be missing; what is mapped is there.
+    // Sub-index 0 may be missing. Objects that a TPDO contains exist.
     let mapped = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
     let mapped = mapped.filter(|entry| PROCESS_VALUES.iter().any(|&(index, _)| index == entry.object.index));
     let known: BTreeSet<u8> = mapped.map(|entry| entry.object.sub).collect();
@@ -406,7 +406,7 @@ pub fn survey_each(
     nodes: &[NodeId],
     overrides: &Overrides,
 ) -> Result<Vec<Result<Node, SdoError>>, Error> {
-    each(master, nodes, &mut |master, nodes| survey_nodes(master, nodes, overrides))
+    read_each(master, nodes, &mut |master, nodes| survey_nodes(master, nodes, overrides))
 }
 
 /// Like [`identify`], with one result for each node: a node that fails does not affect the others.
@@ -418,14 +418,18 @@ pub fn identify_each(
     nodes: &[NodeId],
     overrides: &Overrides,
 ) -> Result<Vec<Result<Node, SdoError>>, Error> {
-    each(master, nodes, &mut |master, nodes| identify(master, nodes, overrides))
+    read_each(master, nodes, &mut |master, nodes| identify(master, nodes, overrides))
 }
 
 /// Reads nodes in parallel.
 type ReadNodes<'a> = &'a mut dyn FnMut(&mut Master<'_>, &[NodeId]) -> Result<Vec<Node>, Error>;
 
-/// Reads all nodes in parallel; if one of them fails, each alone. Nodes that no longer answer fail together.
-fn each(master: &mut Master<'_>, nodes: &[NodeId], read: ReadNodes<'_>) -> Result<Vec<Result<Node, SdoError>>, Error> {
+/// Reads all nodes in parallel. If one of them fails, each node is read alone, except those that no longer answer.
+fn read_each(
+    master: &mut Master<'_>,
+    nodes: &[NodeId],
+    read: ReadNodes<'_>,
+) -> Result<Vec<Result<Node, SdoError>>, Error> {
     match read(master, nodes) {
         Ok(all) => return Ok(all.into_iter().map(Ok).collect()),
         Err(Error::Sdo(error)) if nodes.len() == 1 => return Ok(vec![Err(error)]),
@@ -437,7 +441,7 @@ fn each(master: &mut Master<'_>, nodes: &[NodeId], read: ReadNodes<'_>) -> Resul
     for (&node, answer) in nodes.iter().zip(master.transfer(requests, &mut |_| {})?) {
         match answer {
             Err(error) if matches!(error.failure, SdoFailure::NoAnswer { .. }) => results.push(Err(error)),
-            _ => results.extend(each(master, &[node], read)?),
+            _ => results.extend(read_each(master, &[node], read)?),
         }
     }
     Ok(results)

@@ -1,4 +1,4 @@
-//! The only wait loop. It ends at a deadline, when the caller has received what it needs, or when the policy ends it.
+//! The only wait loop. It ends at a deadline, when the caller has its result, or when the policy ends it.
 //!
 //! | | [`Policy::Command`] | [`Policy::Observe`] | [`Policy::Reconnect`] | [`Policy::Record`] |
 //! |---|---|---|---|---|
@@ -31,7 +31,7 @@ pub enum Policy {
 /// How a wait ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Waited<T> {
-    /// The caller has what it waited for.
+    /// The caller has its result.
     Done(T),
     /// The deadline passed.
     Deadline,
@@ -42,7 +42,7 @@ pub enum Waited<T> {
 }
 
 impl<T> Waited<T> {
-    /// The result, if the caller has what it waited for.
+    /// The result, if the caller has it.
     pub fn done(self) -> Option<T> {
         match self {
             Waited::Done(result) => Some(result),
@@ -62,7 +62,7 @@ pub enum Until {
 
 /// A wait whose deadline depends on the received events.
 pub trait Waiter {
-    /// What the wait returns.
+    /// The result of the wait.
     type Output;
     /// How it fails.
     type Error: From<Error>;
@@ -84,7 +84,7 @@ pub trait Waiter {
 /// Waits until the waiter breaks or fails, or the policy ends the wait.
 ///
 /// # Errors
-/// Bus errors, what the policy treats as an error, and those of the waiter.
+/// Bus errors, events that the policy treats as errors, and errors of the waiter.
 pub fn run<W: Waiter>(master: &mut Master<'_>, policy: Policy, waiter: &mut W) -> Result<W::Output, W::Error> {
     loop {
         let event = match waiter.until() {
@@ -104,7 +104,7 @@ pub fn run<W: Waiter>(master: &mut Master<'_>, policy: Policy, waiter: &mut W) -
 /// changes of the link.
 ///
 /// # Errors
-/// Bus errors, and what the policy treats as an error.
+/// Bus errors, and events that the policy treats as errors.
 pub fn wait<T>(
     master: &mut Master<'_>,
     until: Mono,
@@ -140,12 +140,12 @@ pub fn wait<T>(
 /// Waits until `until`, and ignores frames.
 ///
 /// # Errors
-/// Bus errors, and what the policy treats as an error.
+/// Bus errors, and events that the policy treats as errors.
 pub fn pause(master: &mut Master<'_>, until: Mono, policy: Policy) -> Result<(), Error> {
     wait(master, until, policy, |_, _| ControlFlow::<()>::Continue(())).map(|_| ())
 }
 
-/// Turns an event into an error if the policy says so.
+/// Turns an event into an error if the policy requires it.
 fn apply(master: &mut Master<'_>, policy: Policy, event: Happening) -> Result<Happening, Error> {
     match (event, policy) {
         (Happening::Interrupted, Policy::Command | Policy::Reconnect) => {

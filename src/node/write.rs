@@ -26,7 +26,7 @@ use std::time::Duration;
 /// Whether an expedited download contains its size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
-    /// As the device description says, else with the size; the other form if the node rejects the first one.
+    /// As in the device description, else with the size; the other form if the node rejects the first one.
     #[default]
     Auto,
     /// With the size.

@@ -1,4 +1,4 @@
-//! Settings of a device: the file that `config dump` writes, and what `config diff` and `config apply` report.
+//! Settings of a device: the file that `config dump` writes, and the reports of `config diff` and `config apply`.
 
 use super::report::{Cell, Column, Report};
 use super::table::{self, Align};
@@ -66,7 +66,7 @@ pub fn write_toml(dump: &Dump, out: &mut dyn Write) -> io::Result<()> {
         }
         writeln!(out, "{name} = {}{}", toml_value(&row.value), comment(row))?;
         if row.key == "device.product" {
-            specimen(dump, out)?;
+            identity_comment(dump, out)?;
         }
     }
     for object in &dump.unreadable {
@@ -76,8 +76,8 @@ pub fn write_toml(dump: &Dump, out: &mut dyn Write) -> io::Result<()> {
 }
 
 /// Revision and serial number: they differ between devices of one kind.
-fn specimen(dump: &Dump, out: &mut dyn Write) -> io::Result<()> {
-    let [revision, serial] = dump.specimen;
+fn identity_comment(dump: &Dump, out: &mut dyn Write) -> io::Result<()> {
+    let [revision, serial] = dump.revision_and_serial;
     let revision = revision.map(|revision| format!("revision 0x{revision:X}"));
     let serial = serial.map(|serial| format!("serial number {serial}"));
     let known: Vec<String> = [revision, serial].into_iter().flatten().collect();
@@ -128,7 +128,7 @@ impl Report for ChangedSetting {
     }
 }
 
-/// What `config apply` did with one device.
+/// The result of `config apply` for one device.
 #[derive(Clone, Debug)]
 pub struct AppliedReport(pub Applied);
 

@@ -1,11 +1,11 @@
-//! The record of `config apply` for the quality folder, as JSON or as one page to print.
+//! The record of `config apply` for quality documents, as JSON or as one page to print.
 
 use super::text;
 use crate::bus::Wall;
 use crate::tasks::config::{Applied, Row, Snapshot};
 use serde_json::{Map, Value, json};
 
-/// What is recorded about one run.
+/// The record of one run.
 #[derive(Clone, Debug)]
 pub struct ConfigRecord<'a> {
     /// When it ended.

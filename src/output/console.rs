@@ -70,7 +70,7 @@ impl Console {
         if let Some(place) = &failure.place {
             let (shown, before) = text::around(&place.text, place.before.chars().count());
             let start: String = shown.chars().take(before).collect();
-            // What is not shown as it is takes more room.
+            // Escaped characters take more room.
             let before = text::safe(&start).chars().count();
             self.line(Style::new(), "  ", &shown);
             self.line(AnsiColor::Red.on_default().bold(), &format!("  {}^", " ".repeat(before)), "");

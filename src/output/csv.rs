@@ -1,6 +1,6 @@
-//! Tables as CSV: what `--format csv` gives of every command but `log`, whose rows stand in [`super::rows`].
+//! Tables as CSV, for every command with `--format csv` except `log`, whose rows are in [`super::rows`].
 //!
-//! A terminal may be on the other end of stdout: text from devices is made safe here, whatever the cell.
+//! A terminal may be on the other end of stdout: text from devices is made safe here, in every cell.
 
 use super::text::safe;
 use std::io::{self, Write};

@@ -1,4 +1,4 @@
-//! The reports of `devices`: the descriptions that there are, one of them as TOML, and mistakes in a file.
+//! The reports of `devices`: the list of descriptions, one of them as TOML, and mistakes in a file.
 
 use super::report::{Cell, Column, Report};
 use super::text;
@@ -73,7 +73,7 @@ impl Report for DescriptionText {
     }
 }
 
-/// A mistake in the file of a description, or something that may be one.
+/// A mistake, or a possible mistake, in the file of a description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
     /// The file.

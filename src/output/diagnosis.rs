@@ -1,4 +1,4 @@
-//! Text for the reasons why a node sends no measurements, and what to do about them.
+//! Text for the reasons why a node sends no measurements, with hints.
 
 use crate::bus::time::format_duration;
 use crate::canopen::id::{CanId, NodeId};
@@ -115,7 +115,7 @@ fn not_sent(number: TpdoNumber, when: &str, running: Running) -> String {
     format!("{number} is due {when}, and no {number} was received: {state}")
 }
 
-/// What else may be the cause, if the state of the node is unknown.
+/// Other possible causes, if the state of the node is unknown.
 fn or_not_running(running: Running) -> &'static str {
     match running {
         Running::Operational => "",

@@ -1,4 +1,4 @@
-//! A first description of a device as TOML, with comments for what a person has to fill in.
+//! A first description of a device as TOML, with comments that show what to complete.
 
 use super::sdo::is_usually_hexadecimal;
 use super::text::safe;

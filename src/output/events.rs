@@ -43,7 +43,7 @@ impl EventText {
     }
 }
 
-/// The text for what another program did to a file.
+/// The text for a change of a file by another program.
 pub fn file_change_text(change: &FileChange) -> String {
     match change {
         FileChange::Shortened(path) => {
@@ -122,7 +122,7 @@ impl Events {
         self.writer.finish(give_up)
     }
 
-    /// What other programs did to the file since the last call.
+    /// Changes of the file by other programs since the last call.
     pub fn take_changes(&mut self) -> Vec<FileChange> {
         self.writer.take_changes()
     }

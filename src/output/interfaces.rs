@@ -75,7 +75,7 @@ impl Report for Interface {
     }
 }
 
-/// What was changed: `can0 is up at 250000 bit/s; it was up at 125000 bit/s`.
+/// A change: `can0 is up at 250000 bit/s; it was up at 125000 bit/s`.
 pub fn change(before: &Interface, after: &Interface) -> String {
     let (name, now, was) = (&after.interface, link_text(after), link_text(before));
     match (before == after, now == was) {
@@ -97,7 +97,7 @@ fn link_text(interface: &Interface) -> String {
 pub struct BitRateReport {
     /// The interface.
     pub interface: String,
-    /// What was found.
+    /// The result.
     pub detection: Detection,
 }
 

@@ -89,7 +89,7 @@ impl Report for Identified {
     }
 }
 
-/// The result of `set-id`, `set-bitrate` and `set`, with what the user has to do on the host.
+/// The result of `set-id`, `set-bitrate` and `set`, with the remaining steps on the host.
 #[derive(Clone, Debug)]
 pub struct AssignReport {
     /// The result.
@@ -161,7 +161,7 @@ impl Report for AssignReport {
 }
 
 impl AssignReport {
-    /// What confirmed the node-ID, and the identifiers of the TPDOs.
+    /// The evidence for the node-ID, and the identifiers of the TPDOs.
     pub fn confirmation(&self) -> Option<String> {
         let (new, ids) = (self.assigned.new?, self.assigned.cob_ids.as_ref()?);
         let boot_up = match self.assigned.boot_time {
@@ -174,7 +174,7 @@ impl AssignReport {
         Some(std::iter::once(boot_up).chain(tpdos).collect::<Vec<_>>().join("; "))
     }
 
-    /// What remains to be done.
+    /// The remaining steps.
     pub fn notes(&self) -> Vec<NoteText> {
         let assigned = &self.assigned;
         let mut notes = Vec::new();

@@ -1,4 +1,4 @@
-//! Rows and text: what goes to stdout, stderr and files. Knows no bus and no command line.
+//! Rows and text for stdout, stderr and files. Uses neither the bus nor the command line.
 
 pub mod autozero;
 pub mod check_progress;

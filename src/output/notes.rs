@@ -23,7 +23,7 @@ pub struct NoteText {
     pub message: String,
     /// A command to type.
     pub command: Option<String>,
-    /// What the command does: `undo`.
+    /// The purpose of the command: `undo`.
     #[serde(skip)]
     pub purpose: &'static str,
 }
@@ -34,7 +34,7 @@ impl NoteText {
         NoteText { code, message: message.into(), command: None, purpose: "" }
     }
 
-    /// The same with a command. `purpose` says what the command does: `undo`.
+    /// The same with a command. `purpose` is a word or clause: `undo`.
     pub(super) fn command(mut self, purpose: &'static str, command: impl Into<String>) -> NoteText {
         self.command = Some(command.into());
         self.purpose = purpose;

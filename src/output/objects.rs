@@ -1,4 +1,4 @@
-//! The report of `objects`: what a description or an EDS states about an object.
+//! The report of `objects`: the facts about an object in a description or an EDS.
 
 use super::report::{Cell, Column, Report};
 use super::{table, text};
@@ -11,7 +11,7 @@ use crate::device::scalar::{NumberRange, Scalar};
 use crate::output::sdo::is_usually_hexadecimal;
 use std::io::{self, Write};
 
-/// What is known of one object without asking the device.
+/// The facts about one object that are known without asking the device.
 #[derive(Clone, Debug)]
 pub struct ObjectFacts<'a> {
     /// The description or EDS.
@@ -80,7 +80,7 @@ impl<'a> ObjectFacts<'a> {
         values.map(|(value, meaning)| format!("{} {meaning}", number(*value))).collect()
     }
 
-    /// Every fact, one thought a line.
+    /// All facts, each on its own line.
     fn details(&self, out: &mut dyn Write) -> io::Result<()> {
         let entry = self.entry;
         let mut lines = Vec::new();

@@ -110,7 +110,7 @@ pub struct ReceivedTpdo {
 }
 
 impl ReceivedTpdo {
-    /// A TPDO with the samples that it item. `sources` are those of the decoder.
+    /// A TPDO with its samples. `sources` are those of the decoder.
     pub fn new(at: Stamp, node: NodeId, number: TpdoNumber, samples: &[Sample], sources: &[Source]) -> ReceivedTpdo {
         let value = |sample: &Sample| Some((sources.get(sample.source)?.clone(), sample.clone()));
         ReceivedTpdo { at, node, number, values: samples.iter().filter_map(value).collect() }

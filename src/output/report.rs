@@ -1,4 +1,4 @@
-//! Reports: what a command prints to stdout, defined once for text, JSON Lines and CSV.
+//! Reports: the output of a command on stdout, defined once for text, JSON Lines and CSV.
 //!
 //! A command returns values that implement [`Report`]. Each value is one JSON object. The same columns and cells make
 //! the CSV file and the table for people. Only [`render`] and [`Stream`] know the formats.

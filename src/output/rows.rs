@@ -48,7 +48,7 @@ impl Rows {
         Rows { sink: RowSink::new(writer, setup), wide, column_changes: 0 }
     }
 
-    /// Sets what will be measured: the columns of layout `wide`.
+    /// Sets the signals that will be measured: the columns of layout `wide`.
     ///
     /// # Errors
     /// The file to be continued has other columns.
@@ -146,7 +146,7 @@ impl Rows {
         self.sink.lost()
     }
 
-    /// What other programs did to the files since the last call.
+    /// Changes of the files by other programs since the last call.
     pub fn take_changes(&mut self) -> Vec<FileChange> {
         self.sink.take_changes()
     }

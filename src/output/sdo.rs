@@ -10,7 +10,7 @@ use std::io::{self, Write};
 /// A value of an object, as `sdo read` prints it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectValue {
-    /// What was read.
+    /// The value.
     pub read: ReadValue,
     /// The object as the user typed it.
     pub typed: String,

@@ -11,7 +11,7 @@ use crate::tasks::log::{RecordingReport, Remark, SyncStatistics};
 use std::io::{self, Write};
 use std::time::Duration;
 
-/// What was written.
+/// The rows that were written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Written {
     /// Rows of either layout.
@@ -27,9 +27,9 @@ pub struct Written {
 /// The summary of a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Summary<'a> {
-    /// What was recorded.
+    /// The recording.
     pub report: &'a RecordingReport,
-    /// What was written.
+    /// The rows that were written.
     pub written: Written,
     /// Whether the recording reached its planned end: `--count`, `--duration`, or any end if none is planned.
     pub complete: bool,
@@ -201,12 +201,12 @@ impl Summary<'_> {
 
 fn head(report: &RecordingReport, written: Written) -> String {
     let mut head = format!(
-        "{} rows in {}, {} timestamps, {} frames dropped, {} gaps",
-        grouped(written.rows),
+        "{} in {}, {} timestamps, {}, {}",
+        counted(written.rows, "row", "rows"),
         format_duration(report.length),
         report.timestamps,
-        grouped(report.dropped),
-        grouped(report.gaps)
+        counted(report.dropped, "frame dropped", "frames dropped"),
+        counted(report.gaps, "gap", "gaps")
     );
     let events = &report.events;
     for (count, one, several) in [
@@ -224,10 +224,15 @@ fn head(report: &RecordingReport, written: Written) -> String {
         (written.events_lost, "event lost", "events lost"),
     ] {
         if count > 0 {
-            head.push_str(&format!(", {} {}", grouped(count), if count == 1 { one } else { several }));
+            head.push_str(&format!(", {}", counted(count, one, several)));
         }
     }
     head
+}
+
+/// `1 row`, `1,200 rows`.
+fn counted(count: u64, one: &str, several: &str) -> String {
+    format!("{} {}", grouped(count), if count == 1 { one } else { several })
 }
 
 fn syncs(syncs: &SyncStatistics) -> Option<String> {
@@ -255,7 +260,7 @@ fn signal_line(source: &Source, statistics: &Statistics) -> String {
         line.push_str(&format!("  every {median}, jitter p99 {p99}  max {max}"));
     }
     if statistics.gaps() > 0 {
-        line.push_str(&format!("  {} gaps", grouped(statistics.gaps())));
+        line.push_str(&format!("  {}", counted(statistics.gaps(), "gap", "gaps")));
     }
     if statistics.invalid() > 0 {
         line.push_str(&format!("  {} invalid", grouped(statistics.invalid())));

@@ -108,7 +108,7 @@ impl Bench {
     fn from_list(spec: &str) -> Result<Bench, BenchError> {
         let entries = spec.split(',').map(|text| {
             let (kind, node) = text.rsplit_once('@').ok_or_else(|| {
-                BenchError::Usage(format!("\"{text}\" is not DEVICE@NODE ({DEFAULT}) and no file FILE.toml"))
+                BenchError::Usage(format!("\"{text}\" is neither DEVICE@NODE ({DEFAULT}) nor a file (FILE.toml)"))
             })?;
             let mut parts = node.split(':');
             let node = match parts.next().unwrap_or_default() {

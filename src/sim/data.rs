@@ -31,7 +31,7 @@ pub struct SimData {
     pub overload_percent: f64,
     /// The emergency code of an overload, if the device sends one.
     pub overload_emcy: Option<u16>,
-    /// What its LSS slave supports.
+    /// The services of its LSS slave.
     #[serde(default)]
     pub lss: SimLss,
     /// The measured quantities, one per signal.
@@ -39,7 +39,7 @@ pub struct SimData {
     pub channels: Vec<SimChannel>,
 }
 
-/// What the LSS slave of a simulated device supports.
+/// The services of the LSS slave of a simulated device.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SimLss {

@@ -36,7 +36,7 @@ pub(super) struct Reply {
     pub(super) then: Then,
 }
 
-/// What the device does after a request.
+/// The action of the device after a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Then {
     #[default]

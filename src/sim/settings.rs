@@ -61,9 +61,9 @@ impl Settings {
             codes = STANDARD.map(|(code, rate)| (code, BitRate::At(rate))).to_vec();
         }
         codes.extend(description.auto_bit_rate.map(|code| (code, BitRate::Auto)));
-        let way = description.assign.iter().find(|entry| entry.way == AssignKind::Objects);
+        let entry = description.assign.iter().find(|entry| entry.kind == AssignKind::Objects);
         let place = |place: fn(&AssignEntry) -> Option<AssignObject>| {
-            let entry = way?;
+            let entry = entry?;
             let object = place(entry)?.object;
             let needs_power_cycle = entry.applies == Applies::Power;
             objects.has(object).then_some(Place { object, store: entry.store, needs_power_cycle })

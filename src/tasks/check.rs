@@ -22,7 +22,7 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// What to check, and how to measure.
+/// The expressions to check, and how to measure.
 #[derive(Clone, Debug)]
 pub struct CheckOptions {
     /// The nodes.

@@ -1,4 +1,4 @@
-//! Reads what a first description of an unknown device needs: identity, readable objects, signals.
+//! Reads the contents for a first description of an unknown device: identity, readable objects, signals.
 
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -13,7 +13,7 @@ use crate::tasks::Failure;
 use crate::tasks::settings::open;
 use std::collections::BTreeSet;
 
-/// What was read of a device.
+/// The facts that were read from a device.
 #[derive(Clone, Debug)]
 pub struct Draft {
     /// Identity, signals and TPDOs.

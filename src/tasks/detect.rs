@@ -89,7 +89,8 @@ pub struct Detection {
     pub tried: Vec<Tried>,
 }
 
-/// Tries the usual bit rates one after the other, each for `each`, the present one first. Then sets the interface back.
+/// Tries the usual bit rates one after the other, each for `time_per_rate`, the present one first. Then sets the
+/// interface back.
 ///
 /// It listens. If `ask` is set and no frame is received, it asks as well, which disturbs a bus that runs at another bit
 /// rate. `on_tried` receives the result of each try.
@@ -99,12 +100,13 @@ pub struct Detection {
 pub fn detect(
     bus: &mut dyn Bus,
     ask: bool,
-    each: Duration,
+    time_per_rate: Duration,
     on_tried: &mut dyn FnMut(&Tried),
 ) -> Result<Detection, Failure> {
     bus.can_set_bit_rate().map_err(|error| refused(error, bus.name()))?;
     let bit_rate = bus.bit_rate();
-    let result = bus.listen(&Filters::All).map_err(Error::from).and_then(|()| try_all(bus, ask, each, on_tried));
+    let result =
+        bus.listen(&Filters::All).map_err(Error::from).and_then(|()| try_all(bus, ask, time_per_rate, on_tried));
     let restored = bus.restore_bit_rate();
     let result = result.map_err(|error| match error {
         Error::Bus(error) => refused(error, bus.name()),
@@ -128,12 +130,17 @@ fn refused(error: BusError, name: &str) -> Failure {
     not_set(error, HostAction::Detect { interface: name.to_owned() })
 }
 
-fn try_all(bus: &mut dyn Bus, ask: bool, each: Duration, on_tried: &mut dyn FnMut(&Tried)) -> Result<Detection, Error> {
+fn try_all(
+    bus: &mut dyn Bus,
+    ask: bool,
+    time_per_rate: Duration,
+    on_tried: &mut dyn FnMut(&Tried),
+) -> Result<Detection, Error> {
     let first = bus.bit_rate();
     let rates: Vec<u32> = first.into_iter().chain(RATES.into_iter().filter(|&rate| Some(rate) != first)).collect();
     let mut tried: Vec<Tried> = Vec::new();
     for &bit_rate in &rates {
-        let one = match listen(bus, bit_rate, each) {
+        let one = match listen(bus, bit_rate, time_per_rate) {
             // Without a listen-only mode, only asking is left.
             Err(Error::Bus(BusError::Unsupported(_))) if ask && tried.is_empty() => break,
             one => one?,
@@ -146,7 +153,7 @@ fn try_all(bus: &mut dyn Bus, ask: bool, each: Duration, on_tried: &mut dyn FnMu
         }
     }
     for &bit_rate in rates.iter().filter(|_| ask) {
-        let one = ask_all(bus, bit_rate, each)?;
+        let one = ask_all(bus, bit_rate, time_per_rate)?;
         on_tried(&one);
         let found = one.is_found();
         tried.push(one);
@@ -171,12 +178,12 @@ fn set(bus: &mut dyn Bus, mode: Mode, tried: &mut Tried) -> Result<bool, BusErro
     }
 }
 
-fn listen(bus: &mut dyn Bus, bit_rate: u32, each: Duration) -> Result<Tried, Error> {
+fn listen(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<Tried, Error> {
     let mut tried = Tried::new(bit_rate, How::Listening);
     if !set(bus, Mode::ListenOnly, &mut tried)? {
         return Ok(tried);
     }
-    let until = bus.mono() + each;
+    let until = bus.mono() + time_per_rate;
     while !tried.is_decided() {
         match bus.receive(until)? {
             Event::Frame(_) => tried.frames += 1,
@@ -190,19 +197,19 @@ fn listen(bus: &mut dyn Bus, bit_rate: u32, each: Duration) -> Result<Tried, Err
     Ok(tried)
 }
 
-fn ask_all(bus: &mut dyn Bus, bit_rate: u32, each: Duration) -> Result<Tried, Error> {
+fn ask_all(bus: &mut dyn Bus, bit_rate: u32, time_per_rate: Duration) -> Result<Tried, Error> {
     let mut tried = Tried::new(bit_rate, How::Asking);
     if !set(bus, Mode::Normal, &mut tried)? {
         return Ok(tried);
     }
-    let mut master = Master::new(bus, Timing { timeout: each, retries: 0 });
+    let mut master = Master::new(bus, Timing { timeout: time_per_rate, retries: 0 });
     let mut pending: BTreeSet<Ticket> = NodeId::all()
-        .map(|node| master.start(Request::read(node, ObjectId::DEVICE_TYPE).once().within(each)))
+        .map(|node| master.start(Request::read(node, ObjectId::DEVICE_TYPE).once().within(time_per_rate)))
         .collect();
     // On a slow bus the requests alone take longer than the answers.
     let requests = u64::try_from(pending.len()).unwrap_or(0);
     let on_the_wire = REQUEST_BITS * requests * 1_000_000 / u64::from(bit_rate.max(1));
-    let until = master.now() + each + Duration::from_micros(on_the_wire);
+    let until = master.now() + time_per_rate + Duration::from_micros(on_the_wire);
     let waited = wait(&mut master, until, Policy::Reconnect, |_, event| {
         match event {
             Happening::Frame(_) => tried.frames += 1,

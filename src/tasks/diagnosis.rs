@@ -1,6 +1,6 @@
 //! Why a node sends no measurements.
 //!
-//! [`diagnose`] decides from evidence, in this order: what the node sent last ([`Heard`]), what it answers now
+//! [`diagnose`] decides from evidence, in this order: its last frames ([`Heard`]), its present answers
 //! ([`Inquiry`]), and the parameters of the TPDOs that carry the requested signals. Causes that cannot be distinguished are
 //! named together: see [`Running`].
 
@@ -28,11 +28,11 @@ pub struct Silence {
     pub cause: SilenceCause,
     /// The code of the last emergency of the node.
     pub emergency: Option<u16>,
-    /// What is known of the NMT state, for causes that do not explain the silence of a running node for certain.
+    /// Whether the node is OPERATIONAL. Set for causes that leave doubt: a node in another state is silent as well.
     pub running: Running,
 }
 
-/// What is known of the NMT state of a node that is not known to be in another state than OPERATIONAL.
+/// Whether a node is OPERATIONAL, as far as it is known. A node that is known to be in another state has another cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Running {
     /// It is OPERATIONAL.
@@ -56,7 +56,7 @@ pub enum SilenceCause {
     NotOperational {
         /// Its state.
         state: NmtState,
-        /// What showed the state.
+        /// The evidence for the state.
         by: Proof,
         /// Whether it had been started before.
         was_started: bool,
@@ -134,7 +134,7 @@ pub enum TpdoCause {
     UnknownType,
 }
 
-/// What a node sent while it was observed.
+/// The frames of a node while it was observed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Heard {
     /// The state of its last heartbeat; `None` after a boot-up.
@@ -157,7 +157,7 @@ pub struct Heard {
     pub shared: Option<(CanId, NodeId)>,
 }
 
-/// What was done to get measurements.
+/// The way in which measurements were requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Situation {
     /// How long it waited.
@@ -170,7 +170,7 @@ pub struct Situation {
     pub was_started: bool,
 }
 
-/// Decides why a node sends no measurements. `carries` says whether a TPDO carries what was requested.
+/// Decides why a node sends no measurements. `carries` returns whether a TPDO contains a requested value.
 pub fn diagnose(
     node: &Node,
     carries: &dyn Fn(&Tpdo) -> bool,
@@ -243,7 +243,7 @@ fn setup_cause(
 /// Why a valid TPDO is not sent.
 fn tpdo_cause(node: &Node, tpdo: &Tpdo, heard: &Heard, findings: &Findings, situation: &Situation) -> TpdoCause {
     if tpdo.mapping.is_empty() {
-        return TpdoCause::NothingMapped(findings.small(tpdo.number.mapping(0)));
+        return TpdoCause::NothingMapped(findings.unsigned(tpdo.number.mapping(0)));
     }
     let (received, length) = heard.syncs;
     let seen = situation.syncs_sent.unwrap_or(0) + received;
@@ -273,7 +273,7 @@ fn tpdo_cause(node: &Node, tpdo: &Tpdo, heard: &Heard, findings: &Findings, situ
 
 /// Why a TPDO that is sent by its event timer or on change is not sent.
 fn event_cause(node: &Node, tpdo: &Tpdo, findings: &Findings, waited: Duration) -> TpdoCause {
-    let inhibit: Option<u16> = findings.small(tpdo.number.communication(3));
+    let inhibit: Option<u16> = findings.unsigned(tpdo.number.communication(3));
     let inhibit = inhibit.filter(|&inhibit| Duration::from_micros(100) * u32::from(inhibit) >= waited);
     match node.event_timer(tpdo.transmission, tpdo.event_timer_ms) {
         Some(timer) if Duration::from_millis(timer.into()) >= waited => TpdoCause::SlowEventTimer(timer),

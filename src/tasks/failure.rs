@@ -1,4 +1,4 @@
-//! Why a task failed: the node, the object, the cause, and what the task changed before it failed.
+//! Why a task failed: the node, the object, the cause, and the changes before the failure.
 //!
 //! These types contain no text for people. [`crate::output::failure`] turns them into a message and a hint.
 
@@ -21,7 +21,7 @@ use std::sync::Arc;
 /// The kinds of failure that scripts can distinguish. Each has one exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
-    /// The answer is no, or a safety check stopped the command before it changed anything.
+    /// A check failed, or a safety check stopped the command before it changed anything.
     CheckFailed,
     /// The arguments or a file are wrong; nothing was changed.
     Usage,
@@ -48,13 +48,13 @@ pub struct Failure {
     pub node: Option<NodeId>,
     /// The object that was read or written.
     pub object: Option<ObjectId>,
-    /// What went wrong.
+    /// The cause.
     pub cause: Cause,
-    /// What was changed before, and what state was left behind; in the order in which it happened.
+    /// The changes before the failure, and the state left behind, in the order of time.
     pub effects: Vec<Effect>,
 }
 
-/// What went wrong. Each area of `tasks` has an enum of its own.
+/// The cause of a failure. Each area of `tasks` has an enum of its own.
 #[derive(Clone, Debug)]
 pub enum Cause {
     /// The bus failed.

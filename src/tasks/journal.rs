@@ -1,6 +1,6 @@
-//! What must be undone if the program is killed. A temporary write is recorded before it is sent.
+//! Temporary writes that must be undone if the program is killed. Each one is recorded before it is sent.
 //!
-//! The file is in the layer above: [`Journal`] is what the tasks need of it.
+//! The file is in the layer above. The tasks use the trait [`Journal`].
 
 use crate::canopen::id::NodeId;
 use crate::canopen::object::ObjectId;
@@ -46,7 +46,7 @@ pub trait Journal {
     fn remove(&mut self, write: &TemporaryWrite);
 }
 
-/// For a bus whose devices end together with the program.
+/// No journal, for a bus whose devices end together with the program.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoJournal;
 
@@ -58,12 +58,12 @@ impl Journal for NoJournal {
     fn remove(&mut self, _: &TemporaryWrite) {}
 }
 
-/// What became of a temporary write that an earlier run left behind.
+/// The result of undoing a temporary write of an earlier run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Undone {
-    /// The object has its value of before again.
+    /// The object has its old value again.
     Restored,
-    /// The object holds another value than the one written: somebody changed it, or the device restarted.
+    /// The object holds another value than the one written: another program changed it, or the device restarted.
     ChangedSince,
     /// Another device has the node-ID now.
     OtherDevice,
@@ -86,7 +86,7 @@ impl TemporaryWrite {
         TemporaryWrite { node: node.id, identity, object, before: before.to_vec(), written: written.to_vec() }
     }
 
-    /// Undoes the write of an earlier run: only on the same device, and only if the object still holds what was written.
+    /// Undoes the write of an earlier run: only on the same device, and only if the object still has the written value.
     ///
     /// # Errors
     /// Bus errors and Ctrl-C.

@@ -45,7 +45,7 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// What to record, and how.
+/// The options of a recording.
 #[derive(Clone, Debug)]
 pub struct LogOptions {
     /// The nodes.

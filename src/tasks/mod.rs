@@ -1,4 +1,4 @@
-//! The procedures that users think in. They return reports and print nothing.
+//! The procedures of the commands. They return reports and print nothing.
 
 pub mod autozero;
 pub mod check;

@@ -1,4 +1,4 @@
-//! What a task reports besides its result: effects of a failure, notes and warnings.
+//! Reports of a task besides its result: effects of a failure, notes and warnings.
 //!
 //! These types contain no text for people. [`crate::output::notes`] turns them into text.
 
@@ -17,7 +17,7 @@ use crate::measure::layout::NarrowValue;
 use crate::measure::sample::Number;
 use crate::node::Node;
 
-/// What a task that failed had changed before, or what state it left behind.
+/// A change before a failure, or the state that a failed task left behind.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     /// The task had changed nothing.

@@ -13,7 +13,7 @@ use crate::tasks::{Failure, Note};
 ///
 /// # Errors
 /// The device does not restore on command, rejects the command or does not answer; settings without their defaults
-/// after the reset; bus errors and Ctrl-C. The effects say what was done before.
+/// after the reset; bus errors and Ctrl-C. The effects list the steps before.
 pub fn restore(master: &mut Master<'_>, device: &Node, group: Group, reset: bool) -> Result<StoreReport, Failure> {
     let node = device.id;
     check_capability(master, device, Verb::Restore, group)?;

@@ -96,7 +96,7 @@ pub fn encode(
     Ok((encoded?, data_type))
 }
 
-/// Finds out which form of a write the node accepts: reads its identity, if its description was not looked for yet.
+/// Reads the identity of a node that has no description yet. The description shows which form of a write it accepts.
 ///
 /// A node that does not answer this is no error. The form is then found out by the write itself.
 ///
@@ -121,7 +121,7 @@ pub fn clipping(master: &mut Master<'_>, node: &Node, written: ObjectId) -> Vec<
     found.iter().flat_map(|node| tasks::Note::may_clip(node.id, node.layout().narrow_values())).collect()
 }
 
-/// Writes bytes to an object, reads them back if `verify` says so, and compares. Returns how the write was confirmed.
+/// Writes bytes to an object, reads them back if `verify` is `true`, and compares. Returns how the write was confirmed.
 ///
 /// # Errors
 /// Those of [`write_with`]; an object that reads differently.

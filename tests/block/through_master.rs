@@ -129,8 +129,8 @@ fn read(bus: &mut dyn Bus, object: ObjectId, data_type: Option<DataType>, mode: 
     outcome
 }
 
-fn way(outcome: &Outcome) -> TransferKind {
-    outcome.as_ref().unwrap().way
+fn kind(outcome: &Outcome) -> TransferKind {
+    outcome.as_ref().unwrap().kind
 }
 
 fn bytes(outcome: Outcome) -> Vec<u8> {
@@ -159,16 +159,16 @@ fn each_size_is_transferred_in_each_mode() {
                     continue;
                 }
                 let in_blocks = mode == BlockMode::Always || mode == BlockMode::Auto && length > 28;
-                let way_in = match (in_blocks, block) {
+                let kind_in = match (in_blocks, block) {
                     (true, true) => TransferKind::Blocks,
                     (true, false) => TransferKind::PlainFallback,
                     (false, _) => TransferKind::Plain,
                 };
-                assert_eq!(way(&written), way_in, "write {length} {mode:?} {block}");
+                assert_eq!(kind(&written), kind_in, "write {length} {mode:?} {block}");
                 let found = read(&mut bus, DOMAIN, Some(DataType::Domain), mode);
                 // A device rejects block transfer before it checks the length.
-                let way_out = if mode == BlockMode::Auto && !block { TransferKind::PlainFallback } else { way_in };
-                assert_eq!(way(&found), way_out, "read {length} {mode:?} {block}");
+                let kind_out = if mode == BlockMode::Auto && !block { TransferKind::PlainFallback } else { kind_in };
+                assert_eq!(kind(&found), kind_out, "read {length} {mode:?} {block}");
                 assert_eq!(bytes(found), data);
             }
             // Text and unknown types are read in blocks only if they are large.
@@ -179,7 +179,7 @@ fn each_size_is_transferred_in_each_mode() {
                     _ if block => TransferKind::Blocks,
                     _ => TransferKind::PlainFallback,
                 };
-                assert_eq!(way(&found), expected, "read {length} {data_type:?} {block}");
+                assert_eq!(kind(&found), expected, "read {length} {data_type:?} {block}");
                 assert_eq!(bytes(found), data);
             }
         }
@@ -189,7 +189,7 @@ fn each_size_is_transferred_in_each_mode() {
 #[test]
 fn a_rejected_block_transfer_costs_two_frames() {
     let mut bus = bus(250_000, [device(5, false)]);
-    assert_eq!(way(&write(&mut bus, TEXT, &[b'x'; 29], BlockMode::Auto)), TransferKind::PlainFallback);
+    assert_eq!(kind(&write(&mut bus, TEXT, &[b'x'; 29], BlockMode::Auto)), TransferKind::PlainFallback);
     assert_eq!(bytes(read(&mut bus, TEXT, Some(DataType::Domain), BlockMode::Auto)), [b'x'; 29]);
     let frames = wire(&bus);
     assert_eq!(
@@ -237,9 +237,9 @@ fn an_abort_about_the_object_is_not_retried() {
 fn a_device_that_ignores_blocks_is_read_in_segments() {
     let mut bus = bus(250_000, [Deaf(device(5, true))]);
     let start = bus.now().mono;
-    assert_eq!(way(&write(&mut bus, TEXT, &[b'x'; 40], BlockMode::Auto)), TransferKind::PlainFallback);
+    assert_eq!(kind(&write(&mut bus, TEXT, &[b'x'; 40], BlockMode::Auto)), TransferKind::PlainFallback);
     let found = read(&mut bus, TEXT, Some(DataType::Domain), BlockMode::Auto);
-    assert_eq!(way(&found), TransferKind::PlainFallback);
+    assert_eq!(kind(&found), TransferKind::PlainFallback);
     assert_eq!(bytes(found), [b'x'; 40]);
     let waited = bus.now().mono.since(start);
     assert!(waited < Duration::from_millis(1_100), "one time-out each, not {waited:?}");
@@ -398,8 +398,8 @@ fn two_devices_are_transferred_in_parallel() {
 fn a_megabyte_is_transferred_in_both_directions() {
     let data = content(1 << 20);
     let mut bus = bus(1_000_000, [device(5, true)]);
-    assert_eq!(way(&write(&mut bus, DOMAIN, &data, BlockMode::Auto)), TransferKind::Blocks);
+    assert_eq!(kind(&write(&mut bus, DOMAIN, &data, BlockMode::Auto)), TransferKind::Blocks);
     let found = read(&mut bus, DOMAIN, None, BlockMode::Auto);
-    assert_eq!(way(&found), TransferKind::Blocks);
+    assert_eq!(kind(&found), TransferKind::Blocks);
     assert!(bytes(found) == data);
 }

@@ -86,7 +86,7 @@ fn unknown_signals_are_refused() {
     let bench = Bench::of("mh4@1,dps@127");
     bench
         .run("log 1,127 presure --sync 10ms")
-        .fails(2, "cangauge: no node has a signal \"presure\"\nhint: there are: pressure, temperature\n");
+        .fails(2, "cangauge: no node has a signal \"presure\"\nhint: the signals are: pressure, temperature\n");
     bench.run("log 127 pressure.status").fails(2, "cangauge: no node has a status object for pressure\n");
     bench
         .run("log 127 0x6132:1")

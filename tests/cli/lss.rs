@@ -247,10 +247,10 @@ fn wrong_arguments_are_rejected_before_the_bus_is_opened() {
     let bench = Bench::of(ALL);
     bench
         .run("lss set-id 0 12")
-        .refuses("\"0\" names no device (5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured)");
+        .refuses("\"0\" is not a device (5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured)");
     bench
         .run("lss set-id 1:2:3 12")
-        .refuses("\"1:2:3\" names no device (5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured)");
+        .refuses("\"1:2:3\" is not a device (5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured)");
     bench
         .run("lss set-id 1 12-14")
         .refuses("give one new node-ID; several are possible for the target \"unconfigured\" only");

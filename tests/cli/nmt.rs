@@ -109,7 +109,7 @@ fn absent_node_is_exit_3() {
     let done = bench.run("nmt start 9 --confirm").exit(3);
     assert_eq!(
         done.stderr,
-        "cangauge: node 9: command sent, but no heartbeat, no boot-up and no SDO answer came\n\
+        "cangauge: node 9: command sent, but no heartbeat, boot-up or SDO answer was received\n\
          hint: check its node-ID, power and cable; list the nodes that answer: cangauge scan\n"
     );
 }

@@ -234,9 +234,9 @@ fn wrong_requests_are_rejected_before_the_first_write() {
             format!("\"{wrong}\" is not a transmission type (acyclic, sync:1 to sync:240, event, timer, 0 to 255)");
         refuses(&format!("pdo map 1 1 --transmission {wrong}"), &message);
     }
-    refuses("pdo map 1 1 --event-timer 66s", "\"66s\" is not a number of milliseconds, 0 to 65535ms");
-    refuses("pdo map 1 1 --event-timer 1500us", "\"1500us\" is not a number of milliseconds, 0 to 65535ms");
-    refuses("pdo map 1 1 --inhibit 50us", "\"50us\" is not a multiple of 100us, 0 to 6553500us");
+    refuses("pdo map 1 1 --event-timer 66s", "\"66s\" is not a duration in whole milliseconds (0ms to 65535ms)");
+    refuses("pdo map 1 1 --event-timer 1500us", "\"1500us\" is not a duration in whole milliseconds (0ms to 65535ms)");
+    refuses("pdo map 1 1 --inhibit 50us", "\"50us\" is not a duration in steps of 100us (0us to 6553500us)");
     for restricted in ["0", "0x7f", "0x101", "0x180", "0x581", "0x601", "0x6e0", "0x701", "0x7ff"] {
         let done = bench.run(&format!("pdo map 1 1 --cob-id {restricted}")).exit(2);
         assert!(done.frames.is_empty() && done.stderr.contains("is not for PDOs"), "{restricted}: {}", done.stderr);

@@ -96,8 +96,8 @@ fn set(bus: &mut dyn Bus, number: u8, file: &str, options: &Options) -> Result<A
     let document = Document::parse(file).expect("TOML");
     let mut master = Master::new(bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
     let now = read(&mut master, node(number), &Overrides::new(), Some(&document))?;
-    let wishes = now.check(&document).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
-    apply(&mut master, now, &wishes, options, &Overrides::new(), &mut NoJournal)
+    let file = now.check(&document).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+    apply(&mut master, now, &file, options, &Overrides::new(), &mut NoJournal)
 }
 
 fn stored() -> Options {

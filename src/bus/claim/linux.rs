@@ -1,6 +1,6 @@
 //! Claims as Unix sockets in the abstract namespace.
 //!
-//! Two rules exclude each other's holders. A process that claims single nodes binds their names and then checks that
+//! Two rules keep processes apart. A process that claims single nodes binds their names and then checks that
 //! "every node" is free. A process that claims every node binds that name and then checks each node. If both
 //! meet, at least one sees the other; the one with single nodes releases them and waits.
 
@@ -24,12 +24,12 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(20);
 /// More nodes than this are claimed as every node. Each name takes a file descriptor.
 const MAX_SINGLE_NODES: usize = 16;
 
-/// What this process has claimed, until the value is dropped or the process ends.
+/// The claims of this process, until the value is dropped or the process ends.
 #[derive(Debug, Default)]
 pub struct Claims {
     #[cfg_attr(not(test), expect(dead_code, reason = "a name is held while its socket is open"))]
     listeners: Arc<[UnixListener]>,
-    /// Its end ends the thread.
+    /// The thread ends when this end is closed.
     stop: Option<UnixStream>,
     drain: Option<JoinHandle<()>>,
 }

@@ -35,7 +35,7 @@ pub(super) fn faults(frame: CanErrorFrame) -> Vec<Fault> {
             ErrorCause::Transceiver { .. } => add(Fault::Transceiver),
             ErrorCause::BusOff => add(Fault::BusOff),
             ErrorCause::Restarted => add(Fault::Restarted),
-            // This class only reports that there was an error. Others in the frame say which one.
+            // This class only reports an error. Other classes in the frame name the error.
             ErrorCause::BusError => {}
             _ => add(Fault::Other),
         }

@@ -38,7 +38,7 @@ use std::time::{Duration, Instant};
 const LINK_CHECK: Duration = Duration::from_millis(200);
 /// The first wait after a send, without reading the clock or checking for signals. An answer within this time costs one
 /// system call instead of four.
-const ANSWER: Duration = Duration::from_millis(10);
+const ANSWER_TIME: Duration = Duration::from_millis(10);
 
 /// A CAN interface of the Linux kernel.
 pub struct SocketCan {
@@ -50,21 +50,21 @@ pub struct SocketCan {
     clocks: Clocks,
     own_clock: OwnClock,
     /// The time of the last frame that was processed.
-    passed: Mono,
-    /// The socket was found empty: wait before the next read.
-    drained: bool,
-    /// A frame was sent since the last wait: an answer may come soon.
-    sent: bool,
+    last_frame_at: Mono,
+    /// Whether the socket was found empty: wait before the next read.
+    is_drained: bool,
+    /// Whether a frame was sent since the last wait: an answer may come soon.
+    has_sent: bool,
     /// The last reading of the clock.
-    looked: Cell<Mono>,
+    last_clock_reading: Cell<Mono>,
     /// Events to deliver before the rest of the batch.
     ready: VecDeque<Event>,
     /// Whether the interface is up, as last reported.
-    up: bool,
-    /// The interface was removed. Its socket is useless.
-    gone: bool,
+    is_up: bool,
+    /// Whether the interface was removed. Its socket is useless.
+    is_removed: bool,
     /// The kernel's count of lost frames at the last report.
-    lost: u32,
+    reported_drops: u32,
     /// The filters, for a new socket.
     filters: Filters,
     /// The identifiers to deliver, if they are too many for the kernel.
@@ -73,7 +73,7 @@ pub struct SocketCan {
     /// The bit rate, read once while the interface stays up: that takes some system calls.
     bit_rate: Cell<Option<Option<u32>>>,
     /// The interface before its bit rate was set.
-    before: Option<Link>,
+    original_link: Option<Link>,
 }
 
 impl SocketCan {
@@ -87,7 +87,7 @@ impl SocketCan {
         let mut bus = SocketCan::bound(name, &Filters::All)?;
         match bus.socket.as_raw_socket().take_error() {
             Ok(None) => {}
-            Ok(Some(error)) | Err(error) if error.raw_os_error() == Some(libc::ENETDOWN) => bus.up = false,
+            Ok(Some(error)) | Err(error) if error.raw_os_error() == Some(libc::ENETDOWN) => bus.is_up = false,
             Ok(Some(error)) | Err(error) => return Err(bus.error("open", error)),
         }
         Ok(bus)
@@ -106,7 +106,7 @@ impl SocketCan {
     fn bound(name: &str, filters: &Filters) -> Result<SocketCan, BusError> {
         let interrupts =
             Interrupts::new().map_err(|source| BusError::Io { what: "watch for signals".into(), source })?;
-        let Bound { socket, wanted, timestamps } = socket::bind(name, filters, ANSWER)?;
+        let Bound { socket, wanted, timestamps } = socket::bind(name, filters, ANSWER_TIME)?;
         Ok(SocketCan {
             name: name.to_owned(),
             socket,
@@ -115,19 +115,19 @@ impl SocketCan {
             batch: Batch::new(),
             clocks: Clocks::default(),
             own_clock: OwnClock::default(),
-            passed: Mono::START,
-            drained: false,
-            sent: false,
-            looked: Cell::new(Mono::START),
+            last_frame_at: Mono::START,
+            is_drained: false,
+            has_sent: false,
+            last_clock_reading: Cell::new(Mono::START),
             ready: VecDeque::new(),
-            up: true,
-            gone: false,
-            lost: 0,
+            is_up: true,
+            is_removed: false,
+            reported_drops: 0,
             filters: filters.clone(),
             wanted,
             timestamps,
             bit_rate: Cell::new(None),
-            before: None,
+            original_link: None,
         })
     }
 
@@ -143,16 +143,16 @@ impl SocketCan {
     }
 
     /// Queues [`Event::Link`] if the state differs from the last reported one.
-    fn link(&mut self, up: bool) {
-        if self.up != up {
-            self.up = up;
+    fn set_is_up(&mut self, is_up: bool) {
+        if self.is_up != is_up {
+            self.is_up = is_up;
             self.bit_rate.set(None);
-            self.ready.push_back(Event::Link(up));
+            self.ready.push_back(Event::Link(is_up));
         }
     }
 
-    /// Runs `work`, which may take the interface down and up without an [`Event::Link`]. When `work` calls its
-    /// argument, the frames received so far are discarded.
+    /// Runs `work`, which may set the interface down and up without an [`Event::Link`]. `work` calls its second
+    /// argument to discard the frames received so far.
     fn reset<T>(&mut self, work: impl FnOnce(&str, &mut dyn FnMut()) -> Result<T, BusError>) -> Result<T, BusError> {
         let (batch, ready, socket) = (&mut self.batch, &mut self.ready, self.socket.as_fd());
         let result = work(&self.name, &mut || {
@@ -161,37 +161,37 @@ impl SocketCan {
             while batch.fill(socket, false).is_ok() {}
             while batch.fill(socket, false).is_ok() {}
         });
-        // The interface may have gone down again, on the way back from an unsupported bit rate.
+        // If the bit rate is not supported, the interface may have gone down once more.
         let _ = self.socket.as_raw_socket().take_error();
-        self.drained = false;
+        self.is_drained = false;
         self.bit_rate.set(None);
-        self.up = interfaces::is_up(&self.name).unwrap_or(result.is_ok());
+        self.is_up = interfaces::is_up(&self.name).unwrap_or(result.is_ok());
         result
     }
 
     /// Reads the frames that the kernel holds for this socket.
-    /// With `wait`, it waits up to [`ANSWER`] for the first one.
+    /// With `wait`, it waits up to [`ANSWER_TIME`] for the first one.
     fn fill(&mut self, wait: bool) -> Result<(), BusError> {
         match self.batch.fill(self.socket.as_fd(), wait) {
             Ok(count) => {
-                self.drained = count < receive::BATCH;
+                self.is_drained = count < receive::BATCH;
                 if wait {
-                    // Usually not later than this. A frame that does not fit makes the clocks be compared.
-                    self.clocks.batch(self.looked.get() + ANSWER + ANSWER, false);
+                    // The frames are usually not later than this. If one is, the clocks are compared again.
+                    self.clocks.batch(self.last_clock_reading.get() + ANSWER_TIME + ANSWER_TIME, false);
                 } else {
-                    self.clocks.batch(self.mono(), self.drained);
+                    self.clocks.batch(self.mono(), self.is_drained);
                 }
                 Ok(())
             }
             Err(error) => match error.raw_os_error() {
                 Some(libc::EAGAIN) => {
-                    self.drained = true;
+                    self.is_drained = true;
                     Ok(())
                 }
                 Some(libc::EINTR) => Ok(()),
                 // The kernel reports this once. The socket stays bound and works again with the interface.
                 Some(libc::ENETDOWN) => {
-                    self.link(false);
+                    self.set_is_up(false);
                     Ok(())
                 }
                 Some(libc::ENODEV | libc::ENXIO) => {
@@ -203,12 +203,12 @@ impl SocketCan {
         }
     }
 
-    /// Waits for a frame, a signal or the deadline. Whether the deadline was reached without an event.
+    /// Waits for a frame, a signal or the deadline. Returns whether the deadline was reached without an event.
     fn wait(&mut self, deadline: Mono) -> Result<bool, BusError> {
         let left = deadline.since(self.mono());
-        let limit = if self.up { left } else { left.min(LINK_CHECK) };
+        let limit = if self.is_up { left } else { left.min(LINK_CHECK) };
         // A socket without an interface receives nothing.
-        let ready = if self.gone {
+        let ready = if self.is_removed {
             poll::readable([self.interrupts.fd()], limit).map(|[signal]| [false, signal])
         } else {
             poll::readable([self.socket.as_fd(), self.interrupts.fd()], limit)
@@ -218,23 +218,23 @@ impl SocketCan {
             self.interrupts.collect();
         }
         if frames {
-            self.drained = false;
-        } else if self.gone {
+            self.is_drained = false;
+        } else if self.is_removed {
             self.find_again()?;
         } else if self.is_back() {
-            self.link(true);
+            self.set_is_up(true);
         }
         Ok(!frames && !signal && self.ready.is_empty() && self.mono() >= deadline)
     }
 
     /// Whether the interface was down and is up again.
     fn is_back(&self) -> bool {
-        !self.up && !self.gone && interfaces::is_up(&self.name) == Some(true)
+        !self.is_up && !self.is_removed && interfaces::is_up(&self.name) == Some(true)
     }
 
     fn lose_interface(&mut self) {
-        self.gone = true;
-        self.link(false);
+        self.is_removed = true;
+        self.set_is_up(false);
     }
 
     /// Opens the interface again after it was removed, if one with its name exists: an adapter was unplugged and
@@ -243,7 +243,7 @@ impl SocketCan {
     /// # Errors
     /// The interface exists but cannot be opened.
     fn find_again(&mut self) -> Result<(), BusError> {
-        let bound = match socket::bind(&self.name, &self.filters, ANSWER) {
+        let bound = match socket::bind(&self.name, &self.filters, ANSWER_TIME) {
             Ok(bound) => bound,
             // Not ready yet: the interface is created, renamed and set up step by step.
             Err(BusError::NoInterface(_) | BusError::NotCan(_)) => return Ok(()),
@@ -254,14 +254,14 @@ impl SocketCan {
             self.ready.push_back(Event::Dropped(more));
         }
         (self.socket, self.wanted, self.timestamps) = (bound.socket, bound.wanted, bound.timestamps);
-        (self.gone, self.lost, self.drained) = (false, 0, false);
+        (self.is_removed, self.reported_drops, self.is_drained) = (false, 0, false);
         self.own_clock = OwnClock::default();
         // If the interface is down, that is the first error of the socket.
         match self.socket.as_raw_socket().take_error() {
-            Ok(None) => self.link(true),
+            Ok(None) => self.set_is_up(true),
             Ok(Some(error)) | Err(error) => match error.raw_os_error() {
                 Some(libc::ENETDOWN) => {}
-                Some(libc::ENODEV | libc::ENXIO) => self.gone = true,
+                Some(libc::ENODEV | libc::ENXIO) => self.is_removed = true,
                 _ => return Err(self.error("open", error)),
             },
         }
@@ -269,17 +269,17 @@ impl SocketCan {
     }
 
     /// Processes a message. Returns its frame if no other event comes first; otherwise all events are queued in order.
-    fn take_in(&mut self, message: Message) -> Option<Event> {
-        // A received frame shows earlier than the next check that the interface is up. But frames from before it went
-        // down arrive too.
+    fn process(&mut self, message: Message) -> Option<Event> {
+        // A received frame may show that the interface is up, earlier than the next check. Frames from before it went
+        // down arrive as well.
         if self.is_back() {
-            self.link(true);
+            self.set_is_up(true);
         }
         if let Some(lost) = message.lost {
             // The count at the time when this frame was queued. Later drops may already be reported.
-            let more = lost.wrapping_sub(self.lost);
+            let more = lost.wrapping_sub(self.reported_drops);
             if more > 0 && more <= u32::MAX / 2 {
-                self.lost = lost;
+                self.reported_drops = lost;
                 self.ready.push_back(Event::Dropped(more));
             }
         }
@@ -292,7 +292,7 @@ impl SocketCan {
             }
             None => self.own_clock.pass(at),
         }
-        self.passed = at.mono;
+        self.last_frame_at = at.mono;
         match CanFrame::from(message.frame) {
             CanFrame::Error(frame) => {
                 self.ready.extend(faults::faults(frame).into_iter().map(|fault| Event::Fault(fault, at)));
@@ -327,13 +327,13 @@ impl BitRateControl for SocketCan {
 
     fn set_bit_rate(&mut self, bit_rate: u32, mode: Mode) -> Result<(), BusError> {
         let now = setup::link(&self.name)?;
-        self.before.get_or_insert_with(|| now.clone());
+        self.original_link.get_or_insert_with(|| now.clone());
         self.reset(|name, while_down| setup::retime(name, &now, bit_rate, mode, while_down)).map(|_| ())
     }
 
     fn restore_bit_rate(&mut self) -> Result<(), BusError> {
-        match self.before.take() {
-            Some(before) => self.reset(|name, while_down| setup::put_back(name, &before, while_down)),
+        match self.original_link.take() {
+            Some(before) => self.reset(|name, while_down| setup::restore(name, &before, while_down)),
             None => Ok(()),
         }
     }
@@ -350,13 +350,13 @@ impl Bus for SocketCan {
 
     fn now(&self) -> Stamp {
         let now = now(self.opened);
-        self.looked.set(now.mono);
+        self.last_clock_reading.set(now.mono);
         now
     }
 
     fn mono(&self) -> Mono {
         let mono = Mono::at(self.opened.elapsed());
-        self.looked.set(mono);
+        self.last_clock_reading.set(mono);
         mono
     }
 
@@ -373,17 +373,17 @@ impl Bus for SocketCan {
 
     fn late_drops(&mut self) -> u32 {
         let Some(lost) = socket::lost(&self.socket) else { return 0 };
-        let more = lost.wrapping_sub(self.lost);
-        self.lost = lost;
+        let more = lost.wrapping_sub(self.reported_drops);
+        self.reported_drops = lost;
         more
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        self.sent = true;
+        self.has_sent = true;
         self.socket.write_frame(&to_kernel(frame)).map_err(|error| {
             // The kernel reports this once, to the first call.
             match error.raw_os_error() {
-                Some(libc::ENETDOWN) => self.link(false),
+                Some(libc::ENETDOWN) => self.set_is_up(false),
                 Some(libc::ENODEV | libc::ENXIO) => self.lose_interface(),
                 _ => {}
             }
@@ -392,7 +392,7 @@ impl Bus for SocketCan {
     }
 
     fn receive(&mut self, deadline: Mono) -> Result<Event, BusError> {
-        let mut unwanted = false;
+        let mut has_discarded = false;
         loop {
             if self.interrupts.take() {
                 return Ok(Event::Interrupted);
@@ -401,16 +401,19 @@ impl Bus for SocketCan {
                 return Ok(event);
             }
             if let Some(message) = self.batch.next() {
-                match self.take_in(message) {
+                match self.process(message) {
                     Some(event) => return Ok(event),
-                    None => unwanted = true,
+                    None => has_discarded = true,
                 }
-            } else if unwanted && self.passed > deadline {
+            } else if has_discarded && self.last_frame_at > deadline {
                 // Discarded frames must not delay the deadline.
                 return Ok(Event::Timeout);
-            } else if !self.drained {
+            } else if !self.is_drained {
                 self.fill(false)?;
-            } else if std::mem::take(&mut self.sent) && self.up && deadline.since(self.looked.get()) > ANSWER * 3 {
+            } else if std::mem::take(&mut self.has_sent)
+                && self.is_up
+                && deadline.since(self.last_clock_reading.get()) > ANSWER_TIME * 3
+            {
                 self.fill(true)?;
             } else if self.wait(deadline)? {
                 return Ok(Event::Timeout);

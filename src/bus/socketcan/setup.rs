@@ -80,7 +80,7 @@ pub(super) fn can_set_bit_rate(name: &str) -> Result<(), BusError> {
 /// Sets bit rate and mode of an interface and switches it on. `while_down` is called while it is down.
 ///
 /// # Errors
-/// The kernel rejects the change. The interface is then restored, or the error says that it is not.
+/// The kernel rejects the change. The interface is then restored, or the error reports that it is not.
 pub(super) fn retime(
     name: &str,
     before: &Link,
@@ -104,9 +104,9 @@ pub(super) fn retime(
         netlink::configure(before, BitTiming::of_rate(bit_rate), listen_only)
             .map_err(|refusal| explain(refusal, &doing, name, bit_rate, listens))?;
         let now = switch(name, before, true)?;
-        let made = now.bit_rate().unwrap_or(0);
-        if !is_near(made, bit_rate) {
-            let why = format!("the nearest possible is {made} bit/s");
+        let actual = now.bit_rate().unwrap_or(0);
+        if !is_near(actual, bit_rate) {
+            let why = format!("the nearest possible is {actual} bit/s");
             return Err(BusError::BitRate { name: name.to_owned(), bit_rate, why });
         }
         if listens_only(&now) != listens {
@@ -114,9 +114,9 @@ pub(super) fn retime(
         }
         Ok(now)
     };
-    work(while_down).map_err(|error| match put_back(name, before, &mut || ()) {
+    work(while_down).map_err(|error| match restore(name, before, &mut || ()) {
         Ok(()) => error,
-        Err(worse) => not_put_back(error, &worse),
+        Err(worse) => not_restored(error, &worse),
     })
 }
 
@@ -124,7 +124,7 @@ pub(super) fn retime(
 ///
 /// # Errors
 /// The kernel rejects the change; the error describes the present state.
-pub(super) fn put_back(name: &str, before: &Link, while_down: &mut dyn FnMut()) -> Result<(), BusError> {
+pub(super) fn restore(name: &str, before: &Link, while_down: &mut dyn FnMut()) -> Result<(), BusError> {
     let mut now = link(name)?;
     let timing = before.bit_timing.or(now.bit_timing);
     let differs = now.bit_timing != timing || now.listen_only != before.listen_only;
@@ -160,8 +160,8 @@ fn switch(name: &str, link: &Link, up: bool) -> Result<Link, BusError> {
 }
 
 /// Whether an actual bit rate is close enough to the requested one.
-fn is_near(made: u32, bit_rate: u32) -> bool {
-    u64::from(made.abs_diff(bit_rate)) * 1000 <= u64::from(bit_rate) * TOLERANCE
+fn is_near(actual: u32, bit_rate: u32) -> bool {
+    u64::from(actual.abs_diff(bit_rate)) * 1000 <= u64::from(bit_rate) * TOLERANCE
 }
 
 fn is_possible(name: &str, link: &Link, bit_rate: u32) -> Result<(), BusError> {
@@ -172,7 +172,7 @@ fn is_possible(name: &str, link: &Link, bit_rate: u32) -> Result<(), BusError> {
             format!("it has {}", rates.join(", "))
         }
         _ => match link.rate_max {
-            Some(most) if bit_rate > most => format!("its highest is {most} bit/s"),
+            Some(highest) if bit_rate > highest => format!("its highest is {highest} bit/s"),
             _ => return Ok(()),
         },
     };
@@ -215,7 +215,7 @@ fn explain(refusal: Refusal, doing: &str, name: &str, bit_rate: u32, listens: bo
 }
 
 /// Combines an error with a second one that occurred while restoring.
-fn not_put_back(error: BusError, worse: &BusError) -> BusError {
+fn not_restored(error: BusError, worse: &BusError) -> BusError {
     let what = format!("{error}; the former state could not be restored");
     BusError::Io { what, source: std::io::Error::other(worse.to_string()) }
 }

@@ -113,7 +113,7 @@ fn read_memory_info(socket: BorrowedFd<'_>) -> io::Result<Vec<u32>> {
     const SO_MEMINFO: libc::c_int = 55;
     let mut numbers = [0u32; 16];
     let mut length = libc::socklen_t::try_from(size_of_val(&numbers)).unwrap_or(0);
-    // SAFETY: `numbers` is as long as `length` says and outlives the call, every pattern of bits is a u32, and the
+    // SAFETY: `numbers` has the length `length` and outlives the call, every pattern of bits is a u32, and the
     // descriptor is borrowed and so is open.
     let result = unsafe {
         libc::getsockopt(socket.as_raw_fd(), libc::SOL_SOCKET, SO_MEMINFO, numbers.as_mut_ptr().cast(), &raw mut length)

@@ -26,7 +26,7 @@ const RESTARTS: u8 = 3;
 /// A number that no step asks for. No slave that follows the protocol answers it.
 const UNUSED_NUMBER: u32 = u32::MAX;
 
-/// What a step waits for.
+/// The answer that a step waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wait {
     /// Any slave: the longest time-out. It measures how fast the slaves answer.
@@ -44,7 +44,7 @@ pub enum Wait {
 pub struct Step {
     /// The request to send.
     pub request: Request,
-    /// What to wait for.
+    /// The answer to wait for.
     pub wait: Wait,
     /// Whether to wait until the time-out even after an answer.
     pub until_timeout: bool,
@@ -145,7 +145,7 @@ impl Fastscan {
         super::Answer::parse(frame, super::Service::Fastscan).is_some()
     }
 
-    /// The present step: what to send and what to wait for.
+    /// The present step: the frame to send and the answer to wait for.
     pub fn step(&self) -> Step {
         let ask = |number, bit_check, sub, next| Request::Fastscan { number, bit_check, sub, next };
         let (request, wait) = match self.phase {
@@ -220,7 +220,7 @@ impl Fastscan {
         Progress::Continue
     }
 
-    /// No slave has the bits found so far, from `bit` upwards: finds them again.
+    /// Finds the bits from `bit` upwards again, because no slave has the bits found so far.
     fn on_failed_check(&mut self, bit: u8) -> Progress {
         self.tries += 1;
         if self.tries >= TRIES {

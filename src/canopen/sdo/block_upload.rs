@@ -212,7 +212,7 @@ impl BlockUpload {
             self.missing = 7 - part.len();
             self.bytes.extend_from_slice(part);
             self.bytes.extend(std::iter::repeat_n(0, self.missing));
-            // The end frame tells how many bytes of the last segment are valid.
+            // The end frame states how many bytes of the last segment are valid.
             if self.bytes.len() > self.limit.saturating_add(6) {
                 return self.fail(Violation::TooLong, frame, out);
             }
@@ -279,7 +279,7 @@ impl BlockUpload {
         self.send(0xa1, 0, 0, out);
         let mut bytes = std::mem::take(&mut self.bytes);
         bytes.truncate(length);
-        Progress::Done(Uploaded { announced: self.announced, misnamed_end: misnamed, ..Uploaded::complete(bytes) })
+        Progress::Done(Uploaded { announced: self.announced, has_wrong_end: misnamed, ..Uploaded::complete(bytes) })
     }
 
     /// Whether an end frame wrongly declares the whole last segment invalid: the announced size and the CRC

@@ -45,7 +45,7 @@ pub enum Note {
     /// A segment before the last one was not full, twice in the same way.
     ShortSegment,
     /// The end frame of a block transfer declares the last segment invalid; size and CRC include it.
-    MisnamedEnd,
+    WrongEnd,
 }
 
 impl fmt::Display for Note {
@@ -58,7 +58,7 @@ impl fmt::Display for Note {
                 write!(f, "the device announced {announced} bytes and delivered {found}")
             }
             Note::ShortSegment => f.write_str("the device sent a segment in the middle that is not full"),
-            Note::MisnamedEnd => {
+            Note::WrongEnd => {
                 f.write_str("the device calls the last 7 bytes unused; they are kept, since size and CRC include them")
             }
         }
@@ -96,7 +96,7 @@ pub fn fit(data_type: Option<DataType>, uploaded: &Uploaded) -> Result<Fitted, F
     let odd = uploaded.announced.filter(|&size| usize::try_from(size) != Ok(found));
     let odd = odd.map(|announced| Note::Announced { announced, found });
     let odd = odd.or(uploaded.has_short_segment.then_some(Note::ShortSegment));
-    let odd = odd.or(uploaded.misnamed_end.then_some(Note::MisnamedEnd));
+    let odd = odd.or(uploaded.has_wrong_end.then_some(Note::WrongEnd));
     let suffices = |data_type: DataType| data_type.width().is_some_and(|width| width <= found);
     if let Some(frame) = uploaded.truncated.filter(|_| !data_type.is_some_and(suffices)) {
         return Err(FitError::Truncated(frame));
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn only_integers_may_be_narrower_than_their_type() {
-        // MH-4, 9130h: the table says INTEGER16, text and mapping INTEGER32.
+        // MH-4, 9130h: INTEGER16 in the table, INTEGER32 in the text and the mapping.
         let note = Some(Note::Narrower { expected: 4, found: 2 });
         assert_eq!(text(DataType::Integer(4), &uploaded(&[0xfe, 0xff], true)), Ok(("-2".into(), note)));
         assert!(text(DataType::Real32, &uploaded(&[0, 0], true)).is_err());

@@ -22,7 +22,7 @@ pub struct Uploaded {
     /// The expedited answer, if it has fewer bytes than it declares. The missing bytes are never filled.
     pub truncated: Option<Frame>,
     /// Whether the end frame of a block transfer declared a segment invalid that size and CRC include. It is kept.
-    pub misnamed_end: bool,
+    pub has_wrong_end: bool,
 }
 
 impl Uploaded {
@@ -34,7 +34,7 @@ impl Uploaded {
             announced: None,
             has_short_segment: false,
             truncated: None,
-            misnamed_end: false,
+            has_wrong_end: false,
         }
     }
 

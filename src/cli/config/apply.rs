@@ -18,7 +18,9 @@ use crate::output::config_record::ConfigRecord;
 use crate::output::failure::ErrorMessage;
 use crate::output::notes;
 use crate::tasks::config::diff::check_offline;
-use crate::tasks::config::{Applied, ConfigFailure, Line, Options, Sections, Snapshot, Wishes, apply, lines, read};
+use crate::tasks::config::{
+    Applied, ConfigFailure, FileSettings, Line, Options, Sections, Snapshot, apply, lines, read,
+};
 use crate::tasks::{Failure, Kind, Note};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -58,11 +60,11 @@ pub(super) struct Apply {
     /// Restore the settings from before the last apply that failed or was killed
     #[arg(long, conflicts_with_all = ["exact", "address", "with_calibration"])]
     rollback: bool,
-    /// Set many devices, one row each: vendor, product, serial, node (with --address), and columns that fill in
+    /// Set many devices, one row each: vendor, product, serial, node (with --address), and a column for each
     /// "{column}" in the file. A device that is not in the table is not changed
     #[arg(long, value_name = "FILE.csv", conflicts_with = "rollback")]
     table: Option<PathBuf>,
-    /// Write a record: when, which devices, before, after, how it was verified; HTML if the name ends with .html, else
+    /// Write a record with time, devices, old and new values and verification; HTML if the name ends with .html, else
     /// JSON
     #[arg(long, value_name = "FILE", conflicts_with = "dry_run")]
     record: Option<PathBuf>,
@@ -80,7 +82,7 @@ struct Job {
 /// The results, and the failures of each device.
 type Results = (Vec<Outcome>, Failures);
 
-/// Checks what a file says against the description of the device that it names. Needs no bus.
+/// Checks a file against the description of the device that it names. Needs no bus.
 fn check_before(document: &Document, file: &str) -> anyhow::Result<()> {
     match described(document) {
         Some(node) => check_offline(document, &node).map_err(|found| mistakes(file, found)),
@@ -88,7 +90,7 @@ fn check_before(document: &Document, file: &str) -> anyhow::Result<()> {
     }
 }
 
-/// What was done with one node.
+/// The result for one node.
 enum Outcome {
     Applied(Box<Applied>),
     Lines(Vec<Line>, Vec<Note>),
@@ -263,15 +265,15 @@ impl Apply {
                 (file, document)
             }
         };
-        let wishes: Result<Wishes, _> = snapshot.check(&document);
-        let wishes = wishes.map_err(|found| ConfigFailure::of_mistakes(&file, Some(node), found))?;
+        let settings: Result<FileSettings, _> = snapshot.check(&document);
+        let settings = settings.map_err(|found| ConfigFailure::of_mistakes(&file, Some(node), found))?;
         let options = self.options();
         if self.dry_run {
-            crate::tasks::config::check_device(&wishes, &snapshot, self.with_calibration).map_err(one)?;
-            let (lines, notes) = lines(&wishes, &snapshot, &options);
+            crate::tasks::config::check_device(&settings, &snapshot, self.with_calibration).map_err(one)?;
+            let (lines, notes) = lines(&settings, &snapshot, &options);
             return Ok(Outcome::Lines(lines, notes));
         }
-        let applied = apply(master, snapshot, &wishes, &options, overrides, &mut journal).map_err(one)?;
+        let applied = apply(master, snapshot, &settings, &options, overrides, &mut journal).map_err(one)?;
         Ok(Outcome::Applied(Box::new(applied)))
     }
 

@@ -33,7 +33,7 @@ pub(super) struct Diff {
     with_calibration: bool,
 }
 
-/// What is compared.
+/// One side of the comparison.
 enum Side<'a> {
     Node(NodeId),
     File(&'a str),
@@ -92,8 +92,8 @@ impl Diff {
         let overrides = descriptions::overrides(global, &[node])?;
         let compare = |master: &mut Master<'_>, overrides: &Overrides| {
             let snapshot = read(master, node, overrides, Some(&document))?;
-            let wishes = snapshot.check(&document).map_err(|found| mistakes(file, found))?;
-            Ok(with_file(&snapshot, &wishes, sections))
+            let settings = snapshot.check(&document).map_err(|found| mistakes(file, found))?;
+            Ok(with_file(&snapshot, &settings, sections))
         };
         global.with_master(|master| compare(master, &overrides))
     }

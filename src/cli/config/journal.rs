@@ -1,4 +1,4 @@
-//! The journal: what a device held before a change, until the change is complete.
+//! The journal: the old settings of a device, until the change is complete.
 //!
 //! One file for each device, named after the bus and the identity. It is written and synced before the first write, kept
 //! if the change fails or the program is killed, and removed after success.
@@ -15,12 +15,12 @@ use std::path::PathBuf;
 fn file(bus: &str, snapshot: &Snapshot) -> Option<PathBuf> {
     let identity = &snapshot.node.identity;
     let code = |number: Option<u32>| number.map_or_else(|| "-".to_owned(), |number| format!("{number:X}"));
-    let specimen = match identity.serial.filter(|serial| *serial != 0) {
+    let device = match identity.serial.filter(|serial| *serial != 0) {
         Some(serial) => serial.to_string(),
         None => format!("node{}", snapshot.node.id),
     };
     let bus: String = bus.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
-    let name = format!("{bus}_{}_{}_{specimen}.toml", code(identity.vendor), code(identity.product));
+    let name = format!("{bus}_{}_{}_{device}.toml", code(identity.vendor), code(identity.product));
     Some(folder()?.join(name))
 }
 
@@ -44,7 +44,7 @@ impl Journal for FileJournal<'_> {
                 .note("no journal: neither XDG_STATE_HOME nor HOME is set; --rollback is not possible");
             return Ok(());
         };
-        // A change that was not completed before: what the device held before that one counts.
+        // An earlier change was not completed: the settings before that change are kept.
         if path.exists() {
             return Ok(());
         }
@@ -59,13 +59,13 @@ impl Journal for FileJournal<'_> {
 
     fn finish(&mut self) {
         if let Some(path) = &self.path {
-            // A file that remains is older than the settings: --rollback says so, as its values differ.
+            // A remaining file is older than the settings. --rollback reports it, because the values differ.
             let _ = fs::remove_file(path);
         }
     }
 }
 
-/// What a device held before a change that was not completed: the name of the file, and its text.
+/// The old settings of a device whose change was not completed: the name of the file, and its text.
 ///
 /// # Errors
 /// [`ConfigFailure::NoJournal`].

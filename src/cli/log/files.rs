@@ -147,7 +147,7 @@ pub(super) struct OpenFiles {
     setup: Setup,
     /// How many bytes of the existing file are kept.
     keep: u64,
-    /// What the existing file of events contains.
+    /// The contents of the existing file of events.
     existing_events: Option<ExistingLines>,
     /// How long opening waited for readers of FIFOs.
     pub(super) waited: Duration,

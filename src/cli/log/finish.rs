@@ -1,4 +1,4 @@
-//! The end of `cangauge log`: what is still to be written, the summary, and the exit code.
+//! The end of `cangauge log`: the remaining rows, the summary, and the exit code.
 
 use super::super::exit::{Several, open_stdout, stdout};
 use super::super::file::OutFile;

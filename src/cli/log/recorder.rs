@@ -18,7 +18,7 @@ use std::time::Duration;
 /// How often lost rows and changed columns are looked for.
 const CHECK_INTERVAL: Duration = Duration::from_millis(100);
 
-/// What could not be written.
+/// Rows that could not be written.
 #[derive(Debug)]
 pub(super) enum Unwritten {
     Rows(io::Error),
@@ -100,7 +100,7 @@ impl Recorder {
         self.proceed(result)
     }
 
-    /// What other programs did to the files since the last call, as text.
+    /// Changes of the files by other programs since the last call, as text.
     pub(super) fn take_changes(&mut self) -> Vec<String> {
         let mut changes = self.rows.take_changes();
         changes.extend(self.events.as_mut().map(Events::take_changes).unwrap_or_default());

@@ -174,7 +174,7 @@ impl Options {
     fn run(&self, global: &Global, target: &Target, all: &[Values]) -> anyhow::Result<()> {
         let named = NamedDescriptions::new(global)?;
         let (descriptions, via) = (named.get(), Via::from(self.via));
-        // What the user says about the device is enough to reject values before the bus is opened.
+        // The user's own options are enough to reject values before the bus is opened.
         let model = match target {
             Target::Node(node) => descriptions.overrides.get(node),
             _ => descriptions.given,
@@ -210,7 +210,7 @@ impl Options {
     }
 }
 
-/// Prints the result, and on stderr what confirmed it and what remains to be done.
+/// Prints the result, and on stderr its evidence and the remaining steps.
 fn report(
     global: &Global,
     report: &AssignReport,

@@ -1,4 +1,4 @@
-//! Checks what the parts of a description state about each other.
+//! Checks the references between the parts of a description.
 
 use super::table::Table;
 use super::*;
@@ -277,7 +277,7 @@ fn assign(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>)
         let places = [("node_id", entry.node_id), ("bit_rate", entry.bit_rate)];
         let places = places.into_iter().filter_map(|(key, place)| Some((key, place?)));
         let has_place = entry.node_id.is_some() || entry.bit_rate.is_some();
-        if has_place == (entry.way == AssignKind::Lss) {
+        if has_place == (entry.kind == AssignKind::Lss) {
             table.mistake("way", "way: \"objects\" needs node_id or bit_rate, and \"lss\" has neither");
         }
         // Objects that only other documents mention are marked as unverified and may be missing.

@@ -15,7 +15,7 @@ pub fn read(text: &str) -> Result<Description, Vec<DescriptionError>> {
     read_with_notes(text).0
 }
 
-/// Reads a description. Also returns what may be a mistake, although the description can be used, in the order of the
+/// Reads a description. Also returns possible mistakes that do not prevent its use, in the order of the
 /// lines.
 pub fn read_with_notes(text: &str) -> (Result<Description, Vec<DescriptionError>>, Vec<DescriptionError>) {
     let source = Source::new(text);
@@ -34,7 +34,7 @@ pub fn read_with_notes(text: &str) -> (Result<Description, Vec<DescriptionError>
     (result, notes)
 }
 
-/// Reads every table of the file, then checks what they state about each other.
+/// Reads every table of the file, then checks their references to each other.
 fn description<'t>(file: &mut Table<'t>) -> Option<Description> {
     let (name, title, vendor) = (file.required("name"), file.required("title"), file.required("vendor"));
     let (source, unconfirmed) = (file.or_default("source"), file.or_default("unconfirmed"));
@@ -141,7 +141,7 @@ fn pdo(table: &mut Table<'_>) -> PdoStyle {
 }
 
 fn assign_entry(table: &mut Table<'_>) -> Option<AssignEntry> {
-    let way = table.required("way");
+    let kind = table.required("way");
     let (state, retry_stopped) = (table.optional("state"), table.or_default("retry_stopped"));
     let node_id = table.table("node_id").map(|mut place| assign_place(&mut place));
     let bit_rate = table.table("bit_rate").map(|mut place| assign_place(&mut place));
@@ -150,7 +150,7 @@ fn assign_entry(table: &mut Table<'_>) -> Option<AssignEntry> {
     let (page, doubt) = (table.or_default("page"), table.or_default("doubt"));
     table.finish();
     let (node_id, bit_rate) = (node_id.flatten(), bit_rate.flatten());
-    Some(AssignEntry { way: way?, state, retry_stopped, node_id, bit_rate, store, applies, unverified, page, doubt })
+    Some(AssignEntry { kind: kind?, state, retry_stopped, node_id, bit_rate, store, applies, unverified, page, doubt })
 }
 
 fn assign_place(table: &mut Table<'_>) -> Option<AssignObject> {

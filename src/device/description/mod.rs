@@ -100,7 +100,7 @@ pub struct Startup {
     pub wait: u32,
     /// Its value if the device starts by itself.
     pub auto: u32,
-    /// What the manual contradicts or leaves open.
+    /// Contradictions and gaps in the manual.
     pub doubt: String,
 }
 
@@ -229,7 +229,7 @@ pub enum SizeIndication {
 /// How PDOs are configured.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PdoStyle {
-    /// What has to be done before the mapping can be changed.
+    /// The step before the mapping can be changed.
     pub remap: Remap,
     /// The transmission type that uses the event timer, 254 or 255; `None` means that both use it.
     pub timer: Option<u8>,
@@ -242,7 +242,7 @@ impl PdoStyle {
     }
 }
 
-/// What has to be done before a mapping can be changed.
+/// The step before a mapping can be changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Remap {
     /// CiA 301: set bit 31 of the COB-ID, then the number of entries to 0.

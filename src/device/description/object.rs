@@ -43,11 +43,11 @@ pub struct ObjectEntry {
     pub unit_at: Option<ObjectId>,
     /// The group of 1010h that stores it; `None` if 1010h does not.
     pub stored: Option<StoreGroup>,
-    /// What it is and does, in one or two sentences.
+    /// Its meaning, in one or two sentences.
     pub text: String,
     /// Page or table of the manual.
     pub page: String,
-    /// What the manual contradicts or leaves open.
+    /// Contradictions and gaps in the manual.
     pub doubt: String,
 }
 
@@ -151,7 +151,7 @@ impl Access {
     }
 }
 
-/// What must be written to an object before it acts.
+/// The signature that an object requires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Signature {
     /// "save": stores parameters (CiA 301, 1010h).

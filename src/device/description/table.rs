@@ -200,7 +200,7 @@ fn kind(value: &DeValue<'_>) -> &'static str {
     }
 }
 
-/// A type that one TOML value can be read as. The error says why the value does not fit.
+/// A type that one TOML value can be read as. The error states why the value does not fit.
 pub(super) trait FromToml: Sized {
     fn from_toml(value: &DeValue<'_>) -> Result<Self, String>;
 }

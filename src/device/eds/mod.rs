@@ -148,7 +148,7 @@ pub fn read(bytes: &[u8]) -> Result<Eds, EdsError> {
     if objects.described.is_empty() {
         return Err(EdsError {
             line: ini.lines,
-            reason: "the file ends, and no section such as [1000] describes an object".to_owned(),
+            reason: "the file has no object: a section such as [1000] is missing".to_owned(),
         });
     }
     warnings.sort_by_key(|warning| warning.line);
@@ -181,7 +181,7 @@ fn no_section(text: &str) -> EdsError {
         Some((line, content)) if content.trim_start().starts_with('<') => {
             (line, "this is XML, perhaps an XDD or XDC file; expected an EDS or DCF file")
         }
-        Some((line, _)) => (line, "no section such as [DeviceInfo] follows: not an EDS or DCF file"),
+        Some((line, _)) => (line, "this is not an EDS or DCF file: it has no section such as [DeviceInfo]"),
     };
     EdsError { line, reason: reason.to_owned() }
 }

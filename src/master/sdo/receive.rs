@@ -1,7 +1,7 @@
-//! What a received frame does to the transfer of its node.
+//! Handles a received frame in the transfer of its node.
 
 use super::super::Timing;
-use super::super::active::Verdict;
+use super::super::active::LengthCheck;
 use super::super::request::{Answer, Operation, SdoError, SdoFailure};
 use super::super::send::Outgoing;
 use super::super::transfer::Blocks;
@@ -14,7 +14,7 @@ use std::time::Duration;
 /// The inaccuracy when a send time is compared with a receive time.
 const CLOCK_TOLERANCE: Duration = Duration::from_millis(5);
 
-/// What a frame of a transfer leads to.
+/// The effect of a frame on its transfer.
 enum Step {
     /// The transfer goes on.
     Continued,
@@ -26,7 +26,7 @@ enum Step {
     Ended(Result<Answer, SdoError>),
 }
 
-/// What the steps of a transfer depend on.
+/// The context of the steps of a transfer.
 struct Context<'a> {
     /// [`crate::device::quirk::Quirk::UploadAnswered60`].
     accept_60: bool,
@@ -170,13 +170,13 @@ impl Active {
                 }
                 Step::Ended(Err(self.error(self.disturbance())))
             }
-            Progress::Done(uploaded) => match self.judge(uploaded.as_ref(), context.accept_60) {
-                Verdict::Accepted => Step::Ended(Ok(Answer { uploaded, at: received.at, way: self.way() })),
-                Verdict::Again => {
+            Progress::Done(uploaded) => match self.check_length(uploaded.as_ref(), context.accept_60) {
+                LengthCheck::Accepted => Step::Ended(Ok(Answer { uploaded, at: received.at, kind: self.kind() })),
+                LengthCheck::Again => {
                     out.push(self.machine.request());
                     Step::Continued
                 }
-                Verdict::WrongLength => {
+                LengthCheck::WrongLength => {
                     let (announced, delivered) = uploaded.map_or((None, 0), |read| (read.announced, read.bytes.len()));
                     let frame = received.frame;
                     Step::Ended(Err(self.error(SdoFailure::WrongLength { announced, delivered, frame })))

@@ -152,7 +152,7 @@ fn shared_cob_id_yields_no_samples() {
     decoder.add(other.layout(), &[]);
     let received = Received { frame: "181#0000803F".parse().expect("a frame"), at: Stamp::default() };
     let mut samples = Vec::new();
-    assert!(matches!(decoder.decode(&received, &mut samples), Decoded::Held(_)) && samples.is_empty());
+    assert!(matches!(decoder.decode(&received, &mut samples), Decoded::Paused(_)) && samples.is_empty());
     assert_eq!(decoder.take_shared_cob_ids().into_values().collect::<Vec<_>>(), [(one.id, other.id)]);
 }
 

@@ -146,7 +146,7 @@ pub struct Input {
     pub node: NodeId,
     /// The name as in [`Source`].
     pub name: String,
-    /// What to measure.
+    /// The quantity to measure.
     pub what: Wanted,
     /// The unit, if known.
     pub unit: Option<Unit>,

@@ -67,7 +67,7 @@ impl InputGroup {
     }
 }
 
-/// What is evaluated for a group of inputs.
+/// The evaluation of a group of inputs.
 #[derive(Clone, Copy, Debug)]
 enum Purpose {
     /// A rule for each sample.

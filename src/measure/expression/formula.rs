@@ -25,7 +25,7 @@ pub(super) enum Formula {
     Negative(Box<Formula>),
     Absolute(Box<Formula>),
     Arithmetic(Box<Formula>, Operator, Box<Formula>),
-    /// Converts from one unit to another. The number says how many times the value contains the offset of its scale.
+    /// Converts from one unit to another. The number is how many times the value contains the offset of its scale.
     Converted(Box<Formula>, Unit, Unit, f64),
 }
 
@@ -79,7 +79,7 @@ impl Formula {
 /// A condition whose signals and units are known.
 #[derive(Clone, Debug)]
 pub(super) enum Rule {
-    /// A comparison. The flag says that both sides are exact: neither calculated nor converted.
+    /// A comparison. The flag is `true` if both sides are exact: neither calculated nor converted.
     Compare(Formula, Relation, Formula, bool),
     /// A range. Both ends belong to it.
     Within(Formula, Formula, Formula, bool),

@@ -1,6 +1,6 @@
 //! Measuring ranges, and overloads that only the error register reports.
 
-use super::{Ask, U8, small};
+use super::{Ask, U8, unsigned};
 use crate::canopen::object::ObjectId;
 use crate::canopen::value::{DataType, Value};
 use crate::master::{Error, Master};
@@ -92,7 +92,7 @@ pub(super) fn read_overloads<A: Ask>(master: &mut A, nodes: &mut [Node]) -> Resu
         nodes.iter().enumerate().filter_map(|(at, node)| Some((at, node.overload_register()?))).collect();
     let items: Vec<Item> = wanted.iter().map(|&(at, _)| (nodes[at].id, Node::ERROR_REGISTER, U8)).collect();
     for (&(at, mask), register) in wanted.iter().zip(read_optional(master, &items)?) {
-        nodes[at].has_overload = small::<u8>(register.as_ref()).is_some_and(|bits| bits & mask == mask);
+        nodes[at].has_overload = unsigned::<u8>(register.as_ref()).is_some_and(|bits| bits & mask == mask);
     }
     Ok(())
 }

@@ -122,7 +122,7 @@ fn buffer_text(buffer: ReceiveBuffer) -> String {
     format!("the receive buffer has {bytes} bytes")
 }
 
-/// The command with which the kernel allows the wanted receive buffer. It doubles what is asked for.
+/// The command with which the kernel allows the wanted receive buffer. It doubles the requested size.
 fn allow_larger(buffer: ReceiveBuffer) -> String {
     format!("sudo sysctl net.core.rmem_max={}", buffer.wanted / 2)
 }

@@ -114,7 +114,7 @@ pub(super) fn sdo(error: &SdoError) -> Words {
         )),
         SdoFailure::Disturbed => words.hint("stop the other program for a moment, or try again"),
         SdoFailure::Violation(Violation::WriteAcknowledgeToRead, _) => words.hint(format!(
-            "if the device answers every read in this way, read its device type before: cangauge sdo read {} 0x1000 {}",
+            "if it answers every read with 60h, read its device type first: cangauge sdo read {} 0x1000 {}",
             error.node, error.object
         )),
         SdoFailure::Violation(Violation::Crc, _) => words.hint("read it without blocks: add --block never"),
@@ -136,7 +136,7 @@ pub fn second_answer(node: NodeId, answers: SecondAnswer) -> String {
     format!("node {node}: answers arrive twice: two devices have node-ID {node}, or a bridge repeats frames")
 }
 
-/// What to do about a node that does not answer.
+/// The hint for a node that does not answer.
 fn silence_advice(node: NodeId, waited: Duration, started: bool, clue: Clue) -> Option<String> {
     if let Some(frame) = clue.frame {
         let channel = frame.id().sdo_response_node();

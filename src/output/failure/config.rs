@@ -1,4 +1,4 @@
-//! Text for causes, effects and notes: settings were not applied, and what to report about it.
+//! Text for causes, effects and notes: settings were not applied, and reports about settings that were.
 
 use super::Words;
 use crate::output::notes::NoteText;
@@ -49,7 +49,7 @@ pub(super) fn words(cause: &ConfigFailure) -> Words {
     }
 }
 
-/// `mh4.toml:12:5: tpdo.1.event-timer: "100" is not a duration (100ms, 1s)`.
+/// `mh4.toml:12:5: tpdo.1.event-timer: "100" has no unit (100ms, 1s)`.
 fn of_mistake(file: &str, mistake: &Mistake) -> Words {
     let key = if mistake.key.is_empty() { String::new() } else { format!("{}: ", mistake.key) };
     let Words { message, hint, .. } = of_problem(&mistake.problem);
@@ -67,6 +67,7 @@ fn of_problem(problem: &Problem) -> Words {
         }
         Problem::Twice { other } => format!("the same setting as {other}"),
         Problem::Type { expected, found } => format!("{found} instead of {expected}"),
+        Problem::NotADuration { text } if text.parse::<f64>().is_ok() => format!("\"{text}\" has no unit (100ms, 1s)"),
         Problem::NotADuration { text } => format!("\"{text}\" is not a duration (100ms, 1s)"),
         Problem::DurationStep { tick: 1000 } => "the device counts in whole milliseconds".to_owned(),
         Problem::DurationStep { tick } => format!("the device counts in steps of {tick}us"),

@@ -14,9 +14,8 @@ use std::time::Duration;
 /// The message and the hint for a cause.
 pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
     match cause {
-        LogFailure::UnknownSignal { name, known } => {
-            Words::new(format!("no node has a signal \"{name}\"")).hint(format!("there are: {}", known.join(", ")))
-        }
+        LogFailure::UnknownSignal { name, known } => Words::new(format!("no node has a signal \"{name}\""))
+            .hint(format!("the signals are: {}", known.join(", "))),
         LogFailure::NoStatus { signal } => Words::new(format!("no node has a status object for {signal}")),
         LogFailure::NotMapped { name, disabled } => {
             let words = match disabled {

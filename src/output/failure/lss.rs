@@ -12,7 +12,7 @@ use crate::tasks::lss::{
     RequestedRate, Setting, TakenSign,
 };
 
-/// What to do if one identity or one node-ID belongs to several devices.
+/// The hint if one identity or one node-ID belongs to several devices.
 const CONNECT_ALONE: &str = "connect only this device";
 
 /// The message and the hint for a cause. A device without a known node-ID is named by its identity.

@@ -1,6 +1,6 @@
 //! Text for failures: a message in one line, and a hint if something can be done.
 //!
-//! Each area of `tasks` has one file here. A message says what happened and what it means; a hint is a command to
+//! Each area of `tasks` has one file here. A message states the event and its meaning; a hint is a command to
 //! type or one thing to check.
 
 pub(super) mod autozero;
@@ -30,7 +30,7 @@ use serde::Serialize;
 use std::fmt;
 use std::io::{self, Write};
 
-/// What is printed for a failure.
+/// The text of a failure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorMessage {
     /// The kind, which decides the exit code.
@@ -41,13 +41,13 @@ pub struct ErrorMessage {
     pub object: Option<String>,
     /// The abort code, if the device rejected an SDO request.
     pub abort: Option<String>,
-    /// One line: the node, what happened, and the effects.
+    /// One line: the node, the event, and the effects.
     pub message: String,
     /// A command to type, or one thing to check.
     pub hint: Option<String>,
     /// The place in the text that the user typed.
     pub place: Option<Place>,
-    /// What was changed before, and what state was left behind.
+    /// The changes before the failure, and the state left behind.
     pub effects: Vec<NoteText>,
 }
 
@@ -87,7 +87,7 @@ impl Words {
 }
 
 impl ErrorMessage {
-    /// What is printed for a failure of a task.
+    /// The text of a failure of a task.
     pub fn of(failure: &Failure) -> ErrorMessage {
         failure.into()
     }

@@ -13,9 +13,9 @@ pub(super) fn words(failure: &Failure, cause: &NmtFailure) -> Words {
     match cause {
         NmtFailure::OtherState { state, wanted } => Words::new(format!("the node is {state}, not {wanted}")),
         NmtFailure::NoSign => {
-            Words::new("command sent, but no heartbeat, no boot-up and no SDO answer came").hint(CHECK_NODE)
+            Words::new("command sent, but no heartbeat, boot-up or SDO answer was received").hint(CHECK_NODE)
         }
-        NmtFailure::NoBootUp => Words::new("command sent, but no boot-up message came")
+        NmtFailure::NoBootUp => Words::new("command sent, but no boot-up message was received")
             .hint(format!("check whether the node answers: cangauge nmt state {node}")),
         NmtFailure::NotConfirmed => Words::new("command sent, not confirmed: the node sends no heartbeat (1017h is 0)")
             .hint(format!("set a heartbeat: cangauge sdo write {node} producer-heartbeat-time 1000")),

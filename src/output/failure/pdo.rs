@@ -1,4 +1,4 @@
-//! Text for causes, effects and notes: a TPDO could not be shown or changed, and what to report about a change.
+//! Text for causes, effects and notes: a TPDO could not be shown or changed, and reports about a change.
 
 use super::Words;
 use crate::canopen::id::{CanId, NodeId};

@@ -1,4 +1,4 @@
-//! Text for causes, effects and notes: a setting could not be shown or changed, and what to report about it.
+//! Text for causes, effects and notes: a setting could not be shown or changed, and reports about a change.
 
 use super::Words;
 use crate::device::unit::Unit;

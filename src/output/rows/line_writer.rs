@@ -30,7 +30,7 @@ impl Job {
         }
     }
 
-    /// What it counts in the queue. Also an empty job is waited for.
+    /// Its share of the queue. The writer waits for an empty job as well.
     fn cost(&self) -> usize {
         self.bytes().len() + 1
     }
@@ -220,7 +220,7 @@ impl LineWriter {
     /// Waits until everything is written. If nothing is written for 100 ms, asks `give_up`; if that returns true,
     /// the remaining rows are lost.
     pub(in crate::output) fn finish(&mut self, give_up: &mut dyn FnMut() -> bool) -> io::Result<()> {
-        // Also what happened after the last row.
+        // Includes changes after the last row.
         self.put(Job::Rows { bytes: Vec::new(), rows: 0 })?;
         let Inner::Queued { queue, lost, .. } = &mut self.0 else { return Ok(()) };
         let mut state = queue.lock();
@@ -240,7 +240,7 @@ impl LineWriter {
         state.error.take().map_or(Ok(()), Err)
     }
 
-    /// What other programs did to the files since the last call.
+    /// Changes of the files by other programs since the last call.
     pub fn take_changes(&mut self) -> Vec<FileChange> {
         match &mut self.0 {
             Inner::Direct { writer, .. } => writer.take_changes(),

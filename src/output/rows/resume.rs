@@ -1,4 +1,4 @@
-//! Reads what a file to be continued contains.
+//! Reads the contents of a file that is to be continued.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};

@@ -1,4 +1,4 @@
-//! Typed rows: what a format writes.
+//! Typed rows, which a format writes.
 
 use crate::bus::Wall;
 use crate::measure::sample::{Number, Sample, Source, Status};
@@ -11,7 +11,7 @@ pub(super) struct Row<'a> {
     pub(super) time: Wall,
     /// Time since the first row of the run.
     pub(super) elapsed: Duration,
-    /// What was measured.
+    /// The measured signal.
     pub(super) values: Values<'a>,
 }
 
@@ -27,7 +27,7 @@ pub(super) enum Values<'a> {
     },
     /// Layout `wide`: the values of one cycle.
     Cycle {
-        /// What the cells contain, in their order.
+        /// The signals of the cells, in their order.
         columns: &'a [Column],
         /// One cell per column; `None` if no value was received in this cycle.
         cells: &'a [Option<Cell>],

@@ -5,7 +5,7 @@ use super::format::{FileFormat, HeaderMismatch};
 use super::rotation::Rotation;
 use super::row::Columns;
 
-/// What makes a row.
+/// The layout: whether a value or a cycle makes a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Layout {
     /// One value.
@@ -20,7 +20,7 @@ pub enum Layout {
 pub struct Setup {
     /// The file format.
     pub format: FileFormat,
-    /// What makes a row.
+    /// The layout: whether a value or a cycle makes a row.
     pub layout: Layout,
     /// Separators of CSV.
     pub dialect: Dialect,

@@ -159,7 +159,7 @@ impl RowSink {
         self.writer.lost() + self.rows_without_file
     }
 
-    /// What other programs did to the files since the last call.
+    /// Changes of the files by other programs since the last call.
     pub(super) fn take_changes(&mut self) -> Vec<FileChange> {
         self.writer.take_changes()
     }

@@ -27,7 +27,7 @@ pub trait Stream: Write + std::fmt::Debug + Send {}
 
 impl<T: Write + std::fmt::Debug + Send> Stream for T {}
 
-/// What another program did to a file while it was written.
+/// A change of a file by another program while it was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileChange {
     /// The file became shorter. It gets its header again.
@@ -49,7 +49,7 @@ pub(super) enum HeaderPlace {
     Present,
 }
 
-/// What failed, and how many rows were lost with it.
+/// A failed write, and how many rows were lost with it.
 pub(super) type WriteFailure = (io::Error, u64);
 
 /// Writes lines to a target, and to the files of a series after it.
@@ -94,7 +94,7 @@ impl TargetWriter {
         self.rows(bytes, 0)
     }
 
-    /// What other programs did to the files since the last call.
+    /// Changes of the files by other programs since the last call.
     pub(super) fn take_changes(&mut self) -> Vec<FileChange> {
         std::mem::take(&mut self.changes)
     }
@@ -127,7 +127,7 @@ impl TargetWriter {
         Ok(())
     }
 
-    /// Finds out what other programs did to the file since the last write. A file that became shorter gets its header
+    /// Detects changes of the file by other programs since the last write. A file that became shorter gets its header
     /// again.
     pub(super) fn check_file(&mut self) -> io::Result<()> {
         let Target::File { file, path, .. } = &self.target else { return Ok(()) };
@@ -147,7 +147,7 @@ impl TargetWriter {
         self.length = metadata.len();
         if is_shorter {
             self.changes.push(FileChange::Shortened(path.clone()));
-            // After a rest, an empty line separates the two tables.
+            // If old rows remain in the file, an empty line separates the two tables.
             let separator: &[u8] = if self.length > 0 && !self.header.is_empty() { b"\n" } else { b"" };
             let lines = [separator, &self.header].concat();
             self.length += lines.len() as u64;

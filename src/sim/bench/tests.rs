@@ -29,10 +29,10 @@ fn lists_of_devices() {
     assert_eq!(nodes(&bench), [5, 127, 6]);
     let names: Vec<&str> = crate::device::catalog::names().collect();
     for (spec, message) in [
-        ("mh4", "\"mh4\" is not DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) and no file FILE.toml"),
+        ("mh4", "\"mh4\" is neither DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) nor a file (FILE.toml)"),
         ("mh4@200", "mh4@200: \"200\" is not a node-ID (1 to 127)"),
         ("mh4@0", "mh4@0: \"0\" is not a node-ID (1 to 127)"),
-        ("mh4@5,", "\"\" is not DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) and no file FILE.toml"),
+        ("mh4@5,", "\"\" is neither DEVICE@NODE (mh4@1,d20@2,mc1609@3,dps@127) nor a file (FILE.toml)"),
         ("mh4@5,dps@5", "two devices with node-ID 5"),
         ("mh5@5", &format!("no device \"mh5\" ({}, FILE.toml or FILE.eds)", names.join(", "))),
     ] {

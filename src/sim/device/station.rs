@@ -1,4 +1,4 @@
-//! What a simulated device does with frames, time and power.
+//! The reactions of a simulated device to frames, time and power.
 
 use super::*;
 use crate::bus::memory::{Station, Tuning};

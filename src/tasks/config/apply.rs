@@ -1,6 +1,7 @@
-//! Applies a file to a device: writes what differs, in an order that works on all devices, and reads everything back.
+//! Applies a file to a device: writes the settings that differ, in an order that works on all devices, and reads
+//! everything back.
 
-use super::check::{Sections, Wanted, Wishes};
+use super::check::{FileSettings, Sections, Wanted};
 use super::conditions::check_device;
 use super::dump::path;
 use super::failure::{ConfigEffect, ConfigFact, ConfigFailure};
@@ -39,7 +40,7 @@ pub struct Options {
     pub store: bool,
     /// Whether the device is reset then, and read again.
     pub reset: bool,
-    /// What the user typed after the node: the file and the options.
+    /// The words that the user typed after the node: the file and the options.
     pub arguments: String,
 }
 
@@ -59,9 +60,9 @@ pub struct Row {
 pub struct Applied {
     /// The node-ID before.
     pub node: NodeId,
-    /// What the device held before.
+    /// The settings before.
     pub before: Snapshot,
-    /// What it holds now, read back.
+    /// The settings now, read back.
     pub after: Snapshot,
     /// The settings that changed.
     pub rows: Vec<Row>,
@@ -69,11 +70,11 @@ pub struct Applied {
     pub stored: bool,
     /// Whether the settings were read again after a reset.
     pub is_reset: bool,
-    /// What else there is to report.
+    /// Notes to report.
     pub notes: Vec<Note>,
 }
 
-/// Keeps what a device held before, until the change is complete.
+/// Keeps the old settings of a device until the change is complete.
 pub trait Journal {
     /// Called before the first write.
     ///
@@ -86,10 +87,10 @@ pub trait Journal {
 }
 
 /// The settings of a file that a device does not have yet, and those that are ignored.
-pub fn targets(wishes: &Wishes, before: &Snapshot, options: &Options) -> (Vec<Wanted>, Vec<Note>) {
+pub fn targets(file: &FileSettings, before: &Snapshot, options: &Options) -> (Vec<Wanted>, Vec<Note>) {
     let id = before.node.id;
     let (mut used, ignored): (Vec<Wanted>, Vec<Wanted>) =
-        wishes.wanted.iter().cloned().partition(|wanted| options.sections.include(&wanted.entry.key));
+        file.wanted.iter().cloned().partition(|wanted| options.sections.include(&wanted.entry.key));
     let mut notes = Vec::new();
     for section in ["address", "calibration"] {
         let is_other = |wanted: &&Wanted| {
@@ -101,7 +102,7 @@ pub fn targets(wishes: &Wishes, before: &Snapshot, options: &Options) -> (Vec<Wa
             notes.push(Note::of_node(id, ConfigFact::Ignored { section, keys }));
         }
     }
-    let is_named = |key: &str| wishes.wanted.iter().any(|wanted| wanted.setting.key == key);
+    let is_named = |key: &str| file.wanted.iter().any(|wanted| wanted.setting.key == key);
     let rest = before.settings.iter().filter(|setting| !is_named(&setting.key) && setting.is_writable);
     let rest = rest.filter(|setting| setting.stage != Stage::Address && setting.stage != Stage::Calibration);
     let rest: Vec<_> = rest.filter(|setting| before.is_default(setting) == Some(false)).collect();
@@ -123,12 +124,12 @@ pub fn targets(wishes: &Wishes, before: &Snapshot, options: &Options) -> (Vec<Wa
 /// Applies the contents of a file to a device.
 ///
 /// # Errors
-/// A condition that is not met; a write that failed, with what was written and what was not; values that read
+/// A condition that is not met; a failed write, with the written and the missing settings; values that read
 /// differently afterwards.
 pub fn apply(
     master: &mut Master<'_>,
     before: Snapshot,
-    wishes: &Wishes,
+    file: &FileSettings,
     options: &Options,
     overrides: &Overrides,
     journal: &mut dyn Journal,
@@ -136,8 +137,8 @@ pub fn apply(
     if options.store || options.sections.address {
         check_confirmed(Some(before.node.id), before.node.model.as_deref())?;
     }
-    check_device(wishes, &before, options.sections.calibration)?;
-    let (targets, notes) = targets(wishes, &before, options);
+    check_device(file, &before, options.sections.calibration)?;
+    let (targets, notes) = targets(file, &before, options);
     let mut work = Work {
         master,
         now: before.clone(),
@@ -197,7 +198,7 @@ impl Work<'_, '_> {
         (id, number(Form::BitRate))
     }
 
-    /// Checks what a new node-ID and a new bit rate need, before anything is written.
+    /// Checks before the first write that a new node-ID is free, and that a device with a new bit rate is alone.
     fn check_bus(&mut self) -> Result<(), Failure> {
         let own = self.before.node.id;
         let (id, rate) = self.address();
@@ -226,7 +227,7 @@ impl Work<'_, '_> {
         Ok(())
     }
 
-    /// Writes everything that differs, stage by stage.
+    /// Writes the settings that differ, stage by stage.
     fn write_settings(&mut self) -> Result<(), Failure> {
         let stages: BTreeSet<Stage> = self.targets.iter().map(|wanted| wanted.setting.stage).collect();
         let mut is_stale = false;
@@ -273,7 +274,7 @@ impl Work<'_, '_> {
         let own = differing.iter().filter(|wanted| wanted.setting.stage == Stage::Tpdo(number));
         own.for_each(|wanted| self.record(wanted));
         // The next TPDO may use an identifier that is free now.
-        self.now.renew_tpdo(changed.wanted);
+        self.now.set_tpdo(changed.wanted);
         Ok(true)
     }
 
@@ -333,7 +334,7 @@ impl Work<'_, '_> {
         Ok(())
     }
 
-    /// Checks that the device holds everything, from what was read last.
+    /// Checks in the last snapshot that the device kept all values.
     fn check_kept(&self, is_after_reset: bool) -> Result<(), Failure> {
         let wrong = self.differing().into_iter().filter(|wanted| wanted.setting.stage != Stage::Address);
         let settings: Vec<_> = wrong
@@ -398,7 +399,7 @@ impl Work<'_, '_> {
         if self.options.store && self.written.len() > count { self.store(false) } else { Ok(()) }
     }
 
-    /// Everything that changed, also what the device changed by itself with a new unit.
+    /// All changes, including those that the device made by itself with a new unit.
     fn rows(&self) -> Vec<Row> {
         let row = |setting: &super::setting::Setting| {
             let old = self.before.settings.iter().find(|old| old.key == setting.key)?;
@@ -409,7 +410,7 @@ impl Work<'_, '_> {
         self.now.settings.iter().filter_map(row).collect()
     }
 
-    /// The failure with what was written and what was not.
+    /// The failure with the written and the missing settings.
     fn explain(&self, failure: Failure) -> Failure {
         let is_written = |key: &String| self.written.iter().any(|row| row.key == *key);
         let initial = |wanted: &&Wanted| self.before.content(&wanted.setting).as_ref() != Some(&wanted.content);

@@ -1,4 +1,5 @@
-//! Compares a file with a device before anything is written: keys, types, units, ranges, and what excludes each other.
+//! Compares a file with a device before anything is written: keys, types, units, ranges, and values that exclude each
+//! other.
 
 use super::dump::path;
 use super::problem::{Mistake, Problem};
@@ -21,20 +22,20 @@ use crate::node::names::nearest;
 pub struct Wanted {
     /// The setting.
     pub setting: Setting,
-    /// The value as the device holds it.
+    /// The value in the form of the device.
     pub content: Content,
     /// The value in the file; its place is for messages.
     pub entry: Entry,
 }
 
-/// The contents of a file for one device.
+/// The settings and conditions of a file, for one device.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Wishes {
+pub struct FileSettings {
     /// The settings.
     pub wanted: Vec<Wanted>,
     /// The conditions of `[device]`, and the serial number of `[calibration]`.
     pub conditions: Vec<Entry>,
-    /// The units and digits as they will be.
+    /// The units and digits after the change.
     pub scales: Scales,
 }
 
@@ -62,8 +63,8 @@ impl Sections {
 const CONDITIONS: [&str; 5] =
     ["device.kind", "device.vendor", "device.product", "device.reference", "calibration.serial"];
 
-/// Checks a file against a node. `present` is what the device holds; without it, only what a description tells is
-/// checked.
+/// Checks a file against a node. `present` contains the present settings of the device. Without it, only the facts of
+/// its description are checked.
 ///
 /// # Errors
 /// Every mistake, in the order of the places.
@@ -72,27 +73,27 @@ pub fn check(
     node: &Node,
     settings: &[Setting],
     present: Option<&Snapshot>,
-) -> Result<Wishes, Vec<Mistake>> {
+) -> Result<FileSettings, Vec<Mistake>> {
     let mut check = Check { node, settings, present, scales: Scales::of(node), mistakes: Vec::new() };
-    check.renew_scales(document);
-    let mut wishes = Wishes::default();
+    check.update_scales(document);
+    let mut file = FileSettings::default();
     for entry in &document.entries {
         if CONDITIONS.contains(&entry.key.as_str()) || entry.key.starts_with("device.range.") {
             match condition(entry) {
-                Ok(()) => wishes.conditions.push(entry.clone()),
+                Ok(()) => file.conditions.push(entry.clone()),
                 Err(problem) => check.mistake(entry, problem),
             }
-        } else if let Some(wanted) = check.entry(entry, &wishes) {
-            wishes.wanted.push(wanted);
+        } else if let Some(wanted) = check.entry(entry, &file) {
+            file.wanted.push(wanted);
         }
     }
     if check.mistakes.is_empty() {
-        check.together(&wishes);
+        check.check_combinations(&file);
     }
     let mut mistakes = check.mistakes;
     mistakes.sort_by_key(|mistake| mistake.place);
-    wishes.scales = check.scales;
-    if mistakes.is_empty() { Ok(wishes) } else { Err(mistakes) }
+    file.scales = check.scales;
+    if mistakes.is_empty() { Ok(file) } else { Err(mistakes) }
 }
 
 /// The form of a condition.
@@ -152,8 +153,8 @@ impl Check<'_> {
         self.mistakes.push(Mistake { place, key: entry.key.clone(), problem });
     }
 
-    /// Units and digits as they will be.
-    fn renew_scales(&mut self, document: &Document) {
+    /// Sets the units and digits to those after the change.
+    fn update_scales(&mut self, document: &Document) {
         let is_offline = self.present.is_none();
         for (scale, signal) in self.scales.signals.iter_mut().zip(&self.node.signals) {
             if is_offline {
@@ -183,7 +184,7 @@ impl Check<'_> {
         own.or_else(explicit).or_else(by_object)
     }
 
-    fn entry(&mut self, entry: &Entry, before: &Wishes) -> Option<Wanted> {
+    fn entry(&mut self, entry: &Entry, before: &FileSettings) -> Option<Wanted> {
         let Some(setting) = self.find(&entry.key).cloned() else {
             let problem = self.unknown(&entry.key);
             self.mistake(entry, problem);
@@ -308,24 +309,24 @@ impl Check<'_> {
         }
     }
 
-    /// Checks values that depend on each other, as they will be.
-    fn together(&mut self, wishes: &Wishes) {
+    /// Checks values that depend on each other, as they are after the change.
+    fn check_combinations(&mut self, file: &FileSettings) {
         let mut found = Vec::new();
-        for wanted in &wishes.wanted {
-            found.extend(self.crossed(wanted, wishes).map(|problem| (wanted.entry.clone(), problem)));
-            found.extend(self.excluded(wanted, wishes).map(|problem| (wanted.entry.clone(), problem)));
-            found.extend(self.same_id(wanted, wishes).map(|problem| (wanted.entry.clone(), problem)));
+        for wanted in &file.wanted {
+            found.extend(self.crossed(wanted, file).map(|problem| (wanted.entry.clone(), problem)));
+            found.extend(self.excluded(wanted, file).map(|problem| (wanted.entry.clone(), problem)));
+            found.extend(self.same_id(wanted, file).map(|problem| (wanted.entry.clone(), problem)));
         }
         found.into_iter().for_each(|(entry, problem)| self.mistake(&entry, problem));
     }
 
     /// The value that a setting will have.
-    fn future(&self, setting: &Setting, wishes: &Wishes) -> Option<Content> {
-        let wanted = wishes.wanted.iter().find(|wanted| wanted.setting.key == setting.key);
+    fn resulting(&self, setting: &Setting, file: &FileSettings) -> Option<Content> {
+        let wanted = file.wanted.iter().find(|wanted| wanted.setting.key == setting.key);
         wanted.map(|wanted| wanted.content.clone()).or_else(|| self.present?.content(setting))
     }
 
-    fn crossed(&self, wanted: &Wanted, wishes: &Wishes) -> Option<Problem> {
+    fn crossed(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
         let (base, name) = wanted.setting.key.rsplit_once('.')?;
         let (other, is_lower) = match name {
             "lower" => ("upper", true),
@@ -335,7 +336,7 @@ impl Check<'_> {
             _ => return None,
         };
         let other = self.find(&format!("{base}.{other}"))?;
-        let is_in_file = wishes.wanted.iter().any(|wanted| wanted.setting.key == other.key);
+        let is_in_file = file.wanted.iter().any(|wanted| wanted.setting.key == other.key);
         let rescales = self.present.is_some_and(|present| present.scales != self.scales);
         // Reported once, at the lower end.
         if is_in_file && !is_lower || !is_in_file && (rescales || self.present.is_none()) {
@@ -345,7 +346,7 @@ impl Check<'_> {
             Content::Bytes(bytes) => Number::from_value(&setting.data_type.decode(bytes).ok()?, 0).map(Number::as_f64),
             _ => None,
         };
-        let content = self.future(other, wishes)?;
+        let content = self.resulting(other, file)?;
         let (own, theirs) = (number(&wanted.setting, &wanted.content)?, number(other, &content)?);
         let is_crossed = if is_lower { own > theirs } else { theirs > own };
         let value = other.show(self.node, &self.scales, &content);
@@ -353,7 +354,7 @@ impl Check<'_> {
     }
 
     /// Heartbeat and guarding, on devices that accept only one of them.
-    fn excluded(&self, wanted: &Wanted, wishes: &Wishes) -> Option<Problem> {
+    fn excluded(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
         let is_on = |content: &Content| matches!(content, Content::Bytes(bytes) if bytes.iter().any(|byte| *byte != 0));
         if !is_on(&wanted.content) {
             return None;
@@ -361,26 +362,26 @@ impl Check<'_> {
         let others = &self.node.described(wanted.setting.object)?.only_if_zero;
         let mut others = self.settings.iter().filter(|setting| others.contains(&setting.object));
         others.find_map(|other| {
-            let content = self.future(other, wishes).filter(is_on)?;
+            let content = self.resulting(other, file).filter(is_on)?;
             let value = other.show(self.node, &self.scales, &content);
             Some(Problem::Excluded { other: other.key.clone(), value })
         })
     }
 
     /// Identifiers that two senders would share, and TPDOs without an identifier.
-    fn same_id(&self, wanted: &Wanted, wishes: &Wishes) -> Option<Problem> {
+    fn same_id(&self, wanted: &Wanted, file: &FileSettings) -> Option<Problem> {
         // Without the device the node-ID is unknown, and with it the identifiers that follow from it.
         self.present?;
         let is_id = |setting: &&Setting| matches!(setting.form, Form::CobId(_));
         let is_on = |setting: &Setting| match setting.stage {
             Stage::Tpdo(number) => {
                 let enabled = self.find(&format!("tpdo.{}.enabled", number.get()));
-                let content = enabled.and_then(|enabled| self.future(enabled, wishes));
+                let content = enabled.and_then(|enabled| self.resulting(enabled, file));
                 content.is_none_or(|content| content == Content::Number(1))
             }
             _ => true,
         };
-        let id = |setting: &Setting| match self.future(setting, wishes) {
+        let id = |setting: &Setting| match self.resulting(setting, file) {
             Some(Content::Number(id)) => Some(id),
             _ => None,
         };

@@ -1,6 +1,6 @@
 //! The conditions of `[device]`: the kind of device, its measuring range, relative or absolute pressure.
 
-use super::check::{Wishes, number, range};
+use super::check::{FileSettings, number, range};
 use super::failure::ConfigFailure;
 use super::identity::Range;
 use super::snapshot::Snapshot;
@@ -15,28 +15,28 @@ const RANGE_TOLERANCE: f64 = 0.001;
 ///
 /// # Errors
 /// [`ConfigFailure::Condition`] with the first condition that the device does not meet.
-pub fn check_device(wishes: &Wishes, snapshot: &Snapshot, with_calibration: bool) -> Result<(), Failure> {
+pub fn check_device(file: &FileSettings, snapshot: &Snapshot, with_calibration: bool) -> Result<(), Failure> {
     let node = snapshot.node.id;
     let counts = |entry: &&Entry| with_calibration || entry.key != "calibration.serial";
-    if let Some((entry, found)) = unmet(wishes, snapshot).into_iter().find(|(entry, _)| counts(entry)) {
+    if let Some((entry, found)) = unmet(file, snapshot).into_iter().find(|(entry, _)| counts(entry)) {
         let (key, place, wanted) = (entry.key.clone(), entry.value_at, entry.value.clone());
         return Err(Failure::at(node, ConfigFailure::Condition { place, key, wanted, found }));
     }
-    let has_serial = wishes.conditions.iter().any(|entry| entry.key == "calibration.serial");
-    let calibrates = wishes.wanted.iter().find(|wanted| wanted.entry.key.starts_with("calibration."));
+    let has_serial = file.conditions.iter().any(|entry| entry.key == "calibration.serial");
+    let calibrates = file.wanted.iter().find(|wanted| wanted.entry.key.starts_with("calibration."));
     match calibrates.filter(|_| with_calibration && !has_serial) {
         Some(wanted) => Err(Failure::at(node, ConfigFailure::NoSerial { place: wanted.entry.key_at })),
         None => Ok(()),
     }
 }
 
-/// The conditions that a device does not meet, with what it says instead.
-pub(super) fn unmet<'a>(wishes: &'a Wishes, snapshot: &Snapshot) -> Vec<(&'a Entry, Option<Item>)> {
+/// The conditions that a device does not meet, with its own values.
+pub(super) fn unmet<'a>(file: &'a FileSettings, snapshot: &Snapshot) -> Vec<(&'a Entry, Option<Item>)> {
     let kind = snapshot.kind();
     let identity = &snapshot.node.identity;
     let code = |number: Option<u32>| number.map(|number| Item::Text(format!("0x{number:X}")));
     let mut unmet = Vec::new();
-    for entry in &wishes.conditions {
+    for entry in &file.conditions {
         let same_number = |found: Option<u32>| found.is_some() && found == number(&entry.value);
         let same_text = |found: Option<Item>| (found.as_ref() == Some(&entry.value), found);
         let (is_met, found) = match entry.key.as_str() {

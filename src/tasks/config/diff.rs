@@ -1,7 +1,7 @@
 //! Compares settings: of a device and a file, of two files, of two devices.
 
 use super::apply::Row;
-use super::check::{Sections, Wishes, check};
+use super::check::{FileSettings, Sections, check};
 use super::conditions::unmet;
 use super::dump;
 use super::setting::settings;
@@ -11,7 +11,7 @@ use crate::device::config_file::{Document, Item};
 use crate::node::Node;
 use std::collections::BTreeMap;
 
-/// What differs, and the keys that differ in sections that are not compared.
+/// The settings that differ, and the differing keys in sections that are not compared.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Difference {
     /// The settings that differ.
@@ -27,14 +27,14 @@ impl Difference {
 }
 
 /// Compares a device with a file that was checked against it.
-pub fn with_file(snapshot: &Snapshot, wishes: &Wishes, sections: Sections) -> Difference {
+pub fn with_file(snapshot: &Snapshot, file: &FileSettings, sections: Sections) -> Difference {
     let mut difference = Difference::default();
-    for (entry, found) in unmet(wishes, snapshot) {
+    for (entry, found) in unmet(file, snapshot) {
         difference.add(Row { key: entry.key.clone(), before: found, after: Some(entry.value.clone()) }, sections);
     }
-    for wanted in &wishes.wanted {
+    for wanted in &file.wanted {
         if snapshot.content(&wanted.setting).as_ref() != Some(&wanted.content) {
-            let after = wanted.setting.show(&snapshot.node, &wishes.scales, &wanted.content);
+            let after = wanted.setting.show(&snapshot.node, &file.scales, &wanted.content);
             let row = Row { key: wanted.entry.key.clone(), before: snapshot.show(&wanted.setting), after: Some(after) };
             difference.add(row, sections);
         }
@@ -89,7 +89,7 @@ fn compare(
     difference
 }
 
-/// Checks a file with what the description of its device says. Needs no bus.
+/// Checks a file against the description of its device. Needs no bus.
 ///
 /// # Errors
 /// Every mistake.

@@ -21,7 +21,7 @@ pub struct Row {
     pub is_default: Option<bool>,
     /// Whether the device cannot change it.
     pub is_fixed: bool,
-    /// What a number means on this device.
+    /// The meaning of a number on this device.
     pub meaning: Option<String>,
 }
 
@@ -31,12 +31,12 @@ pub struct Dump {
     /// The name on the label of the device.
     pub title: Option<String>,
     /// The revision and the serial number.
-    pub specimen: [Option<u32>; 2],
+    pub revision_and_serial: [Option<u32>; 2],
     /// The dates of calibration and production.
     pub dates: Vec<(&'static str, String)>,
     /// The settings, in the order of the sections.
     pub rows: Vec<Row>,
-    /// Objects that the device does not let read, with its reason.
+    /// Objects that cannot be read, with the reason that the device gives.
     pub unreadable: Vec<String>,
 }
 
@@ -92,7 +92,7 @@ impl Snapshot {
             self.unreadable.iter().map(|(object, code)| format!("{} ({code})", self.node.name_of(*object)));
         Dump {
             title: kind.title,
-            specimen: [identity.revision, identity.serial],
+            revision_and_serial: [identity.revision, identity.serial],
             dates: kind.dates,
             rows,
             unreadable: unreadable.collect(),

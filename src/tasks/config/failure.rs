@@ -18,15 +18,15 @@ pub enum ConfigFailure {
         /// The mistake.
         mistake: Box<Mistake>,
     },
-    /// The device is not what `[device]` says.
+    /// The device does not meet the conditions of `[device]`.
     Condition {
         /// The place of the condition in the file.
         place: Place,
         /// Its key.
         key: String,
-        /// What the file says.
+        /// The value in the file.
         wanted: Item,
-        /// What the device says; `None` if it does not say.
+        /// The value of the device; `None` if it is unknown.
         found: Option<Item>,
     },
     /// Calibration values without a serial number.
@@ -62,14 +62,14 @@ pub enum ConfigFailure {
     NoJournal,
 }
 
-/// What an application of settings that failed left behind.
+/// The changes that a failed application of settings left behind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConfigEffect {
     /// The settings that were written.
     pub written: Vec<Row>,
     /// The keys that were not.
     pub missing: Vec<String>,
-    /// What the user typed after the node.
+    /// The words that the user typed after the node.
     pub arguments: String,
 }
 

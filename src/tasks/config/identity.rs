@@ -1,4 +1,4 @@
-//! What `[device]` says: the kind of device, its measuring ranges, relative or absolute pressure.
+//! The facts in `[device]`: the kind of device, its measuring ranges, relative or absolute pressure.
 
 use super::snapshot::Snapshot;
 use crate::canopen::object::ObjectId;
@@ -22,7 +22,7 @@ pub struct Range {
     pub step: f64,
 }
 
-/// What identifies the kind of a device.
+/// The facts that identify the kind of a device.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kind {
     /// The name of its description.
@@ -37,7 +37,7 @@ pub struct Kind {
     pub dates: Vec<(&'static str, String)>,
 }
 
-/// The names of the objects of a date, and what the date is.
+/// The names of the objects of a date, and the meaning of the date.
 const DATES: [(&str, [&str; 3]); 2] = [
     ("calibrated", ["calibration-year", "calibration-month", "calibration-day"]),
     ("produced", ["production-year", "production-month", "production-day"]),
@@ -96,7 +96,7 @@ impl Snapshot {
         self.node.data_type(object).decode(self.bytes(object)?).ok()
     }
 
-    /// What identifies the kind of the device.
+    /// The facts that identify the kind of the device.
     pub fn kind(&self) -> Kind {
         let model = self.node.model.as_ref();
         let description = model.map(|model| &model.description).filter(|description| description.name != "eds");

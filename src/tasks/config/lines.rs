@@ -1,7 +1,7 @@
 //! The writes of an application as single steps that a person can follow (`config apply --dry-run`).
 
 use super::apply::{Options, targets};
-use super::check::{Wanted, Wishes};
+use super::check::{FileSettings, Wanted};
 use super::order::{service_words, sorted, tpdo_settings};
 use super::setting::{Form, Stage};
 use super::snapshot::Snapshot;
@@ -20,11 +20,11 @@ pub struct Line {
     pub node: NodeId,
     /// The settings that the step belongs to.
     pub key: String,
-    /// What is done.
+    /// The step.
     pub step: Step,
 }
 
-/// What a step does.
+/// A step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
     /// Writes an object.
@@ -47,8 +47,8 @@ pub enum Step {
 /// The steps of an application, in their order, with the notes about it.
 ///
 /// If the unit changes, the device may convert other values by itself; the steps then list all of them.
-pub fn lines(wishes: &Wishes, before: &Snapshot, options: &Options) -> (Vec<Line>, Vec<Note>) {
-    let (targets, notes) = targets(wishes, before, options);
+pub fn lines(file: &FileSettings, before: &Snapshot, options: &Options) -> (Vec<Line>, Vec<Note>) {
+    let (targets, notes) = targets(file, before, options);
     let differs = |wanted: &Wanted| before.content(&wanted.setting).as_ref() != Some(&wanted.content);
     let rescales = targets.iter().any(|wanted| wanted.setting.stage <= Stage::Digits && differs(wanted));
     let is_written =

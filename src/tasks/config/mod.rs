@@ -19,7 +19,7 @@ pub mod value;
 
 pub use apply::{Applied, Journal, Options, Row as ChangedRow, apply, targets};
 use check::named_objects;
-pub use check::{Sections, Wanted, Wishes, check};
+pub use check::{FileSettings, Sections, Wanted, check};
 pub use conditions::check_device;
 pub use dump::{Dump, Row, SECTIONS};
 pub use failure::{ConfigEffect, ConfigFact, ConfigFailure};
@@ -58,7 +58,7 @@ impl Snapshot {
     ///
     /// # Errors
     /// Every mistake, in the order of the places.
-    pub fn check(&self, document: &Document) -> Result<Wishes, Vec<Mistake>> {
+    pub fn check(&self, document: &Document) -> Result<FileSettings, Vec<Mistake>> {
         check(document, &self.node, &self.settings, Some(self))
     }
 }

@@ -29,7 +29,7 @@ pub(super) fn sorted(mut group: Vec<Wanted>, now: &Snapshot) -> Vec<Wanted> {
     group
 }
 
-/// The settings of a TPDO as a file wants them.
+/// The settings of a TPDO after the values of a file are applied.
 pub(super) fn tpdo_settings(old: &pdo::Settings, group: &[Wanted]) -> pdo::Settings {
     let mut new = old.clone();
     for wanted in group {

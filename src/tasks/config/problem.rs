@@ -13,16 +13,16 @@ pub struct Mistake {
     pub place: Place,
     /// The key; empty for a mistake of the syntax.
     pub key: String,
-    /// What is wrong.
+    /// The problem.
     pub problem: Problem,
 }
 
-/// What is wrong in a file.
+/// A problem in a file.
 #[derive(Clone, Debug)]
 pub enum Problem {
     /// The text is not TOML.
     Syntax {
-        /// What the parser expected.
+        /// The message of the parser.
         message: String,
     },
     /// No device has such a key, or this device does not have it.
@@ -39,9 +39,9 @@ pub enum Problem {
     },
     /// The value has another type.
     Type {
-        /// What is expected, with an example.
+        /// The expected type, with an example.
         expected: &'static str,
-        /// What is there.
+        /// The type in the file.
         found: &'static str,
     },
     /// Not a duration with its unit.

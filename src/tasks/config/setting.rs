@@ -71,7 +71,7 @@ pub enum Scale {
 /// The order in which settings are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {
-    /// What decides about everything else: sensor type, operating mode.
+    /// Settings on which all others depend: sensor type, operating mode.
     Sensor,
     /// The unit.
     Unit,
@@ -81,9 +81,9 @@ pub enum Stage {
     Filter,
     /// Limits and spans.
     Limits,
-    /// Objects that no section has.
+    /// All other objects, in the section `[object]`.
     Object,
-    /// Values of one specimen.
+    /// Values that belong to one device only.
     Calibration,
     /// Guarding, heartbeat and start-up.
     Node,
@@ -188,7 +188,7 @@ impl Catalog<'_> {
             let setting = || self.of_channel(entry, signal, name, stage);
             return if is_shown && entry.access.is_readable() { vec![setting()] } else { Vec::new() };
         }
-        if !self.is_setting(entry) || self.is_twin(entry.object) {
+        if !self.is_setting(entry) || self.is_in_other_family(entry.object) {
             return Vec::new();
         }
         let one = |key: &str, form: Form, stage: Stage| vec![self.setting(entry, key.to_owned(), form, stage)];
@@ -221,11 +221,11 @@ impl Catalog<'_> {
         let object = entry.object;
         let described = self.node.described(object);
         let acts = described.is_some_and(|entry| entry.signature.is_some());
-        let ways = self.node.model.as_ref().map_or(&[][..], |model| &model.description.assign);
+        let methods = self.node.model.as_ref().map_or(&[][..], |model| &model.description.assign);
         let assigned = |place: Option<crate::device::assign::AssignObject>| {
             place.is_some_and(|place| place.object.index == object.index)
         };
-        let is_assigned = ways.iter().any(|way| assigned(way.node_id) || assigned(way.bit_rate));
+        let is_assigned = methods.iter().any(|method| assigned(method.node_id) || assigned(method.bit_rate));
         let is_elsewhere = matches!(
             object.index,
             0x1003 | 0x1010 | 0x1011 | 0x1013 | 0x1020 | 0x1021..=0x1023 | 0x1200..=0x1bff | 0x1f50..=0x1f5f
@@ -273,7 +273,7 @@ impl Catalog<'_> {
     }
 
     /// Whether an object of CiA 404 is the same setting as one in another family.
-    fn is_twin(&self, object: ObjectId) -> bool {
+    fn is_in_other_family(&self, object: ObjectId) -> bool {
         let low = object.index & 0x0fff;
         let families = [0x6000, 0x7000, 0x8000, 0x9000];
         let is_known = families.contains(&(object.index & 0xf000)) && CHANNEL.iter().any(|(known, ..)| *known == low);
@@ -337,7 +337,7 @@ impl Catalog<'_> {
     }
 }
 
-/// The identifier of a TPDO as delivered: of the description, else of the predefined connection set.
+/// The default identifier of a TPDO: of the description, else of the predefined connection set.
 pub(super) fn default_id(node: &Node, number: TpdoNumber) -> u16 {
     let entry = node.model.as_ref().and_then(|model| model.dictionary.get(number.communication(1)));
     let word = entry.and_then(|entry| entry.default_bytes(node.id)).and_then(|bytes| bytes.try_into().ok());

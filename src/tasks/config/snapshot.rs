@@ -1,4 +1,4 @@
-//! What a device holds in its settings.
+//! The values of all settings of a device.
 
 use super::setting::{Form, Setting, Stage};
 use super::value::{Content, Scales};
@@ -13,7 +13,7 @@ use crate::tasks::Failure;
 use crate::tasks::pdo;
 use std::collections::BTreeMap;
 
-/// What a device holds in its settings at one moment.
+/// The values of all settings of a device at one moment.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     /// The node.
@@ -26,7 +26,7 @@ pub struct Snapshot {
     pub tpdos: Vec<pdo::Settings>,
     values: BTreeMap<ObjectId, Vec<u8>>,
     bit_rate: Option<u32>,
-    /// Objects that the device rejects for another reason than that it does not have them.
+    /// Objects that the device has, but does not allow to read.
     pub unreadable: Vec<(ObjectId, AbortCode)>,
 }
 
@@ -56,7 +56,7 @@ impl Snapshot {
         Ok(snapshot)
     }
 
-    /// What the device holds in a setting; `None` if it does not have it.
+    /// The value of a setting; `None` if the device does not have it.
     pub fn content(&self, setting: &Setting) -> Option<Content> {
         let word = || {
             let bytes = self.values.get(&setting.object)?;
@@ -82,8 +82,8 @@ impl Snapshot {
         self.tpdos.iter().find(|tpdo| tpdo.number == number)
     }
 
-    /// Notes that a TPDO has other settings now.
-    pub(super) fn renew_tpdo(&mut self, now: pdo::Settings) {
+    /// Replaces the settings of a TPDO.
+    pub(super) fn set_tpdo(&mut self, now: pdo::Settings) {
         if let Some(tpdo) = self.tpdos.iter_mut().find(|tpdo| tpdo.number == now.number) {
             *tpdo = now;
         }
@@ -113,7 +113,7 @@ impl Snapshot {
         Some(setting.show(&self.node, &self.scales, &self.content(setting)?))
     }
 
-    /// Whether a setting is known to be as delivered; `None` if its default is unknown.
+    /// Whether a setting has its factory default; `None` if the default is unknown.
     pub fn is_default(&self, setting: &Setting) -> Option<bool> {
         Some(self.content(setting)? == self.default(setting)?)
     }

@@ -12,7 +12,7 @@ pub enum DetectFailure {
     NotFound {
         /// The interface.
         interface: String,
-        /// What was tried.
+        /// The bit rates that were tried.
         detection: Detection,
         /// Whether nodes were asked as well.
         active: bool,

@@ -1,4 +1,4 @@
-//! What is asked of a silent node: whether it answers, and the objects that keep its TPDOs from being sent.
+//! Asks a silent node whether it answers, and reads the objects that keep its TPDOs from being sent.
 
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
@@ -17,12 +17,12 @@ use std::time::Duration;
 /// All questions are answered or given up within this time: two attempts of an SDO request with a long time-out.
 const INQUIRY_LIMIT: Duration = Duration::from_secs(20);
 
-/// What a node answered.
+/// The answers of a node.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Findings {
     /// Whether it answers SDO requests.
     pub answers: bool,
-    /// Its NMT state, and what showed it.
+    /// Its NMT state, and the evidence for it.
     pub state: Option<(NmtState, Proof)>,
     values: BTreeMap<ObjectId, Vec<u8>>,
 }
@@ -34,7 +34,7 @@ impl Findings {
     }
 
     /// The number in an object of one or two bytes; `None` if it was not read.
-    pub(super) fn small<T: TryFrom<u32>>(&self, object: ObjectId) -> Option<T> {
+    pub(super) fn unsigned<T: TryFrom<u32>>(&self, object: ObjectId) -> Option<T> {
         let bytes = self.values.get(&object)?;
         let number = bytes.iter().take(2).rev().fold(0u32, |number, &byte| number << 8 | u32::from(byte));
         T::try_from(number).ok()

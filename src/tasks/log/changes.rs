@@ -1,4 +1,4 @@
-//! What has changed in the setup of a node.
+//! Changes in the setup of a node.
 
 use crate::canopen::id::CanId;
 use crate::canopen::pdo::{TpdoNumber, Transmission};

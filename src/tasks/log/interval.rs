@@ -55,7 +55,7 @@ impl IntervalTracker {
         self.last.is_none() || self.silence(now).is_some()
     }
 
-    /// Starts the silence now, because nothing could be received before.
+    /// Measures silence from now on, because nothing could be received before.
     pub(super) fn restart(&mut self, now: Mono) {
         self.last = self.last.map(|_| now);
     }

@@ -116,7 +116,7 @@ impl SetupListener {
         }
     }
 
-    /// What is known of a node. It contains only TPDOs with known COB-ID and complete mapping.
+    /// The known part of a node. It contains only TPDOs with known COB-ID and complete mapping.
     pub(in crate::tasks) fn known_node(&self, id: NodeId) -> Node {
         let mut node = Node::new(id);
         node.identity = self.overheard.identity(id);

@@ -13,7 +13,7 @@ use crate::tasks::read::{Target, requests, sample, targets};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// What is polled, and the requests under way.
+/// The polled objects, and the requests in progress.
 pub(super) struct Poll {
     period: Duration,
     cycles: u64,
@@ -62,7 +62,7 @@ impl Poll {
         Ok(poll)
     }
 
-    /// Polls a node from now on. A node that was polled before must be held first.
+    /// Polls a node from now on. A node that was polled before must be paused first.
     ///
     /// # Errors
     /// A requested signal cannot be read.
@@ -111,7 +111,7 @@ impl Poll {
     }
 
     /// Stops polling a node. Answers under way are ignored.
-    pub(super) fn hold(&mut self, node: NodeId) {
+    pub(super) fn pause(&mut self, node: NodeId) {
         for (target, live) in self.targets.iter().zip(&mut self.live) {
             *live &= target.source.node != node;
         }

@@ -86,7 +86,7 @@ impl Producer {
         }
     }
 
-    /// Ends the production and returns what was sent.
+    /// Ends the production and returns the statistics of the sent frames.
     pub(super) fn finish(mut self, master: &mut Master<'_>) -> SyncStatistics {
         self.check_sent(master);
         let unsent = u64::from(master.remove_first());

@@ -35,7 +35,7 @@ use tally::Tally;
 /// A signal without values is reported only if the recording is at least this long.
 const MIN_SIGNAL_TIME: Duration = Duration::from_secs(1);
 
-/// A recording: the setup of the nodes, and what was recorded.
+/// A recording: the setup of the nodes, and the values.
 pub(super) struct Recording<'o> {
     pub(super) options: &'o LogOptions,
     pub(super) nodes: Vec<Node>,
@@ -162,8 +162,8 @@ impl<'o> Recording<'o> {
     }
 
     /// Whether the setup of this node may have changed.
-    pub(super) fn is_held(&self, node: NodeId) -> bool {
-        self.rereads.held().any(|held| held == node)
+    pub(super) fn is_paused(&self, node: NodeId) -> bool {
+        self.rereads.paused().any(|paused| paused == node)
     }
 
     /// The time since the start of the recording.
@@ -240,9 +240,9 @@ impl<'o> Recording<'o> {
         }
         match self.decoder.decode(received, &mut self.samples) {
             Decoded::Tpdo(_) => return self.take_samples(None, observer),
-            Decoded::Held(node) => self.not_recorded(node, received.at.mono),
+            Decoded::Paused(node) => self.not_recorded(node, received.at.mono),
             Decoded::WrongLength(node) => self.wrong_length(node, received.at, master, observer),
-            Decoded::NotOurs => self.other_frame(received, master, observer),
+            Decoded::OtherFrame => self.other_frame(received, master, observer),
         }
         ControlFlow::Continue(())
     }

@@ -30,7 +30,7 @@ const WRONG_LENGTH_INTERVAL: Duration = Duration::from_secs(60);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum RereadReason {
     /// The node restarted, or nothing could be received from it for a while. It may need a start command.
-    Away,
+    Disconnected,
     /// Another master wrote an object that its TPDOs depend on.
     Written,
     /// A TPDO has another length than its mapping and made no row. Other TPDOs still make rows.
@@ -109,7 +109,7 @@ impl Rereads {
         let delay = if why == RereadReason::Written { WRITE_SETTLE_TIME } else { Duration::ZERO };
         let pending = self.pending.entry(node).or_insert_with(new);
         pending.due = now + delay;
-        pending.may_need_start |= why == RereadReason::Away;
+        pending.may_need_start |= why == RereadReason::Disconnected;
         if why != RereadReason::WrongLength {
             pending.recorded_since = None;
         }
@@ -172,7 +172,7 @@ impl Rereads {
     }
 
     /// The nodes whose frames make no rows.
-    pub(super) fn held(&self) -> impl Iterator<Item = NodeId> + '_ {
+    pub(super) fn paused(&self) -> impl Iterator<Item = NodeId> + '_ {
         self.pending.iter().filter(|(_, pending)| pending.recorded_since.is_none()).map(|(&node, _)| node)
     }
 }

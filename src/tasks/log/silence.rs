@@ -95,7 +95,7 @@ impl Recording<'_> {
         if !self.link_is_up {
             return of_recording(SilenceCause::InterfaceDown);
         }
-        if self.is_held(id) {
+        if self.is_paused(id) {
             return of_recording(SilenceCause::NotReadAgain);
         }
         if let Some(error) = self.poll.as_ref().and_then(|poll| poll.error(silent)) {

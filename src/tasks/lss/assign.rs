@@ -61,7 +61,7 @@ pub struct Assigned {
     pub retimed: bool,
     /// Whether both are stored.
     pub stored: bool,
-    /// What confirms it.
+    /// The confirmation.
     pub confirmed: Confirmed,
     /// The time from the reset to the boot-up message.
     pub boot_time: Option<Duration>,
@@ -76,7 +76,7 @@ pub struct Assigned {
 /// Sets node-ID, bit rate or both.
 ///
 /// # Errors
-/// The cause, how far the change has come, and what to do next; bus errors and Ctrl-C.
+/// The cause, the completed steps, and the next step; bus errors and Ctrl-C.
 pub fn assign(master: &mut Master<'_>, job: &Job<'_>, notify: Notify<'_>) -> Result<Assigned, Failure> {
     let (device, method, rate) = prepare(master, job, notify).map_err(unchanged)?;
     let mut work = Work { job, device: &device, method, rate, progress: Progress::new(job.id, rate) };
@@ -103,7 +103,7 @@ fn prepare(
     let device = resolve(master, &job.target, &job.descriptions, (job.via, job.force), notify)?;
     check_confirmed(device.node, device.model.as_deref())?;
     let method = choose_method(&device, job.via, job.store, notify)?;
-    let plan = |rate| plan_rate(device.description(), rate, method.way).map_err(|cause| device.failure(cause));
+    let plan = |rate| plan_rate(device.description(), rate, method.kind).map_err(|cause| device.failure(cause));
     let rate = job.rate.map(plan).transpose()?;
     if let (Some(RequestedRate::Bits(_)), RateSource::Standard) = (job.rate, RateTable::of(device.description()).source)
     {
@@ -120,7 +120,7 @@ fn prepare(
     Ok((device, method, rate))
 }
 
-/// A job with everything that was found out before.
+/// A job with the facts that were found before the first change.
 struct Work<'a> {
     job: &'a Job<'a>,
     device: &'a LssDevice,
@@ -144,7 +144,7 @@ impl Work<'_> {
                 return Ok(report);
             }
         }
-        let booted = match self.method.way {
+        let booted = match self.method.kind {
             AssignKind::Lss => self.by_lss(master, follows, follows || !leaves_host, notify)?,
             AssignKind::Objects => {
                 by_objects(master, device, &self.method, job.store, &mut self.progress)?;
@@ -222,12 +222,12 @@ impl Work<'_> {
     /// The objects to use after a failure: the device answers no LSS, nothing was changed, and the user did not choose
     /// the method.
     fn objects_after(&self, failure: &Failure) -> Option<AssignEntry> {
-        let is_lss = self.job.via == Via::Auto && self.method.way == AssignKind::Lss && !self.job.retime;
+        let is_lss = self.job.via == Via::Auto && self.method.kind == AssignKind::Lss && !self.job.retime;
         let is_silent = is_lss && is_silent(self.device, failure) && self.progress.stored == Stage::NotDone;
         objects_instead(self.device, self.job.store).filter(|_| is_silent)
     }
 
-    /// The failure with how far the change has come, and what to do next.
+    /// The failure with the completed steps and the next step.
     fn explain(&self, mut failure: Failure) -> Failure {
         if self.progress.is_unchanged() {
             return unchanged(failure);

@@ -21,7 +21,7 @@ const FIRST_ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 /// The pause before a silent device is asked again.
 const ASK_AGAIN_PAUSE: Duration = Duration::from_millis(100);
 
-/// What confirms the new values.
+/// The confirmation of the new values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Confirmed {
     /// The boot-up message of the new node-ID, and the identity read from it.
@@ -89,7 +89,7 @@ fn boot_up(master: &mut Master<'_>, new: NodeId, start: Mono) -> Result<Option<D
     Ok(booted.done())
 }
 
-/// What answers under the new node-ID. After a boot-up message a silent device is asked again.
+/// The device that answers under the new node-ID. After a boot-up message a silent device is asked again.
 fn first_answer(master: &mut Master<'_>, new: NodeId, has_booted: bool) -> Result<Occupant, Failure> {
     let until = master.now() + FIRST_ANSWER_TIMEOUT;
     loop {

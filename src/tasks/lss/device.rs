@@ -14,7 +14,7 @@ use crate::node::{Node, Overrides};
 use crate::tasks::{Failure, Note};
 use std::sync::Arc;
 
-/// What identifies a device in messages.
+/// The name of a device in messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DeviceName {
     /// Its node-ID; `None` if it has none or it is unknown.
@@ -86,7 +86,7 @@ impl LssDevice {
     pub(super) fn uses_lss(&self, via: Via) -> bool {
         let preferred = self.description().and_then(Description::preferred_assign);
         match via {
-            Via::Auto => preferred.is_none_or(|entry| entry.way == AssignKind::Lss),
+            Via::Auto => preferred.is_none_or(|entry| entry.kind == AssignKind::Lss),
             Via::Lss => true,
             Via::Sdo => false,
         }
@@ -116,12 +116,12 @@ impl LssDevice {
 pub struct Descriptions<'a> {
     /// For nodes.
     pub overrides: &'a Overrides,
-    /// For the target, whatever its node-ID is.
+    /// For the target, independently of its node-ID.
     pub given: Option<&'a Arc<Model>>,
 }
 
 impl Descriptions<'_> {
-    /// The description of a device: the one that the user named, else by what it answers by SDO, else by its identity.
+    /// The description of a device: the one that the user named, else by its SDO answers, else by its identity.
     ///
     /// # Errors
     /// Bus errors and Ctrl-C; a node that stops answering.

@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub struct LssFact {
     /// The device that it concerns.
     pub device: DeviceName,
-    /// What happened.
+    /// The event.
     pub event: LssEvent,
 }
 

@@ -66,7 +66,7 @@ pub enum LssCause {
     NoSuchRate {
         /// The title of the description; `None` for the table of CiA 305.
         title: Option<String>,
-        /// What was requested.
+        /// The requested bit rate.
         rate: RequestedRate,
         /// The rates of the table in bit/s.
         rates: Vec<u32>,
@@ -183,11 +183,11 @@ pub enum LssEffect {
 pub enum NextStep {
     /// Follow the hint of the cause.
     Cause,
-    /// After a power cycle, see what the device has become.
+    /// Check the node-ID and bit rate of the device after a power cycle.
     SeeAfterPowerCycle,
-    /// See after a power cycle whether it is stored, or store again.
+    /// Check after a power cycle whether it is stored, or store again.
     StoreAgain,
-    /// A power cycle discards what is not stored.
+    /// A power cycle discards values that are not stored.
     PowerCycle,
 }
 

@@ -35,7 +35,7 @@ pub struct PlannedRate {
 /// "Store all parameters".
 const STORE_ALL: ObjectId = ObjectId::new(0x1010, 1);
 
-/// Chooses the method. `store` says whether the new values are stored.
+/// Chooses the method. `store` is `true` if the new values are stored.
 ///
 /// # Errors
 /// The device has no known objects, they cannot be reached, or they cannot be set without storing.
@@ -56,9 +56,9 @@ pub(super) fn choose_method(
         }
     };
     let mut entry = entry.unwrap_or_else(AssignEntry::lss);
-    // Nothing is known of the device: it may answer LSS in STOPPED only.
+    // An unknown device may answer LSS in STOPPED only.
     entry.retry_stopped |= description.is_none_or(|description| description.assign.is_empty());
-    if entry.way == AssignKind::Objects {
+    if entry.kind == AssignKind::Objects {
         check_objects(device, &entry, store, notify)?;
     }
     Ok(entry)
@@ -72,7 +72,7 @@ pub(super) fn objects_instead(device: &LssDevice, store: bool) -> Option<AssignE
     is_usable.then(|| entry.clone())
 }
 
-/// Checks that the objects of a method can be used, and warns about what the description says about them.
+/// Checks that the objects of a method can be used, and warns about their doubts in the description.
 ///
 /// # Errors
 /// The objects cannot be reached, or cannot be set without storing.
@@ -114,7 +114,7 @@ pub(super) fn plan_rate(
     }
     let planned = match rate {
         RequestedRate::Index(index, bits) => {
-            // The standard table says nothing about the table of this device.
+            // The table of this device may differ from the standard table.
             let of_table = || table.rate_of(index).filter(|_| !is_standard);
             Some(PlannedRate { index, bits: bits.or_else(of_table), is_auto: false })
         }
@@ -138,7 +138,7 @@ pub(super) fn plan_rate(
 /// [`LssCause::NoSuchRate`] with the rates of the table.
 pub fn check_rate(description: &Description, rate: RequestedRate, via: Via) -> Result<(), Failure> {
     let method = match via {
-        Via::Auto => description.preferred_assign().map_or(AssignKind::Lss, |entry| entry.way),
+        Via::Auto => description.preferred_assign().map_or(AssignKind::Lss, |entry| entry.kind),
         Via::Lss => AssignKind::Lss,
         Via::Sdo => AssignKind::Objects,
     };
@@ -163,7 +163,7 @@ fn of_no_device(cause: LssCause) -> Failure {
 }
 
 fn needs_store(entry: &AssignEntry, store: bool) -> Result<(), LssCause> {
-    match entry.way {
+    match entry.kind {
         AssignKind::Objects if !store => Err(LssCause::NeedsStore(entry.store)),
         AssignKind::Objects | AssignKind::Lss => Ok(()),
     }

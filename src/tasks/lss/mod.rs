@@ -4,9 +4,9 @@
 //! - Nothing is changed before exactly one device is known to be addressed.
 //! - Every path out leaves the LSS configuration state.
 //! - A node is reset only if the reset cannot reach another device.
-//! - Success is what the device shows under its new node-ID, not what it acknowledged.
+//! - Success is proven by the device under its new node-ID, not by its acknowledgement.
 //!
-//! The modules, from the bottom up: `device` (the device and how LSS reaches it), `node_id` and `nodes` (what answers
+//! The modules, from the bottom up: `device` (the device and how LSS reaches it), `node_id` and `nodes` (the devices
 //! on the bus), `session` (configuration state), `sole` and `resolve` (from the argument to the device), `method`,
 //! `objects`, `retime`, `confirm`, `cob_ids`, and the tasks themselves: `assign`, `services`, `find`.
 
@@ -61,9 +61,9 @@ pub enum Target {
     Unconfigured,
 }
 
-/// A text that names no device.
+/// A text that is not a target of LSS.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("\"{0}\" names no device (5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured)")]
+#[error("\"{0}\" is not a device (5, VENDOR:PRODUCT:REVISION:SERIAL, only, unconfigured)")]
 pub struct TargetError(String);
 
 impl FromStr for Target {

@@ -25,7 +25,7 @@ const SECOND_ANSWER_TIMEOUT: Duration = Duration::from_millis(50);
 /// How long to listen for other nodes. The usual heartbeat time is 1 s.
 pub(super) const LISTEN_TIME: Duration = Duration::from_millis(1100);
 
-/// A time that no SDO transfer exceeds.
+/// The longest time of an SDO transfer.
 const MAX_TRANSFER_TIME: Duration = Duration::from_secs(3600);
 
 /// The evidence of two devices with one node-ID.

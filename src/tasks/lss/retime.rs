@@ -68,10 +68,10 @@ impl<'a> Retiming<'a> {
         let old = master.bus().bit_rate().ok_or_else(|| refuse(HostObstacle::NoBitRate))?;
         let name = master.bus().name().to_owned();
         master.bus().can_set_bit_rate().map_err(|error| not_set(error, set_rate(name, new)))?;
-        if method.way == AssignKind::Objects && !job.store {
+        if method.kind == AssignKind::Objects && !job.store {
             return Err(refuse(HostObstacle::AppliesAfterStore));
         }
-        if method.way == AssignKind::Objects && method.applies == Applies::Power {
+        if method.kind == AssignKind::Objects && method.applies == Applies::Power {
             return Err(refuse(HostObstacle::AppliesAtPowerOn));
         }
         check_alone(master, device)?;
@@ -89,11 +89,11 @@ impl<'a> Retiming<'a> {
         progress: &mut Progress,
         notify: Notify<'_>,
     ) -> Result<bool, Failure> {
-        match self.method.way {
+        match self.method.kind {
             AssignKind::Lss => self.by_lss(master, progress, notify)?,
             AssignKind::Objects => self.by_storing(master, progress, notify)?,
         }
-        Ok(self.job.id.is_none() || self.method.way == AssignKind::Objects)
+        Ok(self.job.id.is_none() || self.method.kind == AssignKind::Objects)
     }
 
     fn by_lss(&self, master: &mut Master<'_>, progress: &mut Progress, notify: Notify<'_>) -> Result<(), Failure> {

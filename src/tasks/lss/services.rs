@@ -11,7 +11,7 @@ use crate::canopen::lss::{LssAddress, Mode};
 use crate::master::{Lss, LssError, Master};
 use crate::tasks::{Effect, Failure};
 
-/// What a slave reports.
+/// The identity and node-ID that a slave reports.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Inquired {
     /// The device as the user named it.

@@ -13,7 +13,7 @@ use crate::master::lss::{Gathered, Others};
 use crate::master::{Lss, LssError, Master};
 use crate::tasks::Failure;
 
-/// What the slaves answer if all of them are asked at once.
+/// The answers of the slaves if all of them are asked at once.
 #[derive(Default)]
 struct SlaveAnswers {
     address: Option<LssAddress>,

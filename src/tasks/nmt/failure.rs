@@ -24,7 +24,7 @@ pub enum NmtFailure {
     Absent,
     /// A temporary write could not be recorded in the journal. It was not sent.
     NotRecorded(JournalError),
-    /// The description does not say which object decides how the device starts.
+    /// The object that decides how the device starts is not in the description.
     NoStartupObject,
 }
 

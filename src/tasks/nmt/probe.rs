@@ -24,7 +24,7 @@ pub struct Probe {
     pub report: StateReport,
     /// Why the probe failed.
     pub failure: Option<Failure>,
-    /// What 1017h holds after the probe if it was not restored, in milliseconds.
+    /// The value of 1017h in milliseconds after the probe, if it was not restored.
     pub left: Option<LeftHeartbeat>,
 }
 
@@ -42,7 +42,7 @@ pub struct LeftHeartbeat {
 /// Sets 1017h of a node, waits for a heartbeat and restores 1017h in every case.
 ///
 /// # Errors
-/// Bus errors and Ctrl-C. What the node rejects or does not answer is in the result.
+/// Bus errors and Ctrl-C. A rejection or a missing answer of the node is in the result.
 pub fn probe(master: &mut Master<'_>, node: &Node, journal: &mut dyn Journal) -> Result<Probe, MasterError> {
     let unknown = StateReport::unknown(node.id, true);
     let failed = |failure: Failure| Probe { report: unknown, failure: Some(failure), left: None };

@@ -107,7 +107,7 @@ impl Change<'_, '_> {
     }
 
     /// Whether the change can go on although the device rejected bit 31. Some devices do not know bit 31 and accept a new
-    /// mapping without it. Not if a description says that the device has bit 31.
+    /// mapping without it. Not if the device has bit 31 according to its description.
     fn may_stay_on(&self, error: &SdoError) -> bool {
         let is_unknown_bit = matches!(
             error.failure,

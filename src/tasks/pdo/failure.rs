@@ -47,7 +47,7 @@ pub enum PdoFailure {
     Occupied {
         /// The identifier.
         id: CanId,
-        /// What it is used for.
+        /// Its user.
         by: Occupant,
     },
     /// CiA 301 reserves the identifier for other services.
@@ -123,7 +123,7 @@ impl Parameter {
     }
 }
 
-/// What uses a CAN identifier.
+/// The user of a CAN identifier.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Occupant {
     /// A service of the whole bus: SYNC or TIME.
@@ -237,7 +237,7 @@ impl From<SdoError> for StepError {
     }
 }
 
-/// What a failed change left behind.
+/// The state that a failed change left behind.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PdoEffect {
     /// The previous mapping and parameters are set.
@@ -288,7 +288,7 @@ pub enum PdoFact {
         /// The groups of 1010h.
         groups: Vec<Group>,
     },
-    /// The description says that the object cannot be mapped. The request was sent anyway.
+    /// The object cannot be mapped according to the description. The request was sent anyway.
     MaybeNotMappable {
         /// The object.
         object: ObjectId,

@@ -29,7 +29,7 @@ pub struct MapReport {
     pub writes: u32,
     /// Whether the device acknowledged that it stored the settings.
     pub stored: bool,
-    /// What else there is to report.
+    /// Notes to report.
     pub notes: Vec<Note>,
 }
 
@@ -91,7 +91,7 @@ pub(in crate::tasks) struct Changed {
     pub writes: u32,
     /// The settings now.
     pub wanted: Settings,
-    /// What else there is to report.
+    /// Notes to report.
     pub notes: Vec<Note>,
 }
 

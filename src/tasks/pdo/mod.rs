@@ -2,7 +2,7 @@
 //!
 //! A mapping is changed in the order of CiA 301 (7.5.2.37, 7.5.2.38): switch the PDO off, set the number of entries to 0,
 //! write the entries, their number and the other parameters, switch the PDO on. Then either the new settings are read
-//! back, or the old ones are restored. If neither is possible, the failure says what is left.
+//! back, or the old ones are restored. If neither is possible, the failure describes the present state.
 
 mod change;
 mod failure;

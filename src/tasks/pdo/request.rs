@@ -208,8 +208,8 @@ fn unknown_name(node: &Node, name: &str) -> PdoFailure {
     PdoFailure::UnknownName { name: name.to_owned(), nearest: nearest(name, known), signals }
 }
 
-/// The object of a signal to map: its process value, unless the description says that only another object with the same
-/// value can be mapped.
+/// The object of a signal to map: its process value, unless according to the description only another object with the
+/// same value can be mapped.
 fn value_object(node: &Node, signal: &Signal) -> ObjectId {
     let value = signal.value.0;
     let Some(model) = &node.model else { return value };

@@ -71,11 +71,11 @@ pub struct Setting {
     pub name: String,
     /// The value, as read.
     pub value: Value,
-    /// What the value means.
+    /// The meaning of the value.
     pub meaning: Meaning,
 }
 
-/// What the value of an object means.
+/// The meaning of the value of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Meaning {
     /// Nothing else is known.
@@ -123,7 +123,7 @@ pub struct Channel {
 pub struct Store {
     /// The sub-indices of 1010h that can be written, with the capability bits read there.
     pub groups: Vec<(u8, u32)>,
-    /// The names of the settings that are stored, from the description; empty if it does not say.
+    /// The names of the settings that are stored, from the description; empty if they are unknown.
     pub kept: Vec<String>,
     /// The names of the settings that are lost at power off.
     pub lost: Vec<String>,

@@ -24,7 +24,7 @@ pub(super) fn is_own(object: ObjectId) -> bool {
 /// The objects in the unit of a signal, as indices without the first digit.
 const IN_UNIT: [u16; 9] = [0x121, 0x123, 0x124, 0x133, 0x134, 0x135, 0x136, 0x148, 0x149];
 
-/// What a value means.
+/// The meaning of a value.
 pub(super) fn meaning(
     node: &Node,
     values: &BTreeMap<ObjectId, Value>,
@@ -117,8 +117,9 @@ pub(super) fn store(node: &Node, values: &BTreeMap<ObjectId, Value>, at: ObjectI
         entry.access == Access::Rw && !acts && entry.at.first.index != 0x1003
     });
     // Node-ID and bit rate are stored by another command.
-    let ways = node.model.as_ref().map_or(&[][..], |model| &model.description.assign);
-    let assigned = ways.iter().flat_map(|way| [way.node_id, way.bit_rate]).flatten().map(|place| place.object);
+    let methods = node.model.as_ref().map_or(&[][..], |model| &model.description.assign);
+    let assigned =
+        methods.iter().flat_map(|method| [method.node_id, method.bit_rate]).flatten().map(|place| place.object);
     let assigned: Vec<ObjectId> = assigned.collect();
     for entry in settings {
         let is_assigned = entry.objects().any(|object| assigned.contains(&object));

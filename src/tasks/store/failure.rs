@@ -9,7 +9,7 @@ use crate::tasks::Kind;
 /// Settings were not stored or restored.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StoreFailure {
-    /// 1010h or 1011h says that the device does not carry out the command.
+    /// According to 1010h or 1011h the device does not support the command.
     NotOnCommand {
         /// The command.
         verb: Verb,
@@ -67,7 +67,7 @@ impl StoreFailure {
     }
 }
 
-/// What a failed store or restore had done.
+/// The completed steps of a failed store or restore.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StoreEffect {
     /// The signature was sent once. It is unknown whether the device acted on it.
@@ -85,7 +85,7 @@ pub enum StoreEffect {
     NotVerified(Verb),
 }
 
-/// What to report about a store or restore.
+/// Notes about a store or restore.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StoreFact {
     /// These groups are stored instead of all, which would reset these COB-IDs. A value is `None` if it cannot be read.

@@ -44,7 +44,7 @@ impl Verb {
         ObjectId::new(index, group.sub())
     }
 
-    /// What must be written to the object.
+    /// The signature for the object.
     pub fn signature(self) -> &'static str {
         match self {
             Verb::Store => "save",
@@ -94,7 +94,7 @@ impl Group {
     }
 }
 
-/// What proves that a command was carried out.
+/// The proof that a command was carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verified {
     /// The device acknowledged it.
@@ -120,9 +120,9 @@ pub struct StoreReport {
     pub node: NodeId,
     /// The groups, in the order in which they were sent.
     pub groups: Vec<Group>,
-    /// What proves it.
+    /// The proof.
     pub verified: Verified,
-    /// What else there is to report.
+    /// Notes to report.
     pub notes: Vec<Note>,
 }
 
@@ -134,14 +134,14 @@ pub fn device(master: &mut Master<'_>, node: NodeId, overrides: &Overrides) -> R
     Ok(identify(master, &[node], overrides)?.pop().unwrap_or_else(|| Node::new(node)))
 }
 
-/// What a store will do. Nothing has been changed yet.
+/// A planned store. Nothing has been changed yet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StorePlan {
     groups: Vec<Group>,
     notes: Vec<Note>,
 }
 
-/// Finds out which groups must be stored for `group`, and what the device does not store. Only reads.
+/// Finds out which groups must be stored for `group`, and which settings the device does not store. Only reads.
 ///
 /// # Errors
 /// The device does not store this group on command; no answer, protocol errors, bus errors and Ctrl-C.
@@ -177,7 +177,7 @@ pub fn plan(master: &mut Master<'_>, device: &Node, group: Group) -> Result<Stor
 ///
 /// # Errors
 /// The device does not store on command, rejects the command or does not answer; settings that it did not keep; bus
-/// errors and Ctrl-C. The effects say what was stored before.
+/// errors and Ctrl-C. The effects list the groups that were stored before.
 pub fn store(master: &mut Master<'_>, device: &Node, group: Group, verify: bool) -> Result<StoreReport, Failure> {
     let plan = plan(master, device, group)?;
     carry_out(master, device, plan, verify)

@@ -12,7 +12,7 @@ use crate::node::{Node, state};
 use crate::tasks::note::StateEffect;
 use crate::tasks::{Effect, Fact, Failure, Note};
 
-/// Settings of CiA 301 and CiA 404. They are read if the description does not say what the device stores.
+/// Settings of CiA 301 and CiA 404. They are read if the description does not list the stored settings.
 const COMMUNICATION: [u16; 11] =
     [0x1005, 0x1006, 0x1007, 0x100c, 0x100d, 0x1012, 0x1014, 0x1015, 0x1017, 0x1019, 0x1f80];
 const APPLICATION: [u16; 14] =
@@ -41,7 +41,7 @@ impl Snapshot {
     }
 }
 
-/// The objects of the description; `None` if it does not say which of them the device stores.
+/// The objects of the description; `None` if it does not state which of them the device stores.
 fn described(device: &Node) -> Option<&[ObjectEntry]> {
     let entries = &device.model.as_ref()?.description.objects;
     entries.iter().any(|entry| entry.stored.is_some()).then_some(entries)

@@ -46,8 +46,8 @@ fuzz_target!(|data: &[u8]| {
         let frame = bytes.frame(CanId::standard(0x185).expect("eleven bits"));
         let mut samples = Vec::new();
         match decoder.decode(&Received { frame, at }, &mut samples) {
-            Decoded::NotOurs => assert!(frame.is_remote() || Some(frame.id()) != CanId::standard(0x185)),
-            Decoded::Held(_) => panic!("a TPDO is held without a request"),
+            Decoded::OtherFrame => assert!(frame.is_remote() || Some(frame.id()) != CanId::standard(0x185)),
+            Decoded::Paused(_) => panic!("a TPDO is held without a request"),
             Decoded::WrongLength(_) => assert_ne!(frame.data().len(), bits.div_ceil(8)),
             Decoded::Tpdo(of) => {
                 assert_eq!((of, frame.data().len()), (node(), bits.div_ceil(8)));

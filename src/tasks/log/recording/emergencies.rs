@@ -60,7 +60,7 @@ impl Emergencies {
         }
     }
 
-    /// Takes what became known of a node, and keeps its last emergency.
+    /// Updates the facts about a node, and keeps its last emergency.
     pub(super) fn learn(&mut self, node: &Node) {
         let last = self.repeating.get(&node.id).copied();
         self.watch(node);
@@ -100,8 +100,8 @@ impl Emergencies {
         Some((recent.node, recent.emergency, std::mem::take(&mut recent.count)))
     }
 
-    /// What an emergency code means on this node, and the bits of its error register in words, unless the device always
-    /// sends the same register with this code.
+    /// The meaning of an emergency code on this node, and the bits of its error register in words, unless the device
+    /// always sends the same register with this code.
     pub(super) fn meaning(&self, node: NodeId, emergency: Emergency) -> String {
         let description = self.models.get(&node).map(|model| &model.description);
         let described = description.and_then(|description| description.emergency(emergency.code));
@@ -115,7 +115,7 @@ impl Emergencies {
         emergency.register.map(words).map_or(text.clone(), |words| format!("{text}, {words}"))
     }
 
-    /// What an emergency says about an overload of its node.
+    /// The overload of its node that an emergency reports.
     pub(super) fn overload(&self, node: NodeId, emergency: Emergency) -> Option<OverloadChange> {
         let description = &self.models.get(&node)?.description;
         if emergency.code != 0 {

@@ -1,4 +1,4 @@
-//! What can happen during a recording, and how it continues.
+//! Incidents during a recording, and how it continues.
 
 use super::Recording;
 use super::emergencies::OverloadChange;
@@ -120,7 +120,7 @@ impl Recording<'_> {
             HeartbeatChange::None => {}
             HeartbeatChange::Back => {
                 observer.event(&LogEvent::HeartbeatBack(node), at);
-                self.request_reread(node, RereadReason::Away, at.mono, master);
+                self.request_reread(node, RereadReason::Disconnected, at.mono, master);
             }
             // This is the expected state.
             HeartbeatChange::State(NmtState::Operational) => {}
@@ -134,7 +134,7 @@ impl Recording<'_> {
     fn restarted(&mut self, node: NodeId, at: Stamp, master: &mut Master<'_>, observer: &mut dyn Observer) {
         self.tally.events.restarts += 1;
         observer.event(&LogEvent::Restarted(node), at);
-        self.request_reread(node, RereadReason::Away, at.mono, master);
+        self.request_reread(node, RereadReason::Disconnected, at.mono, master);
     }
 
     /// Takes the nodes that restarted between their survey and the recording.
@@ -161,9 +161,9 @@ impl Recording<'_> {
         }
         // After a wrong length, frames with the right length still make rows: they fit the known mapping.
         if !matches!(why, RereadReason::WrongLength | RereadReason::FramesLost) {
-            self.decoder.hold(node);
+            self.decoder.pause(node);
             if let Some(poll) = &mut self.poll {
-                poll.hold(node);
+                poll.pause(node);
             }
         }
     }
@@ -176,7 +176,7 @@ impl Recording<'_> {
     /// Nothing could be received until now: boot-ups may have been missed.
     fn reception_resumed(&mut self, now: Mono, master: &mut Master<'_>) {
         self.liveness.restart_all(now);
-        self.request_all_rereads(RereadReason::Away, now, master);
+        self.request_all_rereads(RereadReason::Disconnected, now, master);
     }
 
     /// The kernel dropped frames.

@@ -42,7 +42,7 @@ impl Recording<'_> {
         }
         let buffer = self.receive_buffer.filter(|buffer| self.tally.dropped > 0 && buffer.is_small());
         self.remarks.extend(buffer.map(Remark::SmallReceiveBuffer));
-        self.remarks.extend(self.rereads.held().map(Remark::NotReadAgain));
+        self.remarks.extend(self.rereads.paused().map(Remark::NotReadAgain));
         self.remarks.extend(self.not_operational());
         if self.tally.rows > 0 {
             let requests = matches!(self.options.mode, Mode::Request(_));

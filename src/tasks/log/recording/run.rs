@@ -109,7 +109,7 @@ impl Recording<'_> {
         due.fold(schedule.next_tick, Mono::min)
     }
 
-    /// Does what is due at `now`.
+    /// Carries out the work that is due at `now`.
     fn deadline(
         &mut self,
         now: Mono,

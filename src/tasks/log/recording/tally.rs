@@ -8,7 +8,7 @@ use crate::measure::sample::{Sample, Source};
 use crate::measure::statistics::Statistics;
 use std::time::Duration;
 
-/// What was recorded so far.
+/// The counts of a recording so far.
 #[derive(Debug)]
 pub(super) struct Tally {
     /// Per source.

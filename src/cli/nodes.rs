@@ -14,37 +14,38 @@ use crate::tasks::settings::{open as open_node, select};
 use crate::tasks::{Failure, Kind, Note};
 
 /// The results of all nodes.
-pub(super) struct Each<T> {
-    asked: usize,
+pub(super) struct NodeResults<T> {
+    /// The number of nodes that were named.
+    count: usize,
     /// The nodes that succeeded, in the order in which they were named.
     pub(super) done: Vec<(NodeId, T)>,
     failures: Vec<Failure>,
 }
 
 /// Runs `work` on every node, one after the other. A bus failure or Ctrl-C ends it.
-pub(super) fn each<T>(
+pub(super) fn on_each_node<T>(
     global: &Global,
     nodes: &Nodes,
     mut work: impl FnMut(&mut Master<'_>, NodeId, &Overrides) -> Result<T, Failure>,
-) -> anyhow::Result<Each<T>> {
+) -> anyhow::Result<NodeResults<T>> {
     global.with_master(|master| {
         let nodes = open::nodes(master, global, nodes)?;
         let overrides = descriptions::overrides_on(master, global, &nodes)?;
-        let mut each = Each { asked: nodes.len(), done: Vec::new(), failures: Vec::new() };
+        let mut results = NodeResults { count: nodes.len(), done: Vec::new(), failures: Vec::new() };
         for &node in &nodes {
             let result = master.listen_to(&[node]).map_err(Failure::from).and_then(|()| work(master, node, &overrides));
             match result {
-                Ok(done) => each.done.push((node, done)),
+                Ok(done) => results.done.push((node, done)),
                 Err(failure) => {
                     let ends = matches!(failure.kind(), Kind::Interrupted | Kind::Bus);
-                    each.failures.push(failure);
+                    results.failures.push(failure);
                     if ends {
                         break;
                     }
                 }
             }
         }
-        Ok(each)
+        Ok(results)
     })
 }
 
@@ -69,45 +70,45 @@ pub(super) fn on_channels<T>(
     signals: Option<&str>,
     applies: impl Fn(&Node, &Signal) -> bool,
     mut work: impl FnMut(&mut Master<'_>, &mut Node, Option<&str>) -> Result<T, Failure>,
-) -> anyhow::Result<Each<T>> {
+) -> anyhow::Result<NodeResults<T>> {
     on_node(global, node, |master, node| {
         let names = signals.map(|text| select(node, text, |signal| applies(node, signal))).transpose()?;
         let names: Vec<Option<String>> = names.map_or(vec![None], |names| names.into_iter().map(Some).collect());
-        let mut each = Each { asked: names.len(), done: Vec::new(), failures: Vec::new() };
+        let mut results = NodeResults { count: names.len(), done: Vec::new(), failures: Vec::new() };
         for name in names {
             match work(master, node, name.as_deref()) {
-                Ok(done) => each.done.push((node.id, done)),
-                // The same is wrong with the other channels, or nothing was asked of them.
-                Err(failure) if failure.kind() == Kind::Usage && each.done.is_empty() => return Err(failure),
+                Ok(done) => results.done.push((node.id, done)),
+                // The other channels would fail in the same way, or nothing was requested from them.
+                Err(failure) if failure.kind() == Kind::Usage && results.done.is_empty() => return Err(failure),
                 Err(failure) => {
                     let ends = matches!(failure.kind(), Kind::Interrupted | Kind::Bus | Kind::NoAnswer);
-                    each.failures.push(failure);
+                    results.failures.push(failure);
                     if ends {
                         break;
                     }
                 }
             }
         }
-        Ok(each)
+        Ok(results)
     })
 }
 
-impl<T> Each<T> {
-    /// The results, without their nodes, and what the command ends with.
-    pub(super) fn into_parts(self) -> (Vec<T>, Each<T>) {
-        let Each { asked, done, failures } = self;
-        (done.into_iter().map(|(_, done)| done).collect(), Each { asked, done: Vec::new(), failures })
+impl<T> NodeResults<T> {
+    /// The results without their nodes, and the failures for the end of the command.
+    pub(super) fn into_parts(self) -> (Vec<T>, NodeResults<T>) {
+        let NodeResults { count, done, failures } = self;
+        (done.into_iter().map(|(_, done)| done).collect(), NodeResults { count, done: Vec::new(), failures })
     }
 
-    /// Turns failures that `all` tolerates into notes, if at least one node succeeded: `all` does not mean the
-    /// nodes that lack the feature.
-    pub(super) fn excuse(&mut self, global: &Global, excused: impl Fn(&Failure) -> bool) {
+    /// Turns tolerated failures into notes, if at least one node succeeded. With `all`, a node without the feature is
+    /// no failure.
+    pub(super) fn tolerate(&mut self, global: &Global, is_tolerated: impl Fn(&Failure) -> bool) {
         if self.done.is_empty() {
             return;
         }
-        let (without, failed): (Vec<_>, Vec<_>) =
-            std::mem::take(&mut self.failures).into_iter().partition(|failure| excused(failure));
-        without.iter().for_each(|failure| global.console().note(&ErrorMessage::from(failure).message));
+        let (tolerated, failed): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.failures).into_iter().partition(|failure| is_tolerated(failure));
+        tolerated.iter().for_each(|failure| global.console().note(&ErrorMessage::from(failure).message));
         self.failures = failed;
     }
 
@@ -116,7 +117,7 @@ impl<T> Each<T> {
     /// # Errors
     /// The failures, with the exit code for several nodes.
     pub(super) fn end(self) -> anyhow::Result<()> {
-        Ok(several(self.asked, self.failures)?)
+        Ok(several(self.count, self.failures)?)
     }
 }
 
