@@ -188,6 +188,10 @@ fn description_without_a_manual_page_allows_reading_only() {
         let bench = Bench::of(&format!("{name}@1"));
         bench.run(&format!("read 1 {signal}")).exit(0);
         for line in ["store 1", "autozero 1", "tare 1", "lss set-id 1 9", "lss set-bitrate 1 250k"] {
+            // LSS reaches only devices with a serial number.
+            if line.starts_with("lss") && name != "hydronautics" {
+                continue;
+            }
             let done = bench.run(line).exit(2);
             let unchanged = if line.starts_with("lss") { "; nothing was changed" } else { "" };
             assert_eq!(done.stderr, refusal(name, unchanged), "{line}");
