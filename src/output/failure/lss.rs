@@ -31,15 +31,7 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
             Words::new("it has no serial number, so it cannot be distinguished from another device")
                 .hint("connect only this device, and use the target \"only\"")
         }
-        LssCause::DuplicateNodeId(DuplicateSign::OtherMaster) => {
-            Words::new(duplicate(DuplicateSign::OtherMaster)).hint("stop the other program, or try again")
-        }
-        LssCause::DuplicateNodeId(sign) => {
-            Words::new(format!("{}: it seems that several devices have this node-ID", duplicate(*sign))).hint(
-                "connect one device at a time, or name one by the identity on its label: \
-                 cangauge lss set-id VENDOR:PRODUCT:REVISION:SERIAL NEW",
-            )
-        }
+        LssCause::DuplicateNodeId(sign) => duplicate_node_id(*sign),
         LssCause::NoAnswer(waited) => Words::new(format!("no answer within {}", format_duration(*waited)))
             .hint("check its node-ID, power and cable; list the devices: cangauge lss scan"),
         LssCause::OtherNodeIdByLss(found) => {
@@ -84,6 +76,18 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
         | LssCause::NotAloneForRetime(_)
         | LssCause::SilentAtRate(_)
         | LssCause::SilentAfterStore { .. } => retime(&cause.cause),
+    }
+}
+
+/// Answers under a node-ID cannot be assigned to one device.
+fn duplicate_node_id(sign: DuplicateSign) -> Words {
+    let words = duplicate(sign);
+    match sign {
+        DuplicateSign::OtherMaster => Words::new(words).hint("stop the other program, or try again"),
+        _ => Words::new(format!("{words}: it seems that several devices have this node-ID")).hint(
+            "connect one device at a time, or name one by the identity on its label: \
+             cangauge lss set-id VENDOR:PRODUCT:REVISION:SERIAL NEW",
+        ),
     }
 }
 

@@ -74,8 +74,9 @@ fn address_is_repeated_with_pauses() {
         let mut slave = Slave::new(ONE, 5);
         slave.pause = Duration::from_millis(pause);
         let mut bus = bus_of([slave]);
-        run(&mut bus, |lss| assign(lss, ONE, node(12))).unwrap();
-        assert_eq!(bus.stations::<Slave>().map(|slave| slave.node).collect::<Vec<_>>(), [12], "{pause} ms");
+        let mut master = Master::new(&mut bus, Timing::default());
+        let selected = master.lss().switch_selective(&address(ONE));
+        assert_eq!(selected.map_err(|error| error.to_string()), Ok(()), "{pause} ms");
     }
 }
 
