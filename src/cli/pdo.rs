@@ -6,9 +6,11 @@ use super::{Global, descriptions, open};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::canopen::pdo::TpdoNumber;
+use crate::output::events::remark_text;
 use crate::output::failure::ErrorMessage;
-use crate::output::notes;
 use crate::output::pdo::ReceivedTpdo;
+use crate::output::{diagnosis, notes};
+use crate::tasks::log::Remark;
 use crate::tasks::pdo::{Item, PdoRequest, Trigger, WatchEvent, map, show, watch};
 use clap::{Args, Subcommand};
 use std::ops::ControlFlow;
@@ -260,8 +262,11 @@ impl WatchArgs {
                         console.warn(&format!("{}: the node is not shown", ErrorMessage::of(failure).message));
                         node_failures.push(failure.clone());
                     }
-                    WatchEvent::NothingYet => {
-                        console.note("no TPDO yet: are the nodes operational, and does a node send SYNC?");
+                    WatchEvent::NothingYet(nodes) => {
+                        console.note(&format!("no TPDO yet; {}", diagnosis::reasons(nodes)));
+                    }
+                    WatchEvent::Repeated(node, number) => {
+                        console.warn(&remark_text(&Remark::RepeatedTpdo(node, number)));
                     }
                     WatchEvent::WrongLength { node, number, length, .. } => {
                         console.warn(&format!(

@@ -124,9 +124,22 @@ fn or_not_running(running: Running) -> &'static str {
     }
 }
 
-/// A command to type, or one thing to check.
-pub fn hint(silence: &Silence, node: NodeId) -> Option<String> {
-    let poll = || Some("read by SDO instead: add --poll 100ms".to_owned());
+/// How many nodes a message lists with their reasons.
+const MAX_LISTED: usize = 3;
+
+/// The reasons of the first nodes: `node 5: …; node 6: …`.
+pub fn reasons(nodes: &[(NodeId, Silence)]) -> String {
+    let listed = nodes.iter().take(MAX_LISTED);
+    let mut reasons: Vec<String> = listed.map(|(node, silence)| format!("node {node}: {}", reason(silence))).collect();
+    if nodes.len() > MAX_LISTED {
+        reasons.push(format!("{} more", nodes.len() - MAX_LISTED));
+    }
+    reasons.join("; ")
+}
+
+/// A command to type, or one thing to check. `log` is how options of `log` are given: `add`, or the command.
+pub fn hint(silence: &Silence, node: NodeId, log: &str) -> Option<String> {
+    let poll = || Some(format!("read by SDO instead: {log} --poll 100ms"));
     match &silence.cause {
         SilenceCause::InterfaceDown => Some("show the interfaces: cangauge bus list".to_owned()),
         SilenceCause::NotReadAgain | SilenceCause::PollFailed(_) | SilenceCause::SharedCobId(..) => None,
@@ -145,16 +158,18 @@ pub fn hint(silence: &Silence, node: NodeId) -> Option<String> {
         SilenceCause::WrongLength { .. } | SilenceCause::NoTpdo => poll(),
         SilenceCause::Tpdo(number, cause) => match cause {
             TpdoCause::OnlyOnRequest(_) => {
-                Some("read by SDO instead: add --poll 100ms (or request it: --request 100ms)".to_owned())
+                Some(format!("read by SDO instead: {log} --poll 100ms (or request it: --request 100ms)"))
             }
-            TpdoCause::WaitsForSync(_) => Some(format!("add --sync 100ms, or read by SDO: --poll 100ms (node {node})")),
+            TpdoCause::WaitsForSync(_) => {
+                Some(format!("{log} --sync 100ms, or read by SDO: --poll 100ms (node {node})"))
+            }
             TpdoCause::NotSentAtSync | TpdoCause::Due(_) if silence.running == Running::Operational => poll(),
             TpdoCause::NotSentAtSync | TpdoCause::Due(_) if silence.running == Running::NotStopped => {
                 Some(format!("cangauge nmt state {node} --probe"))
             }
             TpdoCause::NotSentAtSync | TpdoCause::Due(_) => Some("check its power and cable".to_owned()),
             TpdoCause::SlowEventTimer(_) | TpdoCause::NoTrigger(..) | TpdoCause::SendsOnChange => Some(format!(
-                "read by SDO instead: add --poll 100ms (or: cangauge pdo map {node} {} --event-timer 100ms)",
+                "read by SDO instead: {log} --poll 100ms (or: cangauge pdo map {node} {} --event-timer 100ms)",
                 number.get()
             )),
             TpdoCause::SyncRejected => {

@@ -7,7 +7,7 @@ use crate::bus::Stamp;
 use crate::canopen::id::NodeId;
 use std::io;
 use std::time::Duration;
-pub use text::{event_text, heartbeat_text, remark_text};
+pub use text::{event_text, heartbeat_text, remark_text, two_senders};
 
 /// The columns.
 pub const COLUMNS: [&str; 5] = ["time", "elapsed_s", "node", "event", "text"];

@@ -184,6 +184,8 @@ pub struct RecordingReport {
     pub statistics: Vec<(Source, Statistics)>,
     /// Nodes whose setup could not be read. They were not recorded.
     pub failed: Vec<Failure>,
+    /// Nodes with a TPDO that two devices send. Their TPDOs made no rows after that was found.
+    pub two_senders: Vec<Failure>,
     /// Nodes that sent no samples, or stopped before the end.
     pub lost: Vec<NodeId>,
     /// Why there are no values.
@@ -306,7 +308,7 @@ fn survey(
 }
 
 /// If the answers of a node arrive twice, compares its mapped values: two devices of one type may differ only in these.
-fn compare_values(master: &mut Master<'_>, node: &Node) -> Result<Result<(), SdoError>, Error> {
+pub(super) fn compare_values(master: &mut Master<'_>, node: &Node) -> Result<Result<(), SdoError>, Error> {
     if !master.second_answers().iter().any(|&(twice, _)| twice == node.id) {
         return Ok(Ok(()));
     }
@@ -330,6 +332,7 @@ fn record_passively(
     let mut listener = SetupListener::new(&options.nodes, &options.overrides, &options.wanted);
     listener.apply_overrides(&mut recording.decoder);
     recording.watch_emergencies(options.nodes.iter().map(|&node| listener.known_node(node)));
+    recording.watch_syncs(options.nodes.iter().map(|&node| listener.known_node(node)));
     recording.listener = Some(listener);
     recording.update_sources();
     master.listen(&Filters::All)?;

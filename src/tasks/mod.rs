@@ -21,6 +21,7 @@ pub mod scan;
 pub mod sdo;
 pub mod settings;
 pub mod store;
+mod synced;
 
 pub use failure::{Failure, Kind};
 pub use note::{Effect, Fact, Note};

@@ -132,6 +132,7 @@ case("nmt reset 5", out="pre-operational|boot-up")(
 
 @case("read 5", out="1.25 bar")
 @case("read 5 -t 2s", out="1.25 bar")
+@case("sdo read 5 0x1000 0x1018:1 0x1018:2 --retries 0", 3, err="-t 2s")
 class SlowThird(Device):
     """Every third answer comes after 0.9 s; the name has more than seven bytes."""
 

@@ -429,3 +429,39 @@ fn tpdo_that_answers_no_request_is_refused_or_named() {
         .run("log 1 --request 100us")
         .refuses("\"100us\" is too short for remote requests (1ms or more)");
 }
+
+/// Node 6 sends TPDO1 with the COB-ID of node 5.
+fn shared_cob_id(values: [f64; 2]) -> Bench {
+    let device = |(node, value): (u8, f64)| {
+        let set = if node == 6 { "start = true\nset = { \"0x1800:1\" = 0x40000185 }\n" } else { "" };
+        format!(
+            "[[device]]\nkind = \"mh4\"\nnode = {node}\n{set}\
+             [[device.channel]]\nchannel = 1\nbase = {value:?}\namplitude = 0.0\nnoise = 0.0\n"
+        )
+    };
+    Bench::described(&[5, 6].into_iter().zip(values).map(device).collect::<String>())
+}
+
+#[test]
+fn second_sender_of_a_tpdo_gives_no_value() {
+    for interval in ["100ms", "60ms"] {
+        let done = shared_cob_id([1.25, 2.5]).run(&format!("log 5 pressure --sync {interval} --duration 1s")).exit(6);
+        assert!(!done.stdout.contains("pressure"), "{}", done.stdout);
+        assert!(
+            done.stderr.contains("TPDO1 arrives twice at a SYNC, with different values: two devices have this node-ID"),
+            "{}",
+            done.stderr
+        );
+        assert!(done.stderr.contains("hint: disconnect one of them"), "{}", done.stderr);
+    }
+}
+
+#[test]
+fn values_of_the_first_sync_are_kept_in_order() {
+    for line in ["log 1,2 --sync 10ms --count 8", "log 1,2 --sync 1s --count 2", "log 1,2 --sync 20ms --duration 30ms"]
+    {
+        let done = Bench::of("mh4@1,d20@2").run(line).exit(0);
+        let times: Vec<&str> = done.stdout.lines().skip(1).filter_map(|row| row.split(',').next()).collect();
+        assert!(times.len() >= 2 && times.is_sorted(), "{line}: {}", done.stdout);
+    }
+}

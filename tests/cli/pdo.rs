@@ -333,6 +333,29 @@ fn settings_that_the_device_stores_are_stored() {
     assert_eq!(steps(&done, 127), [""; 0]);
 }
 
+/// The reason is that of `log`, with commands that can be typed.
+#[test]
+fn watch_gives_the_reason_for_silence() {
+    let bench = |more: &str| Bench::described(&format!("[[device]]\nkind = \"mh4\"\nnode = 5\nstart = true\n{more}"));
+    for (set, reason, hint) in [
+        ("", "TPDO1 waits for SYNC", "cangauge log 5 --sync 100ms"),
+        (
+            "set = { \"0x1800:1\" = 0xC0000185, \"0x1801:1\" = 0xC0000285 }",
+            "its TPDOs are disabled (bit 31",
+            "cangauge log 5 --poll",
+        ),
+        (
+            "set = { \"0x1800:2\" = 254, \"0x1800:5\" = 60000 }",
+            "the event timer of TPDO1 is longer",
+            "--event-timer 100ms",
+        ),
+        ("set = { \"0x1017\" = 100, \"0x1800:2\" = 240 }", "TPDO1 waits for SYNC", "cangauge log 5"),
+    ] {
+        let done = bench(set).run("pdo watch 5 --duration 2s").exit(3);
+        assert!(done.stderr.contains(reason) && done.stderr.contains(hint), "{set}: {}", done.stderr);
+    }
+}
+
 #[test]
 fn watch() {
     let bench = Bench::described(
@@ -353,6 +376,13 @@ fn watch() {
     assert_eq!(csv.lines().next(), Some("time,node,pdo,signal,value,unit,status,raw"));
     assert!(csv.lines().nth(1).is_some_and(|line| line.ends_with(",127,1,pressure,50.000,psi,,0x50C30000")), "{csv}");
     let silent = Bench::of("dps@127").run("pdo watch 127 --duration 8s").exit(3);
-    let said = "no TPDO yet: are the nodes operational, and does a node send SYNC?\ncangauge: no TPDO was received\n";
-    assert!(silent.stderr.starts_with(said), "{}", silent.stderr);
+    let reason = "node 127: TPDO1 is due every 100 ms (1800h:5), and no TPDO1 was received: the node answers SDO, and is \
+                  probably not operational";
+    assert_eq!(
+        silent.stderr.lines().skip(1).collect::<Vec<_>>(),
+        [&format!("cangauge: no TPDO was received; {reason}"), "hint: cangauge nmt state 127 --probe"],
+        "{}",
+        silent.stderr
+    );
+    assert!(silent.stderr.starts_with(&format!("no TPDO yet; {reason}\n")), "{}", silent.stderr);
 }

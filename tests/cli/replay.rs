@@ -30,6 +30,27 @@ fn replay_gives_the_rows_of_the_live_log() {
     assert!(all.stderr.contains("recorded timestamps"), "{}", all.stderr);
 }
 
+/// `t.log` has four cycles of SYNC and these frames.
+fn cycles(bench: &Bench, frames: &[&str]) {
+    let all = (0..4).flat_map(|_| ["080#"].iter().chain(frames)).zip(100..);
+    let lines: String = all.map(|(frame, at)| format!("({at}.000000) can0 {frame}\n")).collect();
+    fs::write(bench.path("t.log"), lines).expect("written");
+}
+
+#[test]
+fn second_sender_of_a_tpdo_is_found_in_a_recording() {
+    let bench = Bench::of("mh4@5");
+    let log = "log 5 pressure --device mh4";
+    cycles(&bench, &["185#0000A03F00", "185#0000204000"]);
+    let done = replay(&bench, "t.log", log).exit(6);
+    assert!(done.stderr.contains("node 5: TPDO1 arrives twice at a SYNC, with different values"), "{}", done.stderr);
+    cycles(&bench, &["185#0000A03F00", "185#0000A03F00"]);
+    let done = replay(&bench, "t.log", log).exit(0);
+    assert!(done.stderr.contains("TPDO1 arrives twice at a SYNC: two devices send it"), "{}", done.stderr);
+    cycles(&bench, &["185#0000A03F00", "285#0000A03F00"]);
+    assert!(!replay(&bench, "t.log", log).exit(0).stderr.contains("twice"));
+}
+
 #[test]
 fn unusual_heartbeats_are_reported_once() {
     let bench = Bench::of("mh4@1");

@@ -231,6 +231,12 @@ fn too_narrow_integer_is_a_warning_before_it_clips() {
         let warning = "warning: node 5: pressure: 0x7130:1 ends at 32.767 psi";
         assert!(done.stderr.contains(warning) && done.stderr.contains("0x9130:1"), "{line}: {}", done.stderr);
     }
+    // The mapping itself narrows the value.
+    for line in ["pdo map 5 1 0x7130:1", "pdo map 5 2 0x7130:1 pressure.status"] {
+        let done = mapped("\"0x6131:1\" = 0x00AB0000, \"0x6149:1\" = 145.0").run(line).exit(0);
+        let warning = "warning: node 5: pressure: 0x7130:1 ends at 32.767 psi";
+        assert!(done.stderr.contains(warning) && done.stderr.contains("0x9130:1"), "{line}: {}", done.stderr);
+    }
     let done = mapped("\"0x1017\" = 0").run("pdo map 5 1 0x7130:1").exit(0);
     assert!(!done.stderr.contains("clipped"), "10 bar fit: {}", done.stderr);
 }

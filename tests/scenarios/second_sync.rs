@@ -9,8 +9,10 @@ use cangauge::master::{Master, Timing};
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Bench, Device, State};
 use cangauge::tasks::log::{LogOptions, Mode, log};
+use cangauge::tasks::pdo::{WatchEvent, watch};
 use cangauge::tasks::{Failure, Kind};
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
@@ -67,6 +69,68 @@ fn second_sync_producer_is_refused_before_any_node_is_started() {
     assert_eq!(kept.rows, [""; 0]);
     let state = bus.stations::<Device>().next().and_then(Device::state);
     assert_eq!(state, Some(State::PreOperational));
+}
+
+/// Repeats each TPDO of node 5 after 1 ms.
+#[derive(Default)]
+struct Bridge(Option<(Mono, Frame)>);
+
+impl Station for Bridge {
+    fn power_on(&mut self, _: Mono, _: &mut Outbox) {}
+
+    fn receive(&mut self, now: Mono, frame: &Frame, _: &mut Outbox) {
+        if frame.id().to_string() == "185" {
+            self.0 = Some((now + Duration::from_millis(1), *frame));
+        }
+    }
+
+    fn wake(&mut self, _: Mono, out: &mut Outbox) {
+        out.send(self.0.take().expect("a frame").1);
+    }
+
+    fn next_wake(&self) -> Option<Mono> {
+        self.0.map(|(at, _)| at)
+    }
+
+    fn sent(&mut self, _: Mono, _: &Frame) {}
+}
+
+/// Watches a node on a bus with SYNC, and a second sender of its TPDO: a device, else a bridge.
+fn watched(second: Option<f64>) -> (Vec<String>, Vec<Kind>) {
+    let device = |(node, pressure): (u8, f64)| {
+        format!(
+            "[[device]]\nkind = \"mh4\"\nnode = {node}\nstart = true\nset = {{ \"0x1800:1\" = 0x40000185 }}\n\
+             [[device.channel]]\nchannel = 1\nbase = {pressure:?}\namplitude = 0.0\nnoise = 0.0\n"
+        )
+    };
+    let devices = [Some((5, 1.25)), second.map(|pressure| (6, pressure))];
+    let text = format!("clock = \"virtual\"\n{}", devices.into_iter().flatten().map(device).collect::<String>());
+    let mut bus = Bench::from_toml(&text, Path::new("")).expect("a bench").open().expect("a bus");
+    if second.is_none() {
+        bus.attach(Bridge::default());
+    }
+    bus.attach(Controller { next: Mono::START + PERIOD });
+    let mut events = Vec::new();
+    let mut on_event = |event: &WatchEvent<'_>| {
+        events.push(match event {
+            WatchEvent::Tpdo { .. } => "value".to_owned(),
+            other => format!("{other:?}").chars().take(8).collect(),
+        });
+        ControlFlow::Continue(())
+    };
+    let nodes = [NodeId::new(5).expect("a node-ID")];
+    let mut master = Master::new(&mut bus, Timing::default());
+    let failures = watch(&mut master, &nodes, &BTreeMap::new(), Some(Duration::from_secs(1)), &mut on_event);
+    (events, failures.expect("watched").iter().map(Failure::kind).collect())
+}
+
+#[test]
+fn second_sender_of_a_watched_tpdo_is_found() {
+    let (events, failures) = watched(Some(2.5));
+    assert_eq!((events.last().map(String::as_str), failures), (Some("Failed(F"), vec![Kind::Unexpected]));
+    let (events, failures) = watched(None);
+    assert_eq!((events.iter().filter(|event| event.starts_with("Repeated")).count(), failures.len()), (1, 0));
+    assert!((18..24).contains(&events.iter().filter(|event| *event == "value").count()), "{events:?}");
 }
 
 #[test]

@@ -5,6 +5,7 @@ use crate::bus::time::format_duration;
 use crate::bus::{Fault, ReceiveBuffer};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::id::NodeId;
+use crate::canopen::pdo::TpdoNumber;
 use crate::output::diagnosis;
 use crate::output::failure::ErrorMessage;
 use crate::tasks::Failure;
@@ -127,6 +128,11 @@ fn allow_larger(buffer: ReceiveBuffer) -> String {
     format!("sudo sysctl net.core.rmem_max={}", buffer.wanted / 2)
 }
 
+/// A TPDO comes from two devices.
+pub fn two_senders(number: TpdoNumber) -> String {
+    format!("{number} arrives twice at a SYNC, with different values: two devices have this node-ID or COB-ID")
+}
+
 /// The text of a remark on a recording.
 pub fn remark_text(remark: &Remark) -> String {
     match remark {
@@ -137,6 +143,10 @@ pub fn remark_text(remark: &Remark) -> String {
         Remark::FreshnessNotProven => {
             "values were sent on remote request: that each one is new is not proven (--poll reads new ones)".to_owned()
         }
+        Remark::RepeatedTpdo(node, number) => {
+            format!("node {node}: {number} arrives twice at a SYNC: two devices send it, or a bridge repeats frames")
+        }
+        Remark::TwoSenders(node, number) => format!("node {node}: {}", two_senders(*number)),
         Remark::PollFailed(error) => format!("node {}: {error}", error.node),
         Remark::ChangedWhileFramesLost(node, before) => {
             let before = format_duration(*before);

@@ -6,6 +6,7 @@ use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::pdo::TpdoNumber;
 use crate::output::diagnosis;
+use crate::output::events::two_senders;
 use crate::tasks::Failure;
 use crate::tasks::diagnosis::Silence;
 use crate::tasks::log::LogFailure;
@@ -40,6 +41,9 @@ pub(super) fn words(failure: &Failure, cause: &LogFailure) -> Words {
         LogFailure::SecondSyncProducer => Words::new("another node sends SYNC on this bus: nothing was started")
             .hint("omit --sync: the nodes send on the SYNC that is already there"),
         LogFailure::NoRtr { number } => no_rtr(*number),
+        LogFailure::TwoSenders(number) => {
+            Words::new(two_senders(*number)).hint("disconnect one of them, or change its node-ID: cangauge lss scan")
+        }
         LogFailure::UnknownMapping => {
             let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
             Words::new("it sends TPDOs, and their mapping is unknown").hint(format!(
@@ -85,24 +89,13 @@ fn count(rows: u64) -> String {
     if rows == 1 { "1 row".to_owned() } else { format!("{rows} rows") }
 }
 
-/// How many nodes a message lists with their reasons.
-const MAX_LISTED: usize = 3;
-
 fn no_measurements(within: Duration, nodes: &[(NodeId, Silence)]) -> Words {
     let within = format_duration(within);
     let words = match nodes {
         [(_, silence)] => Words::new(format!("no measurements within {within}: {}", diagnosis::reason(silence))),
-        _ => {
-            let listed = nodes.iter().take(MAX_LISTED);
-            let mut reasons: Vec<String> =
-                listed.map(|(node, silence)| format!("node {node}: {}", diagnosis::reason(silence))).collect();
-            if nodes.len() > MAX_LISTED {
-                reasons.push(format!("{} more", nodes.len() - MAX_LISTED));
-            }
-            Words::new(format!("no measurements from any node within {within}; {}", reasons.join("; ")))
-        }
+        _ => Words::new(format!("no measurements from any node within {within}; {}", diagnosis::reasons(nodes))),
     };
-    match nodes.first().and_then(|(node, silence)| diagnosis::hint(silence, *node)) {
+    match nodes.first().and_then(|(node, silence)| diagnosis::hint(silence, *node, "add")) {
         Some(hint) => words.hint(hint),
         None => words,
     }

@@ -3,8 +3,10 @@
 use super::Words;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::pdo::{MappingEntry, Transmission};
+use crate::output::diagnosis;
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
+use crate::tasks::diagnosis::Silence;
 use crate::tasks::pdo::{
     Incomplete, Occupant, Parameter, PdoEffect, PdoFact, PdoFailure, Settings, StepError, StepWrite,
 };
@@ -79,14 +81,16 @@ fn unknown_name(name: &str, nearest: &[String], signals: &[String]) -> Words {
     }
 }
 
-fn nothing_received(nodes: &[NodeId]) -> Words {
-    let all = nodes.iter().map(NodeId::to_string).collect::<Vec<_>>().join(",");
-    let words = Words::new("no TPDO was received");
-    let Some(first) = nodes.first() else { return words };
-    words.hint(format!(
-        "check that the nodes are operational and that a node sends SYNC: cangauge pdo show {first}; \
-         cangauge nmt start {all}"
-    ))
+fn nothing_received(nodes: &[(NodeId, Silence)]) -> Words {
+    if nodes.is_empty() {
+        return Words::new("no TPDO was received");
+    }
+    let words = Words::new(format!("no TPDO was received; {}", diagnosis::reasons(nodes)));
+    let hint = |(node, silence): &(NodeId, Silence)| diagnosis::hint(silence, *node, &format!("cangauge log {node}"));
+    match nodes.first().and_then(hint) {
+        Some(hint) => words.hint(hint),
+        None => words,
+    }
 }
 
 fn occupant(by: &Occupant) -> String {

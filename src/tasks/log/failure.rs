@@ -35,6 +35,8 @@ pub enum LogFailure {
     DifferentSyncCounters(Vec<(NodeId, u8)>),
     /// Another node sends SYNC.
     SecondSyncProducer,
+    /// Two devices send this TPDO of the node.
+    TwoSenders(TpdoNumber),
     /// The node sends TPDOs whose mapping is unknown.
     UnknownMapping,
     /// A passive recording received no TPDO of these nodes.
@@ -113,7 +115,7 @@ impl LogFailure {
             | LogFailure::NoStatus { .. }
             | LogFailure::UnknownMapping
             | LogFailure::OtherColumns { .. } => Kind::Usage,
-            LogFailure::NotMapped { .. } => Kind::Unexpected,
+            LogFailure::NotMapped { .. } | LogFailure::TwoSenders(_) => Kind::Unexpected,
             LogFailure::NoRtr { .. } => Kind::Refused,
             LogFailure::DifferentSyncIds(_) | LogFailure::DifferentSyncCounters(_) | LogFailure::SecondSyncProducer => {
                 Kind::CheckFailed

@@ -16,7 +16,7 @@ use super::states::NmtStates;
 use super::{LogEvent, LogFailure, LogOptions, Mode, Observer, Remark};
 use crate::bus::{Bus, Filters, Mono, ReceiveBuffer, Received, TimestampSource};
 use crate::canopen::id::{CanId, NodeId};
-use crate::canopen::pdo::Transmission;
+use crate::canopen::pdo::{TpdoNumber, Transmission};
 use crate::master::{Answer, Error, Master, SdoError, Ticket};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::layout::Tpdo;
@@ -24,6 +24,7 @@ use crate::measure::sample::{Doubt, Sample};
 use crate::node::Node;
 use crate::tasks::Failure;
 use crate::tasks::diagnosis::Heard;
+use crate::tasks::synced::SyncedTpdos;
 use due::DueTpdos;
 use emergencies::Emergencies;
 use liveness::Liveness;
@@ -47,6 +48,12 @@ pub(super) struct Recording<'o> {
     liveness: Liveness,
     emergencies: Emergencies,
     due: DueTpdos,
+    synced: SyncedTpdos,
+    /// TPDOs that two devices send: they make no rows.
+    pub(super) two_senders: BTreeMap<NodeId, TpdoNumber>,
+    /// The values of the first SYNC, until it is known that no second device answers it.
+    early: Vec<Vec<Sample>>,
+    early_until: Option<Mono>,
     rereads: Rereads,
     timestamps: TimestampSource,
     receive_buffer: Option<ReceiveBuffer>,
@@ -90,6 +97,10 @@ impl<'o> Recording<'o> {
             liveness: Liveness::new(expected.into_iter()),
             emergencies,
             due: DueTpdos::default(),
+            synced: SyncedTpdos::new(matches!(options.mode, Mode::Sync(_))),
+            two_senders: BTreeMap::new(),
+            early: Vec::new(),
+            early_until: None,
             rereads: Rereads::new(&options.overrides),
             timestamps: bus.timestamps(),
             receive_buffer: bus.receive_buffer(),
@@ -208,6 +219,11 @@ impl<'o> Recording<'o> {
         nodes.for_each(|node| self.emergencies.watch(&node));
     }
 
+    /// Watches the TPDOs on SYNC of nodes that are not surveyed.
+    pub(super) fn watch_syncs(&mut self, nodes: impl Iterator<Item = Node>) {
+        nodes.for_each(|node| self.synced.set_up(&node));
+    }
+
     /// Makes room for the statistics of all known sources.
     pub(super) fn update_sources(&mut self) {
         self.tally.set_sources(self.decoder.sources());
@@ -234,12 +250,28 @@ impl<'o> Recording<'o> {
         self.has_traffic = true;
         if let Some(listener) = &mut self.listener {
             if let Some(node) = listener.take(received, &mut self.decoder) {
-                self.emergencies.learn(&listener.known_node(node));
+                let node = listener.known_node(node);
+                self.emergencies.learn(&node);
+                self.synced.set_up(&node);
             }
             self.update_sources();
         }
-        match self.decoder.decode(received, &mut self.samples) {
-            Decoded::Tpdo(_) => return self.take_samples(None, observer),
+        let decoded = self.decoder.decode(received, &mut self.samples);
+        if matches!(decoded, Decoded::Tpdo(_) | Decoded::OtherFrame)
+            && let Some(surplus) = self.synced.take(&received.frame)
+        {
+            return self.surplus(surplus, received.at, observer);
+        }
+        match decoded {
+            Decoded::Tpdo(_) if self.early_until.is_some_and(|until| received.at.mono < until) => {
+                self.early.push(std::mem::take(&mut self.samples));
+            }
+            Decoded::Tpdo(_) => {
+                let samples = std::mem::take(&mut self.samples);
+                self.take_early(observer)?;
+                self.samples = samples;
+                return self.take_samples(None, observer);
+            }
             Decoded::Paused(node) => self.not_recorded(node, received.at.mono),
             Decoded::WrongLength(node) => self.wrong_length(node, received.at, master, observer),
             Decoded::OtherFrame => self.other_frame(received, master, observer),
@@ -270,6 +302,18 @@ impl<'o> Recording<'o> {
             observer.event(&LogEvent::Remark(Remark::PollFailed(error)), master.bus().now());
         }
         Ok(self.take_samples(cycle, observer))
+    }
+
+    /// Passes on the values of the first SYNC.
+    fn take_early(&mut self, observer: &mut dyn Observer) -> ControlFlow<()> {
+        if self.early_until.take().is_none() {
+            return ControlFlow::Continue(());
+        }
+        for samples in std::mem::take(&mut self.early) {
+            self.samples = samples;
+            self.take_samples(None, observer)?;
+        }
+        ControlFlow::Continue(())
     }
 
     /// Counts the samples and passes them on. `cycle` is the cycle of the poll that they answer.

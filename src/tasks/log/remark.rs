@@ -2,6 +2,7 @@
 
 use crate::bus::ReceiveBuffer;
 use crate::canopen::id::{CanId, NodeId};
+use crate::canopen::pdo::TpdoNumber;
 use crate::master::SdoError;
 use crate::measure::layout::NarrowValue;
 use crate::measure::sample::Doubt;
@@ -18,6 +19,10 @@ pub enum Remark {
     SharedCobId(CanId, [NodeId; 2]),
     /// The values were sent on remote request: it is not proven that each is new.
     FreshnessNotProven,
+    /// A TPDO of the node arrives twice at a SYNC, with the same values.
+    RepeatedTpdo(NodeId, TpdoNumber),
+    /// A TPDO of the node arrives twice at a SYNC, with different values: it makes no rows.
+    TwoSenders(NodeId, TpdoNumber),
     /// A value could not be polled.
     PollFailed(SdoError),
     /// The node's setup changed while frames were lost. The rows of this time before the change was found may be wrong.

@@ -7,6 +7,7 @@ use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::{MappingEntry, TpdoNumber, Transmission};
 use crate::canopen::sdo::AbortCode;
 use crate::master::{Error, SdoError, SdoFailure};
+use crate::tasks::diagnosis::Silence;
 use crate::tasks::failure::Cause;
 use crate::tasks::store::Group;
 use crate::tasks::{Failure, Kind};
@@ -99,8 +100,8 @@ pub enum PdoFailure {
     },
     /// No TPDO of the nodes was received.
     NothingReceived {
-        /// The nodes.
-        nodes: Vec<NodeId>,
+        /// The nodes, each with the reason.
+        nodes: Vec<(NodeId, Silence)>,
     },
 }
 

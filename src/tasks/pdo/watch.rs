@@ -2,24 +2,31 @@
 
 use super::failure::PdoFailure;
 use crate::bus::{BusError, Filters, Mono, Received, Stamp};
+use crate::canopen::emcy::Emergency;
 use crate::canopen::id::{CanId, NodeId};
 use crate::canopen::nmt::Life;
+use crate::canopen::object::ObjectId;
 use crate::canopen::pdo::TpdoNumber;
 use crate::master::{Error, Happening, Master};
 use crate::measure::decode::{Decoded, Decoder};
 use crate::measure::layout::Tpdo;
 use crate::measure::sample::{Sample, Source};
-use crate::node::Overrides;
 use crate::node::survey::{SETUP_TIMEOUT, survey_each};
 use crate::node::wait::{Policy, Until, Waiter, run};
+use crate::node::{Node, Overrides};
 use crate::tasks::Failure;
-use crate::tasks::log::{LogFailure, SetupListener};
-use std::collections::BTreeMap;
+use crate::tasks::diagnosis::{Findings, Heard, Inquiry, Silence, Situation, diagnose, questions};
+use crate::tasks::log::{LogFailure, SetupListener, compare_values};
+use crate::tasks::synced::{Surplus, SyncedTpdos};
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// After this time without a TPDO, that is reported once.
 const FIRST_TPDO_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// How much later than twice its interval a heartbeat may come.
+const HEARTBEAT_TOLERANCE: Duration = Duration::from_millis(50);
 
 /// An event while TPDOs are received.
 #[derive(Clone, Copy, Debug)]
@@ -52,8 +59,10 @@ pub enum WatchEvent<'a> {
     Restarted(NodeId),
     /// The mapping of a node could not be read: its TPDOs are not shown.
     Failed(&'a Failure),
-    /// No TPDO was received so far.
-    NothingYet,
+    /// A TPDO arrives twice at a SYNC, with the same values.
+    Repeated(NodeId, TpdoNumber),
+    /// No TPDO was received so far, for these reasons.
+    NothingYet(&'a [(NodeId, Silence)]),
 }
 
 /// Shows the TPDOs of the nodes until the time has passed, or until Ctrl-C or `on_event` ends it. Sends no NMT command.
@@ -72,7 +81,10 @@ pub fn watch(
     let end_after = |start: Mono| duration.map_or(Mono::at(Duration::MAX), |duration| start + duration);
     if !master.bus().is_live() {
         let setup = SetupListener::new(nodes, overrides, &[]);
-        let mut watcher = Watcher::new(nodes.to_vec(), end_after(master.now()), on_event);
+        let mut watcher = {
+            let (nodes, start) = (nodes.iter().map(|&node| Node::new(node)).collect(), master.now());
+            Watcher::new(nodes, start, end_after(start), on_event)
+        };
         watcher.learn(setup, overrides);
         run(master, Policy::Record, &mut watcher)?;
         return Ok(Vec::new());
@@ -84,7 +96,10 @@ pub fn watch(
     master.limit_transfers(None);
     for result in results {
         match result {
-            Ok(node) => surveyed.push(node),
+            Ok(node) => match compare_values(master, &node)? {
+                Ok(()) => surveyed.push(node),
+                Err(error) => failures.push(error.into()),
+            },
             Err(error) => failures.push(Failure::from(error)),
         }
     }
@@ -96,54 +111,78 @@ pub fn watch(
             return Ok(failures);
         }
     }
-    let nodes: Vec<NodeId> = surveyed.iter().map(|node| node.id).collect();
     let start = master.now();
-    let mut watcher = Watcher::new(nodes, end_after(start), on_event);
+    let mut watcher = Watcher::new(surveyed, start, end_after(start), on_event);
+    watcher.failures = failures;
     watcher.next = watcher.end.min(start + FIRST_TPDO_TIMEOUT);
-    for node in &surveyed {
+    for node in watcher.nodes.clone() {
         watcher.decoder.add(node.layout(), &[]);
-        watcher.number(&node.tpdos);
+        watcher.set_up(&node);
     }
-    let ids = watcher.numbers.keys().copied().chain(watcher.nodes.iter().map(|&node| CanId::heartbeat(node)));
-    master.listen(&Filters::Only(ids.collect()))?;
+    let own = |node: &Node| [CanId::heartbeat(node.id), CanId::sdo_response(node.id), node.sync, node.emergency];
+    let ids: BTreeSet<CanId> = watcher.numbers.keys().copied().chain(watcher.nodes.iter().flat_map(own)).collect();
+    master.listen(&Filters::Only(ids.into_iter().collect()))?;
     run(master, Policy::Record, &mut watcher)?;
-    Ok(failures)
+    Ok(watcher.failures)
 }
 
 struct Watcher<'a> {
-    nodes: Vec<NodeId>,
+    nodes: Vec<Node>,
     /// Reads the mappings from a recording.
     setup: Option<SetupListener>,
     decoder: Decoder,
     numbers: BTreeMap<CanId, TpdoNumber>,
+    synced: SyncedTpdos,
+    /// What the nodes sent besides TPDOs, and when their last heartbeat came.
+    heard: BTreeMap<NodeId, (Heard, Mono)>,
+    /// The questions to the silent nodes.
+    inquiry: Option<Inquiry>,
     samples: Vec<Sample>,
+    start: Mono,
     end: Mono,
     /// The end, or the time to report that nothing was received.
     next: Mono,
     has_received: bool,
+    failures: Vec<Failure>,
     on_event: &'a mut dyn FnMut(&WatchEvent<'_>) -> ControlFlow<()>,
 }
 
 impl<'a> Watcher<'a> {
     fn new(
-        nodes: Vec<NodeId>,
+        nodes: Vec<Node>,
+        start: Mono,
         end: Mono,
         on_event: &'a mut dyn FnMut(&WatchEvent<'_>) -> ControlFlow<()>,
     ) -> Watcher<'a> {
-        let (decoder, numbers, samples) = (Decoder::default(), BTreeMap::new(), Vec::new());
-        Watcher { nodes, setup: None, decoder, numbers, samples, end, next: end, has_received: false, on_event }
+        Watcher {
+            nodes,
+            setup: None,
+            decoder: Decoder::default(),
+            numbers: BTreeMap::new(),
+            synced: SyncedTpdos::default(),
+            heard: BTreeMap::new(),
+            inquiry: None,
+            samples: Vec::new(),
+            start,
+            end,
+            next: end,
+            has_received: false,
+            failures: Vec::new(),
+            on_event,
+        }
     }
 
-    /// Keeps the numbers of TPDOs for their COB-IDs.
-    fn number(&mut self, tpdos: &[Tpdo]) {
-        let valid = tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
+    /// Keeps the numbers of the TPDOs of a node for their COB-IDs.
+    fn set_up(&mut self, node: &Node) {
+        self.synced.set_up(node);
+        let valid = node.tpdos.iter().filter(|tpdo| tpdo.cob_id.is_valid());
         self.numbers.extend(valid.map(|tpdo| (tpdo.cob_id.can_id(), tpdo.number)));
     }
 
     /// Reads the mappings from the recording; first from the descriptions that the user named.
     fn learn(&mut self, mut setup: SetupListener, overrides: &Overrides) {
         setup.apply_overrides(&mut self.decoder);
-        overrides.keys().for_each(|&node| self.number(&setup.known_node(node).tpdos));
+        overrides.keys().for_each(|&node| self.set_up(&setup.known_node(node)));
         self.setup = Some(setup);
     }
 
@@ -151,14 +190,19 @@ impl<'a> Watcher<'a> {
         let at = received.at;
         if let Some(setup) = &mut self.setup {
             if let Some(node) = setup.take(received, &mut self.decoder) {
-                let tpdos = setup.known_node(node).tpdos;
-                self.number(&tpdos);
+                let node = setup.known_node(node);
+                self.set_up(&node);
             } else if let Some((node, Life::BootUp)) = Life::parse(&received.frame) {
                 setup.forget(node, &mut self.decoder);
             }
         }
         self.samples.clear();
         let decoded = self.decoder.decode(received, &mut self.samples);
+        if matches!(decoded, Decoded::Tpdo(_) | Decoded::OtherFrame)
+            && let Some(surplus) = self.synced.take(&received.frame)
+        {
+            return self.on_surplus(surplus);
+        }
         match (decoded, self.numbers.get(&received.frame.id())) {
             (Decoded::Tpdo(node), Some(&number)) => {
                 self.has_received = true;
@@ -170,27 +214,91 @@ impl<'a> Watcher<'a> {
                 let length = received.frame.data().len();
                 (self.on_event)(&WatchEvent::WrongLength { at, node, number, length })
             }
-            _ => match Life::parse(&received.frame) {
-                Some((node, Life::BootUp)) if self.nodes.contains(&node) => {
-                    (self.on_event)(&WatchEvent::Restarted(node))
-                }
-                _ => ControlFlow::Continue(()),
-            },
+            _ => self.on_other_frame(received),
         }
     }
 
+    fn on_surplus(&mut self, surplus: Surplus) -> ControlFlow<()> {
+        let Surplus { node, number, differs, is_new } = surplus;
+        match (is_new, differs) {
+            (false, _) => ControlFlow::Continue(()),
+            (true, false) => (self.on_event)(&WatchEvent::Repeated(node, number)),
+            (true, true) => {
+                let failure = Failure::at(node, LogFailure::TwoSenders(number));
+                self.failures.push(failure.clone());
+                self.nodes.retain(|other| other.id != node);
+                (self.on_event)(&WatchEvent::Failed(&failure))?;
+                if self.nodes.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            }
+        }
+    }
+
+    /// Heartbeats, boot-up messages, emergencies and SYNC show why there may be no TPDO.
+    fn on_other_frame(&mut self, received: &Received) -> ControlFlow<()> {
+        let (frame, now) = (&received.frame, received.at.mono);
+        for node in self.nodes.iter().filter(|node| node.sync == frame.id() && !frame.is_remote()) {
+            let (heard, _) = self.heard.entry(node.id).or_default();
+            heard.syncs = (heard.syncs.0 + 1, frame.data().len());
+        }
+        let emergency = Emergency::parse(frame).filter(|emergency| emergency.code != 0);
+        if let Some(node) = self.nodes.iter().find(|node| node.emergency == frame.id())
+            && let Some(emergency) = emergency
+        {
+            self.heard.entry(node.id).or_default().0.emergency = Some(emergency.code);
+        }
+        let Some((id, life)) = Life::parse(frame) else { return ControlFlow::Continue(()) };
+        if !self.nodes.iter().any(|node| node.id == id) {
+            return ControlFlow::Continue(());
+        }
+        let (heard, last) = self.heard.entry(id).or_default();
+        *last = now;
+        heard.booted = life == Life::BootUp;
+        heard.state = if let Life::State(state) = life { Some(state) } else { None };
+        if heard.booted { (self.on_event)(&WatchEvent::Restarted(id)) } else { ControlFlow::Continue(()) }
+    }
+
+    /// Why the nodes send no TPDOs.
+    fn silences(&self, findings: &BTreeMap<NodeId, Findings>, now: Mono) -> Vec<(NodeId, Silence)> {
+        let situation =
+            Situation { waited: now.since(self.start), syncs_sent: None, requests: false, was_started: false };
+        let silence = |node: &Node| {
+            let (mut heard, last) = self.heard.get(&node.id).copied().unwrap_or_default();
+            let period = node.heartbeat_ms.map(|period| Duration::from_millis(period.into()));
+            heard.heartbeat_stopped = period.is_some_and(|period| {
+                !period.is_zero() && now.since(last.max(self.start)) > period * 2 + HEARTBEAT_TOLERANCE
+            });
+            (node.id, diagnose(node, &carries_something, &heard, findings.get(&node.id), &situation))
+        };
+        self.nodes.iter().map(silence).collect()
+    }
+
+    fn questions(&self) -> Vec<(NodeId, Vec<ObjectId>)> {
+        self.nodes.iter().map(|node| (node.id, questions(node, &carries_something))).collect()
+    }
+
     /// The result at the end.
-    fn result(&self) -> Result<ControlFlow<()>, Failure> {
+    fn result(&mut self, master: &mut Master<'_>) -> Result<ControlFlow<()>, Failure> {
         if self.has_received {
             return Ok(ControlFlow::Break(()));
         }
         if let Some(&node) = self.setup.as_ref().and_then(|setup| setup.not_understood.first()) {
             return Err(Failure::at(node, LogFailure::UnknownMapping));
         }
-        // Nothing can be done for the nodes of a recording.
-        let nodes = if self.setup.is_some() { Vec::new() } else { self.nodes.clone() };
-        Err(Failure::general(PdoFailure::NothingReceived { nodes }))
+        if self.setup.is_some() {
+            // Nothing can be done for the nodes of a recording.
+            return Err(Failure::general(PdoFailure::NothingReceived { nodes: Vec::new() }));
+        }
+        let now = master.now();
+        let is_unknown = |node: &&Node| self.heard.get(&node.id).is_none_or(|(heard, _)| heard.state.is_none());
+        let guarded: Vec<NodeId> = self.nodes.iter().filter(is_unknown).map(|node| node.id).collect();
+        let findings = Inquiry::complete(master, &self.questions(), &guarded)?;
+        Err(Failure::general(PdoFailure::NothingReceived { nodes: self.silences(&findings, now) }))
     }
+}
+
+/// Whether a TPDO carries anything.
+fn carries_something(tpdo: &Tpdo) -> bool {
+    !tpdo.mapping.is_empty()
 }
 
 impl Waiter for Watcher<'_> {
@@ -204,21 +312,33 @@ impl Waiter for Watcher<'_> {
     fn on_event(&mut self, master: &mut Master<'_>, event: Happening) -> Result<ControlFlow<()>, Failure> {
         Ok(match event {
             Happening::Frame(received) => self.on_frame(&received),
-            Happening::Ended => return self.result(),
-            Happening::Deadline if self.next == self.end => return self.result(),
+            Happening::Ended => return self.result(master),
+            Happening::Deadline if self.next == self.end => return self.result(master),
             Happening::Deadline => {
                 self.next = self.end;
-                match self.has_received {
-                    true => ControlFlow::Continue(()),
-                    false => (self.on_event)(&WatchEvent::NothingYet),
+                if !self.has_received {
+                    self.inquiry = Some(Inquiry::begin(master, &self.questions()));
                 }
+                ControlFlow::Continue(())
+            }
+            Happening::Sdo(ticket, result) => {
+                let findings = self.inquiry.as_mut().and_then(|inquiry| inquiry.take(ticket, &result, master));
+                match findings {
+                    Some(findings) if !self.has_received => {
+                        let silences = self.silences(&findings, master.now());
+                        (self.on_event)(&WatchEvent::NothingYet(&silences))
+                    }
+                    _ => ControlFlow::Continue(()),
+                }
+            }
+            Happening::Dropped(_) => {
+                self.synced.on_lost_frames();
+                ControlFlow::Continue(())
             }
             Happening::Interrupted if self.has_received => ControlFlow::Break(()),
             Happening::Interrupted => return Err(Error::Interrupted.into()),
             Happening::Link(false) => return Err(BusError::Down(master.bus().name().to_owned()).into()),
-            Happening::Sdo(..) | Happening::Fault(..) | Happening::Dropped(_) | Happening::Link(true) => {
-                ControlFlow::Continue(())
-            }
+            Happening::Fault(..) | Happening::Link(true) => ControlFlow::Continue(()),
         })
     }
 }

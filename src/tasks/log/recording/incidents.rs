@@ -11,7 +11,9 @@ use crate::tasks::log::changes::changes;
 use crate::tasks::log::heartbeats::HeartbeatChange;
 use crate::tasks::log::rereads::{Reread, RereadReason, writes_setup};
 use crate::tasks::log::{LogEvent, Observer, Remark};
+use crate::tasks::synced::Surplus;
 use std::collections::BTreeSet;
+use std::ops::ControlFlow;
 
 impl Recording<'_> {
     /// Reports COB-IDs that two nodes use for TPDOs.
@@ -183,6 +185,7 @@ impl Recording<'_> {
     pub(super) fn dropped(&mut self, count: u32, master: &mut Master<'_>, observer: &mut dyn Observer) {
         let at = master.bus().now();
         self.tally.dropped += u64::from(count);
+        self.synced.on_lost_frames();
         observer.event(&LogEvent::Dropped(count), at);
         self.request_all_rereads(RereadReason::FramesLost, at.mono, master);
     }
@@ -191,6 +194,26 @@ impl Recording<'_> {
     pub(super) fn not_recorded(&mut self, node: NodeId, now: Mono) {
         self.tally.events.not_recorded += 1;
         self.liveness.restart(node, now);
+    }
+
+    /// A TPDO arrived more often than at each SYNC. If the values differ, it makes no rows any more.
+    pub(super) fn surplus(&mut self, surplus: Surplus, at: Stamp, observer: &mut dyn Observer) -> ControlFlow<()> {
+        let Surplus { node, number, differs, is_new } = surplus;
+        if !is_new {
+            return ControlFlow::Continue(());
+        }
+        if !differs {
+            self.remark(Remark::RepeatedTpdo(node, number), at, observer);
+            return ControlFlow::Continue(());
+        }
+        self.remark(Remark::TwoSenders(node, number), at, observer);
+        self.two_senders.insert(node, number);
+        let sources = self.decoder.sources();
+        self.early.retain(|samples| samples.iter().all(|sample| sources[sample.source].node != node));
+        self.liveness.remove(node);
+        self.decoder.pause(node);
+        // Without another node there is nothing left to record.
+        if self.liveness.nodes().next().is_none() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     /// A TPDO has another length than its mapping.
@@ -260,6 +283,7 @@ impl Recording<'_> {
         self.liveness.restart(id, at.mono);
         self.nodes[place] = node;
         self.due.set_up(&self.nodes, &self.decoder, self.options.mode);
+        self.synced.set_up(&self.nodes[place]);
         master.listen(&self.filters())?;
         if may_need_start {
             self.states.start_again(id, master);

@@ -4,18 +4,23 @@ use super::Recording;
 use crate::canopen::id::NodeId;
 use crate::canopen::nmt::NmtState;
 use crate::node::state::Proof;
+use crate::tasks::Failure;
 use crate::tasks::diagnosis::{Running, Silence, SilenceCause};
 use crate::tasks::log::silence::{Silent, why_nothing};
-use crate::tasks::log::{Mode, RecordingReport, Remark};
+use crate::tasks::log::{LogFailure, Mode, RecordingReport, Remark};
 
 impl Recording<'_> {
     /// Ends the recording.
     pub(in crate::tasks::log) fn report(mut self) -> RecordingReport {
         let lost = self.liveness.lost(self.tally.end());
         self.remark_at_end();
+        let two_senders = self.two_senders.iter();
+        let two_senders =
+            two_senders.map(|(&node, &number)| Failure::at(node, LogFailure::TwoSenders(number))).collect();
         let nothing = (self.tally.rows == 0).then(|| why_nothing(&self, self.options));
         RecordingReport {
             failed: Vec::new(),
+            two_senders,
             rows: self.tally.rows,
             length: self.tally.length(),
             lost,

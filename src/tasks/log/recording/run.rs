@@ -14,6 +14,9 @@ use std::time::Duration;
 /// How often it is checked whether the starts of the nodes were sent.
 const START_CHECK_INTERVAL: Duration = Duration::from_millis(1);
 
+/// How long the values of the first SYNC are kept back: a second device with the same COB-ID answers within this time.
+const SECOND_SENDER_TIMEOUT: Duration = Duration::from_millis(50);
+
 /// When the loop has something to do, besides frames, polls and SYNC.
 struct Schedule {
     start: Mono,
@@ -76,6 +79,7 @@ impl Recording<'_> {
                 let id = self.sync_interval().map(|_| id);
                 let overflow = self.nodes.first().and_then(|first| first.sync_overflow);
                 self.due.set_up(&self.nodes, &self.decoder, self.options.mode);
+                self.nodes.iter().for_each(|node| self.synced.set_up(node));
                 Some(Producer::new(interval, id, overflow, start))
             }
             _ => None,
@@ -83,6 +87,8 @@ impl Recording<'_> {
         let schedule = Schedule::new(start, self.options.duration, master.bus().is_live());
         let mut recorder = Loop { recording: self, schedule, producer: producer.as_mut(), observer };
         let result = wait::run(master, Policy::Record, &mut recorder);
+        // The reader may have closed the output, which ends the recording anyway.
+        let _ = self.take_early(observer);
         self.timestamps = master.bus().timestamps();
         if let Some(producer) = producer {
             self.tally.syncs = producer.finish(master);
@@ -105,7 +111,7 @@ impl Recording<'_> {
         let poll = self.poll.as_ref().map(|poll| poll.due(schedule.start));
         let reread = self.rereads.due().filter(|_| self.link_is_up);
         let sync = producer.map(Producer::due);
-        let due = [give_up, schedule.end, sync, poll, reread].into_iter().flatten();
+        let due = [give_up, schedule.end, sync, poll, reread, self.early_until].into_iter().flatten();
         due.fold(schedule.next_tick, Mono::min)
     }
 
@@ -123,6 +129,9 @@ impl Recording<'_> {
             return ControlFlow::Break(());
         }
         self.tally.extend_to(now);
+        if self.early_until.is_some_and(|until| now >= until) {
+            self.take_early(observer)?;
+        }
         if schedule.is_over(now, self.tally.rows) {
             return ControlFlow::Break(());
         }
@@ -136,6 +145,12 @@ impl Recording<'_> {
             observer.cycle(producer.slot(), master.bus().now())?;
             self.due.sync(now);
             let is_free = !master.is_sending();
+            if let Mode::Sync(interval) = self.options.mode {
+                if producer.slot() == 0 {
+                    self.early_until = Some(now + interval.min(SECOND_SENDER_TIMEOUT));
+                }
+                self.nodes.iter().map(|node| node.sync).take(1).for_each(|id| self.synced.on_sync(id));
+            }
             producer.send(master);
             if is_free {
                 self.send_requests(master);
@@ -177,7 +192,7 @@ impl Recording<'_> {
     /// Ctrl-C. After the first one, the frames received before it are still recorded. The second one does not wait.
     fn interrupt(&mut self, schedule: &mut Schedule, master: &Master<'_>) -> Result<ControlFlow<()>, Error> {
         let is_second = std::mem::replace(&mut self.interrupted, true);
-        if self.tally.rows == 0 {
+        if self.tally.rows == 0 && self.early.is_empty() {
             return Err(Error::Interrupted);
         }
         if is_second || !master.bus().is_live() {
