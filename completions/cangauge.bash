@@ -34,6 +34,9 @@ _cangauge() {
             cangauge,devices)
                 cmd="cangauge__subcmd__devices"
                 ;;
+            cangauge,doctor)
+                cmd="cangauge__subcmd__doctor"
+                ;;
             cangauge,errors)
                 cmd="cangauge__subcmd__errors"
                 ;;
@@ -216,6 +219,9 @@ _cangauge() {
                 ;;
             cangauge__subcmd__help,devices)
                 cmd="cangauge__subcmd__help__subcmd__devices"
+                ;;
+            cangauge__subcmd__help,doctor)
+                cmd="cangauge__subcmd__help__subcmd__doctor"
                 ;;
             cangauge__subcmd__help,errors)
                 cmd="cangauge__subcmd__help__subcmd__errors"
@@ -533,7 +539,7 @@ _cangauge() {
 
     case "${cmd}" in
         cangauge)
-            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version scan ls read nmt sdo log check lss info status unit filter limits minmax errors bus pdo config autozero zero tare store restore sim objects export devices completions help"
+            opts="-b -t -f -q -v -h -V --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version scan ls read nmt sdo log check lss info status unit filter limits minmax errors bus pdo config autozero zero tare store restore sim doctor objects export devices completions help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 1 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2070,6 +2076,76 @@ _cangauge() {
             COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
             return 0
             ;;
+        cangauge__subcmd__doctor)
+            opts="-b -t -f -q -v -h -V --passive --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version"
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                --bus)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -b)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --timeout)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                -t)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --retries)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --device)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --eds)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --sdo)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --format)
+                    COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
+                    return 0
+                    ;;
+                -f)
+                    COMPREPLY=($(compgen -W "text json csv" -- "${cur}"))
+                    return 0
+                    ;;
+                --wait)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --trace)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --progress)
+                    COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
+                    return 0
+                    ;;
+                --color)
+                    COMPREPLY=($(compgen -W "auto always never" -- "${cur}"))
+                    return 0
+                    ;;
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
         cangauge__subcmd__errors)
             opts="-b -t -f -q -v -h -V --clear --bus --timeout --retries --device --eds --sdo --accept-mismatch --format --wait --pace --trace --ignore-lock --quiet --verbose --progress --color --help --version"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
@@ -2405,7 +2481,7 @@ _cangauge() {
             return 0
             ;;
         cangauge__subcmd__help)
-            opts="scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim objects export devices completions help"
+            opts="scan read nmt sdo log check lss info unit filter limits minmax errors bus pdo config autozero tare store restore sim doctor objects export devices completions help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -2645,6 +2721,20 @@ _cangauge() {
         cangauge__subcmd__help__subcmd__devices__subcmd__show)
             opts=""
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 4 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
+        cangauge__subcmd__help__subcmd__doctor)
+            opts=""
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
             fi

@@ -6,6 +6,7 @@ use crate::master::{Error, SdoError};
 use crate::measure::expression::ExpressionError;
 use crate::output::console::Console;
 use crate::output::failure::ErrorMessage;
+use crate::tasks::failure::Cause;
 use crate::tasks::{Failure, Kind};
 use anstream::ColorChoice;
 use clap::CommandFactory;
@@ -223,6 +224,16 @@ fn message(error: &anyhow::Error) -> ErrorMessage {
 /// It was closed when the program started.
 pub(super) fn open_stdout() -> anyhow::Result<io::Stdout> {
     crate::bus::stdout::stdout().map_err(stdout)
+}
+
+/// The message of an error if there is no bus that can be used: `doctor` reports it as a finding. Another program that uses
+/// the node is not one.
+pub(super) fn bus_error(error: &anyhow::Error, has_interface: bool) -> Option<ErrorMessage> {
+    let message = message(error);
+    let cause = error.downcast_ref::<Failure>().map(|failure| &failure.cause);
+    let is_in_use = matches!(cause, Some(Cause::Bus(error)) if matches!(**error, BusError::InUse(_)));
+    let is_about_bus = message.kind == Kind::Bus || message.kind == Kind::Usage && !has_interface;
+    (is_about_bus && !is_in_use).then_some(message)
 }
 
 /// An error of writing to stdout. A closed pipe ends the command with success.

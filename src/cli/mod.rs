@@ -8,6 +8,7 @@ mod completions;
 mod config;
 mod descriptions;
 mod devices;
+mod doctor;
 mod errors;
 pub mod exit;
 mod export;
@@ -254,6 +255,7 @@ commands! {
     Store(store::Store): "store";
     Restore(store::Restore): "restore";
     Sim(sim::Sim): "sim";
+    Doctor(doctor::Doctor): "doctor";
     Objects(objects::Objects): "objects";
     Export(export::Export): "export";
     Devices(devices::Devices): "devices";
@@ -264,7 +266,7 @@ impl Command {
     /// Whether the command only reads objects.
     fn only_reads(&self) -> bool {
         match self {
-            Command::Scan(_) | Command::Read(_) | Command::Info(_) => true,
+            Command::Scan(_) | Command::Read(_) | Command::Info(_) | Command::Doctor(_) => true,
             Command::Objects(_) | Command::Devices(_) | Command::Export(_) => true,
             Command::Sdo(sdo) => sdo.only_reads(),
             Command::Config(config) => config.only_reads(),

@@ -209,6 +209,11 @@ fn interfaces() -> Vec<(String, bool)> {
     Vec::new()
 }
 
+/// Whether a CAN interface is up.
+pub(super) fn has_interface() -> bool {
+    interfaces().iter().any(|(_, up)| *up)
+}
+
 fn only_interface() -> Result<BusSpec, ErrorMessage> {
     let all = interfaces();
     let up: Vec<&String> = all.iter().filter(|(_, up)| *up).map(|(name, _)| name).collect();

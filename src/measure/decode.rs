@@ -130,8 +130,9 @@ impl Decoder {
             let mut decoder = self.tpdo_decoder(layout, tpdo, wanted);
             let id = tpdo.cob_id.can_id();
             // Two nodes send with one COB-ID: the sender of a frame is unknown.
-            if let Some(other) = self.tpdos.get(&id).filter(|other| other.node != layout.node) {
+            if let Some(other) = self.tpdos.remove(&id).filter(|other| other.node != layout.node) {
                 decoder.is_paused = true;
+                decoder.values.extend(other.values);
                 self.shared.insert(id, (other.node, layout.node));
             }
             self.tpdos.insert(id, decoder);

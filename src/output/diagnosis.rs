@@ -44,6 +44,39 @@ pub fn reason(silence: &Silence) -> String {
     }
 }
 
+/// A word for the cause, for scripts.
+pub fn word(silence: &Silence) -> &'static str {
+    match &silence.cause {
+        SilenceCause::InterfaceDown => "interface-down",
+        SilenceCause::NotReadAgain => "not-read-again",
+        SilenceCause::PollFailed(_) => "no-answer",
+        SilenceCause::NotOperational { state: NmtState::Stopped, .. } => "stopped",
+        SilenceCause::NotOperational { .. } => "not-operational",
+        SilenceCause::Restarted => "restarted",
+        SilenceCause::Unreachable { .. } => "unreachable",
+        SilenceCause::HeartbeatStopped => "heartbeat-stopped",
+        SilenceCause::WrongLength { .. } => "wrong-length",
+        SilenceCause::SharedCobId(..) => "shared-cob-id",
+        SilenceCause::NoTpdo => "no-tpdo",
+        SilenceCause::Tpdo(_, cause) => match cause {
+            TpdoCause::Disabled => "tpdo-disabled",
+            TpdoCause::NothingMapped(Some(0xfe..)) => "multiplexed-pdo",
+            TpdoCause::NothingMapped(_) => "nothing-mapped",
+            TpdoCause::OnlyOnRequest(_) => "only-on-request",
+            TpdoCause::WaitsForSync(_) | TpdoCause::TooFewSyncs { .. } => "waits-for-sync",
+            TpdoCause::SyncCounter { .. } | TpdoCause::SyncRejected => "sync-counter",
+            TpdoCause::SteadyAtSync | TpdoCause::SendsOnChange => "steady",
+            TpdoCause::NotSentAtSync | TpdoCause::NotSentOnRequest | TpdoCause::Due(_) => "not-sent",
+            TpdoCause::SlowEventTimer(_) => "slow-event-timer",
+            TpdoCause::InhibitTime(_) => "inhibit-time",
+            TpdoCause::ChannelOff(_) => "channel-off",
+            TpdoCause::InterruptsDisabled(_) => "interrupts-disabled",
+            TpdoCause::NoTrigger(..) => "no-trigger",
+            TpdoCause::UnknownType => "unknown-transmission",
+        },
+    }
+}
+
 /// Why a TPDO is not sent.
 fn tpdo_reason(number: TpdoNumber, cause: TpdoCause, running: Running) -> String {
     let communication = number.communication(0).index;

@@ -9,6 +9,7 @@ pub mod csv;
 pub mod dbc;
 pub mod devices;
 pub mod diagnosis;
+pub mod doctor;
 pub mod doubt;
 pub mod draft;
 mod elapsed;

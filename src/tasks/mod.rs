@@ -6,6 +6,7 @@ pub mod config;
 pub mod describe;
 pub mod detect;
 pub mod diagnosis;
+pub mod doctor;
 pub mod export;
 pub mod failure;
 pub mod host;

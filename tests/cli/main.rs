@@ -8,6 +8,7 @@ mod check;
 mod config;
 mod descriptions;
 mod devices;
+mod doctor;
 mod examples;
 mod export;
 mod half_dead;

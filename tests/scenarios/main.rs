@@ -5,6 +5,7 @@ mod assign;
 mod bit_rates;
 mod config;
 mod detect;
+mod doctor;
 mod full_queue;
 mod garbage;
 mod log_goes_on;

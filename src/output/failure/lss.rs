@@ -3,6 +3,7 @@
 use super::Words;
 use super::below;
 use crate::bus::time::format_duration;
+use crate::canopen::id::NodeId;
 use crate::output::lss::{another, duplicate, progress, short};
 use crate::output::notes::NoteText;
 use crate::tasks::Failure;
@@ -34,10 +35,7 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
         LssCause::DuplicateNodeId(sign) => duplicate_node_id(*sign),
         LssCause::NoAnswer(waited) => Words::new(format!("no answer within {}", format_duration(*waited)))
             .hint("check its node-ID, power and cable; list the devices: cangauge lss scan"),
-        LssCause::OtherNodeIdByLss(found) => {
-            let found = found.map_or_else(|| "has no node-ID".to_owned(), |found| format!("has node-ID {found}"));
-            Words::new(format!("a device with the same identity answers LSS and {found}")).hint(CONNECT_ALONE)
-        }
+        LssCause::OtherNodeIdByLss(found) => other_node_id(*found),
         LssCause::SameIdentity(other) => Words::new(format!("node {other} has the same identity")).hint(CONNECT_ALONE),
         LssCause::SeveralWithIdentity => Words::new("more than one device answers to its identity").hint(CONNECT_ALONE),
         LssCause::NotTheOnly(sign) => {
@@ -77,6 +75,12 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
         | LssCause::SilentAtRate(_)
         | LssCause::SilentAfterStore { .. } => retime(&cause.cause),
     }
+}
+
+/// A device with the same identity has another node-ID, or none.
+fn other_node_id(found: Option<NodeId>) -> Words {
+    let found = found.map_or_else(|| "has no node-ID".to_owned(), |found| format!("has node-ID {found}"));
+    Words::new(format!("a device with the same identity answers LSS and {found}")).hint(CONNECT_ALONE)
 }
 
 /// Answers under a node-ID cannot be assigned to one device.

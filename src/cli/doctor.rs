@@ -1,0 +1,86 @@
+//! `cangauge doctor`.
+
+use super::args::Nodes;
+use super::exit;
+use super::scan::SCAN_TIMEOUT;
+use super::{Global, descriptions, open};
+use crate::bus::claim::Claim;
+use crate::canopen::id::NodeId;
+use crate::output::doctor::FindingReport;
+use crate::output::failure::ErrorMessage;
+use crate::tasks::Kind;
+use crate::tasks::doctor::{DoctorOptions, examine};
+use clap::Args;
+
+/// Find out why a node or the whole bus is silent
+///
+/// Looks for nodes, observes their TPDOs for up to 5 s, and reads the objects that explain a silence, the status of the
+/// values and the error registers. Nothing is changed. Each finding is followed by the command to type. Exit code 0: all is
+/// well, 1: something was found.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  cangauge doctor 5\n  cangauge doctor --passive\n  cangauge -b sim doctor 1 --format json"
+)]
+pub(crate) struct Doctor {
+    /// Node-ID: 5, 0x7f; all: every node, and by LSS devices without a node-ID if no node answers [default: every node]
+    node: Option<Nodes>,
+    /// Send nothing
+    #[arg(long)]
+    passive: bool,
+}
+
+impl Doctor {
+    /// The nodes that no other cangauge may use at the same time.
+    pub(super) fn claim(&self) -> Claim {
+        match &self.node {
+            Some(nodes) if !self.passive => nodes.claim(),
+            _ => Claim::Nothing,
+        }
+    }
+
+    pub(super) fn run(&self, global: &Global) -> anyhow::Result<()> {
+        let node = match &self.node {
+            Some(Nodes::These(nodes)) if nodes.len() > 1 => {
+                return Err(ErrorMessage::usage("doctor examines one node, or all").hint("cangauge doctor").into());
+            }
+            Some(Nodes::These(nodes)) => nodes.first().copied(),
+            _ => None,
+        };
+        let nodes: Vec<NodeId> = node.map_or_else(|| NodeId::all().collect(), |node| vec![node]);
+        let timing = global.timing(SCAN_TIMEOUT);
+        let options = DoctorOptions {
+            node,
+            passive: self.passive,
+            lss: self.node == Some(Nodes::All) && !self.passive,
+            timeout: timing.timeout,
+            rounds: 1 + timing.retries,
+            overrides: descriptions::overrides(global, &nodes)?,
+        };
+        let examined = global.with_master(|master| {
+            let examination = examine(master, &options)?;
+            let name = master.bus().name().to_owned();
+            let reports = examination.findings.iter().map(|finding| FindingReport::new(finding, &name)).collect();
+            Ok((examination.nodes.len(), reports))
+        });
+        let (nodes, findings): (usize, Vec<FindingReport>) = match examined {
+            Err(error) => match exit::bus_error(&error, global.bus.is_some() || open::has_interface()) {
+                Some(message) => (0, vec![FindingReport::of_bus(message)]),
+                None => return Err(error),
+            },
+            Ok(examined) => examined,
+        };
+        Self::report(global, nodes, &findings)
+    }
+
+    /// Prints the findings.
+    fn report(global: &Global, nodes: usize, findings: &[FindingReport]) -> anyhow::Result<()> {
+        global.print(findings)?;
+        if findings.is_empty() {
+            let nodes = if nodes == 1 { "1 node".to_owned() } else { format!("{nodes} nodes") };
+            global.console().note(&format!("{nodes}: nothing is wrong"));
+            return Ok(());
+        }
+        let count = if findings.len() == 1 { "1 finding".to_owned() } else { format!("{} findings", findings.len()) };
+        Err(ErrorMessage::new(Kind::CheckFailed, count).into())
+    }
+}

@@ -1,0 +1,35 @@
+//! `cangauge doctor`. The findings themselves: `tests/scenarios/doctor.rs`.
+
+use super::Bench;
+use serde_json::json;
+
+const SENDING: &str = "[[device]]\nkind = \"mh4\"\nnode = 5\nstart = true\n\
+                       set = { \"0x1800:2\" = 254, \"0x1800:5\" = 100, \"0x1801:5\" = 100 }\n";
+
+#[test]
+fn finding_is_followed_by_the_command_to_type() {
+    let bench = Bench::of("mh4@5");
+    let done = bench.run("doctor 5").exit(1);
+    assert_eq!(
+        done.stdout,
+        "node 5: TPDO1 waits for SYNC, and no node sends SYNC\n  cangauge log 5 --sync 100ms, or read by SDO: --poll 100ms (node 5)\n"
+    );
+    assert_eq!(done.stderr, "cangauge: 1 finding\n");
+    let found = bench.run("doctor 9 --format json").exit(1).json();
+    assert_eq!((&found[0]["node"], &found[0]["finding"]), (&json!(9), &json!("absent")));
+}
+
+#[test]
+fn nothing_wrong_is_success() {
+    let done = Bench::described(SENDING).run("doctor 5").exit(0);
+    assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("", "1 node: nothing is wrong\n"));
+}
+
+#[test]
+fn missing_bus_is_a_finding() {
+    let bench = Bench::of("mh4@5");
+    let done = bench.command(&["-b", "can47", "doctor"]).output().expect("it starts");
+    let text = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(done.status.code() == Some(1) && text.contains("CAN") || text.contains("can47"), "{done:?}");
+    bench.run("doctor 5,6").exit(2);
+}
