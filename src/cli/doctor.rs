@@ -19,7 +19,7 @@ use clap::Args;
 /// well, 1: something was found.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  cangauge doctor 5\n  cangauge doctor --passive\n  cangauge -b sim doctor 1 --format json"
+    after_help = "Examples:\n  cangauge doctor 5\n  cangauge doctor --passive\n  cangauge doctor all --format json"
 )]
 pub(crate) struct Doctor {
     /// Node-ID: 5, 0x7f; all: every node, and by LSS devices without a node-ID if no node answers [default: every node]

@@ -316,10 +316,12 @@ fn channel_values(node: &Node, counts: &[Option<Value>]) -> Vec<ObjectId> {
         return (1..=channels(count)).map(|channel| ObjectId::new(index, channel)).collect();
     }
     // Sub-index 0 may be missing. Objects that a TPDO contains exist.
-    let mapped = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping);
-    let mapped = mapped.filter(|entry| PROCESS_VALUES.iter().any(|&(index, _)| index == entry.object.index));
-    let known: BTreeSet<u8> = mapped.map(|entry| entry.object.sub).collect();
-    known.into_iter().map(|channel| ObjectId::new(PROCESS_VALUES[0].0, channel)).collect()
+    let mapped = node.tpdos.iter().flat_map(|tpdo| &tpdo.mapping).map(|entry| entry.object);
+    let rank = |object: ObjectId| PROCESS_VALUES.iter().position(|&(index, _)| index == object.index);
+    let mut known: Vec<(u8, usize)> = mapped.filter_map(|object| Some((object.sub, rank(object)?))).collect();
+    known.sort_unstable();
+    known.dedup_by_key(|(channel, _)| *channel);
+    known.into_iter().map(|(channel, rank)| ObjectId::new(PROCESS_VALUES[rank].0, channel)).collect()
 }
 
 /// The signals of devices without channels of CiA 404.

@@ -208,7 +208,7 @@ fn mistakes_in_a_description_are_shown_with_their_places() {
         (signal("ch2", "channel = 1", ""), "6:8: name: \"ch2\" is channel 2"),
         (signal("pressure", "chanel = 1", ""), "7:1: unknown key \"chanel\""),
         (signal("pressure", "channel = 1", "units = \"bar\"\n"), "9:1: unknown key \"units\""),
-        ("[[signal]\n".to_owned(), "5:9: "),
+        ("[[signal]\n".to_owned(), "5:10: "),
     ] {
         let bench = bench_with("mh4@1", &[("mine.toml", format!("{head}{text}"))]);
         for line in ["read 1", "log 1 --sync 100ms --count 1", "pdo show 1"] {

@@ -11,7 +11,7 @@ type Object<'a> = (&'a str, &'a str, &'a str, &'a str);
 fn device(device_type: &str, objects: &[Object<'_>], mapping: &[&str]) -> String {
     let mut text = "name = \"own\"\ntitle = \"Own\"\nvendor = \"Maker\"\n".to_owned();
     let mut add = |(at, data_type, access, default): Object<'_>| {
-        let pdo = at.starts_with("0x6") || at.starts_with("0x2");
+        let pdo = !at.starts_with("0x1");
         let name = format!("o-{}", at.replace(':', "-")).to_lowercase();
         text += &format!(
             "[[object]]\nat = \"{at}\"\nname = \"{name}\"\ntype = \"{data_type}\"\naccess = \"{access}\"\npdo = {pdo}\n\

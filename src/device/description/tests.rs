@@ -21,7 +21,7 @@ fn source_and_identify_are_optional() {
 
 #[test]
 fn unknown_keys_are_listed_with_their_line() {
-    let known = "name, title, vendor, source, quirks, error_history, error_counters, repeating_average_ms, auto_bit_rate, \
+    let known = "name, title, vendor, source, unconfirmed, quirks, error_history, error_counters, repeating_average_ms, auto_bit_rate, \
                  identify, bit_rates, factory, sdo, pdo, startup, assign, autozero, signal, object, emcy";
     let expected = format!("x.toml:4: unknown key \"signals\" (known: {known})");
     assert_eq!(mistakes("signals = 1"), [expected]);

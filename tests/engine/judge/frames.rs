@@ -90,6 +90,7 @@ pub(super) fn frames(spec: &Spec, sent: impl Iterator<Item = (Mono, Frame)>, vio
                         | Command::Store { .. }
                         | Command::Restore { .. }
                         // The state of a silent node.
+                        | Command::PdoWatch { .. }
                         | Command::Log { .. }
                         | Command::Check { .. }
                 );
