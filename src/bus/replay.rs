@@ -1,7 +1,7 @@
 //! Replays a recording as a bus: a log of candump, Vector ASC, PEAK TRC, or CSV of python-can, also compressed by gzip.
 //!
 //! The time is that of the recording. It passes as fast as the program reads, or in real time. Each format has a
-//! [`Parser`] that turns a line into a frame with its time. Order, broken lines and channels are handled here.
+//! `Parser` that turns a line into a frame with its time. Order, broken lines and channels are handled here.
 
 mod asc;
 mod candump;
@@ -93,6 +93,9 @@ pub enum ReplayNote {
     },
 }
 
+/// A format, and its parser.
+type KnownFormat = (RecordingFormat, Box<dyn Parser>);
+
 /// A recording as a bus that only receives.
 pub struct Replay {
     file: String,
@@ -100,7 +103,7 @@ pub struct Replay {
     /// The line that is being read.
     buffer: Vec<u8>,
     /// The format, once it is known.
-    format: Option<(RecordingFormat, Box<dyn Parser>)>,
+    format: Option<KnownFormat>,
     /// The channel to replay; the only one if none is chosen.
     channel: Option<String>,
     /// The channels that frames came from.
@@ -270,7 +273,7 @@ impl Replay {
     }
 
     /// The format and its parser. `text` is a line that may show it.
-    fn format_by(&mut self, text: &str) -> Result<Option<&mut (RecordingFormat, Box<dyn Parser>)>, BusError> {
+    fn format_by(&mut self, text: &str) -> Result<Option<&mut KnownFormat>, BusError> {
         if self.format.is_none() {
             if let Some(format) = FileFormat::of(&self.lines.start) {
                 return Err(self.wrong(None, RecordingError::OtherFormat(format)));

@@ -208,6 +208,5 @@ fn few_operations_fail_on_a_wire_that_loses_three_of_a_hundred_frames() {
         let written = write_and_verify(&mut master, &Node::new(node()), object, &bytes, DataType::Unsigned(2));
         failed[2] += u64::from(written.is_err());
     }
-    println!("of {RUNS} each failed: name {}, values {}, write {}", failed[0], failed[1], failed[2]);
     assert!(failed.iter().all(|&count| count * 10 <= RUNS), "{failed:?} of {RUNS}");
 }

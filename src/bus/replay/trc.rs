@@ -53,7 +53,8 @@ impl Trc {
     fn start(&mut self) -> Duration {
         let Some(clock) = self.clock.take() else { return *self.start.get_or_insert_default() };
         // Ten digits of a day are 9 us, and more of them are as exact as a microsecond.
-        let clock = Duration::from_nanos_u128((clock.as_nanos() + 500) / 1000 * 1000);
+        let micros = (clock + Duration::from_nanos(500)).as_micros();
+        let clock = Duration::from_micros(u64::try_from(micros).unwrap_or(u64::MAX));
         let (days, second) = (clock.as_secs() / DAY.as_secs(), clock.as_secs() % DAY.as_secs());
         let fields = [1, second].map(|it| i32::try_from(it).unwrap_or_default());
         let day = i32::try_from(days).ok().and_then(|days| days.checked_add(fields[0]));
