@@ -10,7 +10,8 @@ use crate::master::Master;
 use crate::node::Overrides;
 use crate::output::autozero::ZeroReport;
 use crate::output::notes;
-use crate::tasks::autozero::{Action, Limit, Options, Zeroed, autozero};
+use crate::tasks::autozero::{Action, AutozeroFailure, Limit, Options, Zeroed, autozero};
+use crate::tasks::failure::Cause;
 use crate::tasks::{Failure, Kind};
 use clap::Args;
 
@@ -100,7 +101,8 @@ pub(super) fn run_each(
         zeroed.notes.iter().for_each(|note| notes::print(&global.console(), note));
     }
     if *nodes == Nodes::All {
-        results.tolerate(global, |failure| failure.kind() == Kind::Usage);
+        let has_none = |failure: &Failure| matches!(failure.cause, Cause::Autozero(AutozeroFailure::NoAutozero { .. }));
+        results.tolerate(global, |failure| failure.kind() == Kind::Usage || has_none(failure));
     }
     results.end()
 }

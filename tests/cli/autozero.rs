@@ -135,7 +135,7 @@ fn absolute_pressure_is_refused() {
 
 #[test]
 fn device_without_autozero_is_refused() {
-    Bench::of(ALL).run("autozero 3").fails(2, "cangauge: node 3: HBM SomatXR MC1609 has no autozero\n");
+    Bench::of(ALL).run("autozero 3").fails(4, "cangauge: node 3: HBM SomatXR MC1609 has no autozero\n");
     Bench::of(ALL)
         .run("autozero 1 --channel 2")
         .fails(2, "cangauge: node 1: WIKA MH-4-CAN has no autozero of channel 2\nhint: it has one of: 1\n");

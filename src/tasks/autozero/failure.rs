@@ -126,14 +126,15 @@ impl AutozeroFailure {
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
-            AutozeroFailure::NoAutozero { .. }
-            | AutozeroFailure::NoSuchChannel { .. }
+            AutozeroFailure::NoSuchChannel { .. }
             | AutozeroFailure::NoTare
             | AutozeroFailure::NoTareOfChannel { .. }
             | AutozeroFailure::WhichChannel { .. }
             | AutozeroFailure::NoMeasuredValueOnChannel { .. }
             | AutozeroFailure::LimitUnit { .. } => Kind::Usage,
-            AutozeroFailure::NoObject { .. } | AutozeroFailure::NoTareZero { .. } => Kind::Refused,
+            AutozeroFailure::NoAutozero { .. }
+            | AutozeroFailure::NoObject { .. }
+            | AutozeroFailure::NoTareZero { .. } => Kind::Refused,
             AutozeroFailure::Unsafe { .. } => Kind::CheckFailed,
             AutozeroFailure::RestartedBefore
             | AutozeroFailure::RestartedAfter

@@ -230,16 +230,15 @@ impl SettingsFailure {
             | SettingsFailure::NoSuchLimit { .. }
             | SettingsFailure::LimitsCrossed { .. }
             | SettingsFailure::LimitValue { .. } => Kind::Usage,
-            SettingsFailure::NoFilter { .. } => Kind::Refused,
-            SettingsFailure::NoErrorObjects
+            SettingsFailure::NoFilter { .. }
+            | SettingsFailure::NoErrorObjects
             | SettingsFailure::NoErrorHistory
-            | SettingsFailure::HistoryNotCleared { .. }
             | SettingsFailure::NoUnit { .. }
             | SettingsFailure::NoChannel { .. }
             | SettingsFailure::NoLimits { .. }
             | SettingsFailure::NoMinMax
-            | SettingsFailure::NoMinMaxReset { .. }
-            | SettingsFailure::MinMaxNotReset { .. } => Kind::Unexpected,
+            | SettingsFailure::NoMinMaxReset { .. } => Kind::Refused,
+            SettingsFailure::HistoryNotCleared { .. } | SettingsFailure::MinMaxNotReset { .. } => Kind::Unexpected,
         }
     }
 }
