@@ -200,15 +200,13 @@ pub(super) fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result
         }
     }
     let bytes = read_file(what)?;
-    let usage = |error: String| ErrorMessage::usage(format!("{what}: {error}"));
     let extension = Path::new(what).extension().map(|extension| extension.to_ascii_lowercase());
     let mut model = if is_eds || extension.is_some_and(|extension| extension == "eds" || extension == "dcf") {
-        let eds = eds::read(&bytes).map_err(|error| usage(error.to_string()))?;
+        let eds = eds::read(&bytes).map_err(|error| ErrorMessage::usage(format!("{what}: {error}")))?;
         print_warnings(what, &eds.warnings, global);
         Model::from_eds(&eds)
     } else {
-        let text = String::from_utf8(bytes).map_err(|_| usage("not a text file".to_owned()))?;
-        Model::from_toml(&text).map_err(|error| ErrorMessage::usage(error.in_file(what)))?
+        Model::from_toml(&text(what, bytes)?).map_err(|error| ErrorMessage::usage(error.in_file(what)))?
     };
     model.made_for.iter_mut().for_each(|device| what.clone_into(&mut device.file));
     model.description.unconfirmed = false;
@@ -217,6 +215,18 @@ pub(super) fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result
     }
     model.warnings.iter_mut().for_each(|(_, text)| *text = format!("{what}: {text}"));
     Ok(Arc::new(model))
+}
+
+/// The text of a file.
+///
+/// # Errors
+/// It is not UTF-8, with the line.
+pub(super) fn text(name: &str, bytes: Vec<u8>) -> Result<String, ErrorMessage> {
+    String::from_utf8(bytes).map_err(|error| {
+        let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = good.iter().filter(|&&byte| byte == b'\n').count() + 1;
+        ErrorMessage::usage(format!("{name}:{line}: not UTF-8 text"))
+    })
 }
 
 /// No description has this name.

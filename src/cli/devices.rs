@@ -86,8 +86,7 @@ fn show(name: &str, global: &Global) -> anyhow::Result<()> {
 }
 
 fn check(file: &str, global: &Global) -> anyhow::Result<()> {
-    let text =
-        String::from_utf8(read_file(file)?).map_err(|_| ErrorMessage::usage(format!("{file}: not a text file")))?;
+    let text = descriptions::text(file, read_file(file)?)?;
     let (result, notes) = read_with_notes(&text);
     let mistakes = result.as_ref().err().cloned().unwrap_or_default();
     let finding = |mistake, is_error| Finding { file: file.to_owned(), mistake, is_error };

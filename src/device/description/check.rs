@@ -72,6 +72,8 @@ fn characters(table: &Table<'_>, name: &str) -> bool {
     let is_plain = !name.is_empty() && name.chars().all(plain);
     if !is_plain {
         table.mistake("name", format!("name: \"{name}\" has other characters than a to z, 0 to 9 and -"));
+    } else if name.starts_with('-') || name.ends_with('-') {
+        table.mistake("name", format!("name: \"{name}\" begins or ends with a hyphen"));
     }
     is_plain
 }
@@ -211,6 +213,11 @@ fn signals(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>
         if signal.status_bits.is_some() && signal.status.is_none() {
             table.mistake("status_bits", "status_bits: there is no status object");
         }
+        let type_of = |object: ObjectId| description.object(object).map(|entry| entry.data_type);
+        if let (Some(bits), Some(status)) = (&signal.status_bits, signal.status) {
+            status_bits(bits, type_of(status), table);
+        }
+        markers(&signal.markers, signal.data_type.or(type_of(signal.value)), table);
         if let Some((stated, object)) = signal.data_type.zip(description.object(signal.value))
             && stated != object.data_type
         {
@@ -223,6 +230,33 @@ fn signals(description: &Description, known: &Known<'_>, tables: &Tables<'_, '_>
         }
         for (key, object) in signal.objects() {
             known.require(table, key, object);
+        }
+    }
+}
+
+/// Each bit has one meaning, and the status object has it.
+fn status_bits(bits: &StatusBits, data_type: Option<DataType>, table: &Table<'_>) {
+    let all = bits.invalid | bits.high | bits.low;
+    let count = [bits.invalid, bits.high, bits.low].map(u64::count_ones).iter().sum::<u32>();
+    if count > all.count_ones() {
+        table.mistake("status_bits", "status_bits: a bit has two meanings");
+    }
+    let width = data_type.and_then(DataType::width).and_then(|width| u32::try_from(8 * width).ok());
+    if let Some(width) = width.filter(|&width| all.checked_shr(width).is_some_and(|beyond| beyond != 0)) {
+        table.mistake("status_bits", format!("status_bits: the status object has bits 0 to {}", width - 1));
+    }
+}
+
+/// Each number has one meaning, and fits the type of the value.
+fn markers(markers: &Markers, data_type: Option<DataType>, table: &Table<'_>) {
+    let mut known = BTreeSet::new();
+    for number in markers.invalid.iter().chain(&markers.high).chain(&markers.low) {
+        if !known.insert(number) {
+            table.mistake("markers", format!("markers: {number} has two meanings"));
+        }
+        let fits = |data_type| Scalar::Integer(*number).encode(data_type, NodeId::MIN).is_ok();
+        if let Some(data_type) = data_type.filter(|&data_type| !fits(data_type)) {
+            table.mistake("markers", format!("markers: {number} does not fit {data_type}"));
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::device::scalar::{NumberRange, Scalar};
 use crate::device::scale::Decimal;
 use crate::device::unit::Unit;
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -20,16 +20,25 @@ pub(super) struct Source<'a> {
     text: &'a str,
     mistakes: RefCell<Vec<DescriptionError>>,
     notes: RefCell<Vec<DescriptionError>>,
+    /// The places of values with a mistake: a value is reported once.
+    wrong: RefCell<BTreeSet<usize>>,
 }
 
 impl<'a> Source<'a> {
     pub(super) fn new(text: &'a str) -> Source<'a> {
-        Source { text, mistakes: RefCell::default(), notes: RefCell::default() }
+        Source { text, mistakes: RefCell::default(), notes: RefCell::default(), wrong: RefCell::default() }
     }
 
     /// Adds a mistake at a byte offset of the text.
     pub(super) fn mistake(&self, offset: usize, message: impl Into<String>) {
         self.mistakes.borrow_mut().push(self.at(offset, message));
+    }
+
+    /// Adds a mistake of a value, if the value has no other.
+    fn mistake_of_value(&self, offset: usize, message: impl Into<String>) {
+        if self.wrong.borrow_mut().insert(offset) {
+            self.mistake(offset, message);
+        }
     }
 
     /// Adds something that may be a mistake; the description can be used.
@@ -81,7 +90,7 @@ impl<'t> Table<'t> {
         match T::from_toml(value.get_ref()) {
             Ok(value) => Some(value),
             Err(error) => {
-                self.source.mistake(value.span().start, format!("{key}: {error}"));
+                self.source.mistake_of_value(value.span().start, format!("{key}: {error}"));
                 None
             }
         }
@@ -89,8 +98,10 @@ impl<'t> Table<'t> {
 
     /// Adds a mistake at the value of a key, or at the table if it has no such key.
     pub(super) fn mistake(&self, key: &str, message: impl Into<String>) {
-        let offset = self.table.get(key).map_or(self.offset, |value| value.span().start);
-        self.source.mistake(offset, message);
+        match self.table.get(key) {
+            Some(value) => self.source.mistake_of_value(value.span().start, message),
+            None => self.source.mistake(self.offset, message),
+        }
     }
 
     /// Adds a note at the value of a key, or at the table if it has no such key.

@@ -174,5 +174,21 @@ fn signals_outside_of_cia_404_have_unit_scale_and_status_of_their_own() {
     assert_eq!(wrong("factor = 2\ndigits = \"0x2001\""), ["x.toml:8: digits: not together with factor or offset"]);
     assert_eq!(wrong("unit = \"furlong\"").len(), 1);
     assert_eq!(wrong("status_bits = { high = 1 }"), ["x.toml:7: status_bits: there is no status object"]);
+    let status = |bits: &str| wrong(&format!("status = \"0x2001\"\nstatus_bits = {bits}"));
+    assert_eq!(status("{ high = 1, low = 3 }"), ["x.toml:8: status_bits: a bit has two meanings"]);
+    assert_eq!(status("{ invalid = 6, low = 4 }"), ["x.toml:8: status_bits: a bit has two meanings"]);
+    assert_eq!(status("{ invalid = 4, low = 3 }"), [""; 0]);
+    let narrow = "{ high = 0x100 }\n[[object]]\nat = \"0x2000\"\nname = \"pv\"\ntype = \"i16\"\naccess = \"ro\"\n\
+                  [[object]]\nat = \"0x2001\"\nname = \"state\"\ntype = \"u8\"\naccess = \"ro\"\n";
+    assert_eq!(status(narrow), ["x.toml:8: status_bits: the status object has bits 0 to 7"]);
+    assert_eq!(wrong("markers = { high = [5], low = [5] }"), ["x.toml:7: markers: 5 has two meanings"]);
+    assert_eq!(wrong("type = \"i8\"\nmarkers = { low = [-128, 200] }"), ["x.toml:8: markers: 200 does not fit i8"]);
+    assert_eq!(wrong("type = \"u16\"\nmarkers = { low = [-1] }"), ["x.toml:8: markers: -1 does not fit u16"]);
+    assert_eq!(wrong("channel = -1").len(), 1, "one mistake for one value");
+    assert_eq!(wrong("channel = 300").len(), 1, "one mistake for one value");
+    for name in ["-p", "p-"] {
+        let found = mistakes(&format!("[[signal]]\nname = \"{name}\"\nvalue = \"0x2000\"\n"));
+        assert_eq!(found, [format!("x.toml:5: name: \"{name}\" begins or ends with a hyphen")]);
+    }
     assert!(wrong("markers = { odd = [1] }")[0].starts_with("x.toml:7: unknown key \"odd\""));
 }
