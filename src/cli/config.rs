@@ -15,17 +15,20 @@ use crate::device::config_file::{Document, Item};
 use crate::node::Node;
 use crate::node::offline::offline;
 use crate::output::config::{SCHEMA, write_toml};
-use crate::tasks::Failure;
+use crate::output::dcf::write_dcf;
+use crate::output::failure::ErrorMessage;
 use crate::tasks::config::{ConfigFailure, Mistake, Problem, read};
+use crate::tasks::{self, Failure};
 use clap::{Args, Subcommand};
 use std::fs::File;
 use std::io::{Read, Write};
+use std::path::Path;
 
 /// Show all settings of a device as a file, compare them with a file, and set them from a file
 ///
 /// The file is TOML with the sections [device], [address], [node], [signal.NAME], [tpdo.N], [object] and [calibration].
 /// Values have units: "100ms", "3.2 bar". The whole file is checked before the first write. Only settings that differ
-/// are written, and all of them are read back.
+/// are written, and all of them are read back. A DCF (FILE.dcf) is accepted for diff and apply, too.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim config dump 1 > mh4.toml\n  cangauge -b sim config dump 127 --changed\n  cangauge config diff 1 mh4.toml\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1-16 mh4.toml --store"
@@ -55,6 +58,9 @@ struct Dump {
     /// Omit settings that are factory defaults
     #[arg(long)]
     changed: bool,
+    /// Print a DCF (CiA 306) for other tools; without [calibration]
+    #[arg(long, conflicts_with = "changed")]
+    dcf: bool,
 }
 
 impl Config {
@@ -87,6 +93,9 @@ impl Dump {
     fn run(&self, global: &Global) -> anyhow::Result<()> {
         let overrides = descriptions::overrides(global, &[self.node])?;
         let snapshot = global.with_master(|master| Ok(read(master, self.node, &overrides, None)?))?;
+        if self.dcf {
+            return write_dcf(&snapshot, &mut super::exit::open_stdout()?.lock()).map_err(stdout);
+        }
         let dump = snapshot.dump(self.changed);
         global.print_or(&dump.rows, |out| write_toml(&dump, out))
     }
@@ -95,7 +104,21 @@ impl Dump {
 /// The longest file that is read.
 const MAX_FILE: u64 = 16 << 20;
 
-/// Reads a file with settings.
+/// Reads a file with settings: TOML, or a DCF by its name.
+fn file(name: &str, global: &Global) -> anyhow::Result<tasks::config::File> {
+    let extension = Path::new(name).extension().map(|extension| extension.to_ascii_lowercase());
+    if extension.is_none_or(|extension| extension != "dcf" && extension != "eds") {
+        return Ok(tasks::config::File::Settings(document(name)?));
+    }
+    let dcf = descriptions::eds(name, global)?;
+    if dcf.parameter_values.is_empty() {
+        let message = format!("{name}: it has no ParameterValue: it describes a device and sets nothing");
+        return Err(ErrorMessage::usage(message).into());
+    }
+    Ok(tasks::config::File::Dcf(Box::new(dcf)))
+}
+
+/// Reads a file with settings that is no DCF.
 fn document(file: &str) -> anyhow::Result<Document> {
     let mut text = String::new();
     File::open(file)

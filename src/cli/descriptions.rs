@@ -202,9 +202,7 @@ pub(super) fn model(what: &str, is_eds: bool, global: &Global) -> anyhow::Result
     let bytes = read_file(what)?;
     let extension = Path::new(what).extension().map(|extension| extension.to_ascii_lowercase());
     let mut model = if is_eds || extension.is_some_and(|extension| extension == "eds" || extension == "dcf") {
-        let eds = eds::read(&bytes).map_err(|error| ErrorMessage::usage(format!("{what}: {error}")))?;
-        print_warnings(what, &eds.warnings, global);
-        Model::from_eds(&eds)
+        Model::from_eds(&eds_of(what, &bytes, global)?)
     } else {
         Model::from_toml(&text(what, bytes)?).map_err(|error| ErrorMessage::usage(error.in_file(what)))?
     };
@@ -227,6 +225,17 @@ pub(super) fn text(name: &str, bytes: Vec<u8>) -> Result<String, ErrorMessage> {
         let line = good.iter().filter(|&&byte| byte == b'\n').count() + 1;
         ErrorMessage::usage(format!("{name}:{line}: not UTF-8 text"))
     })
+}
+
+/// An EDS or DCF file.
+pub(super) fn eds(name: &str, global: &Global) -> anyhow::Result<eds::Eds> {
+    Ok(eds_of(name, &read_file(name)?, global)?)
+}
+
+fn eds_of(name: &str, bytes: &[u8], global: &Global) -> Result<eds::Eds, ErrorMessage> {
+    let eds = eds::read(bytes).map_err(|error| ErrorMessage::usage(format!("{name}: {error}")))?;
+    print_warnings(name, &eds.warnings, global);
+    Ok(eds)
 }
 
 /// No description has this name.

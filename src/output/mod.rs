@@ -7,6 +7,7 @@ pub mod config_record;
 pub mod console;
 pub mod csv;
 pub mod dbc;
+pub mod dcf;
 pub mod devices;
 pub mod diagnosis;
 pub mod doctor;

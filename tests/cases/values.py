@@ -136,7 +136,6 @@ class DigitsMissing(Device):
 
 @case(TWO, never=r"ch1,[0-9.-]+")
 @case("log 5 --layout wide --sync 100ms --count 2", never=r",[0-9.-]+,ok")
-@case("pdo watch 5 --duration 1s", never="ok")
 class IntegerAsFloatInTpdo(Device):
     """TPDO1 carries an integer as 6130h:1."""
 

@@ -434,3 +434,165 @@ fn the_record_can_be_a_page_and_the_schema_is_json() {
         assert!(schema["properties"][key].is_object(), "{key}");
     }
 }
+
+#[test]
+fn a_dcf_sets_a_device_and_its_own_values_change_nothing() {
+    for (device, node) in [("mh4", 1), ("dps", 127), ("d20", 2), ("mc1609", 3), ("jumo", 4)] {
+        let bench = Bench::of(&format!("{device}@{node},{device}@9"));
+        let dcf = bench.run(&format!("config dump {node} --dcf")).exit(0).stdout;
+        assert!(!dcf.contains("[Calibration") && dcf.contains(&format!("NodeID={node}\n")), "{dcf}");
+        std::fs::write(bench.path("x.dcf"), &dcf).expect("a file");
+        let done = bench.run(&format!("config apply {node} x.dcf")).exit(0);
+        assert_eq!(done.stderr, format!("node {node}: 0 changes\n"), "{device}");
+        assert_eq!(writes(&done), [""; 0], "{device}");
+        // Identifiers follow the node-ID of the device.
+        let done = bench.run("config apply 9 x.dcf").exit(0);
+        assert!(done.stderr.ends_with("node 9: 0 changes\n"), "{device}: {}", done.stderr);
+        let changed = dcf.replace("ParameterName=producer-heartbeat-time", "ParameterName=Heartbeat");
+        let place = changed.find("[1017]").expect("1017h");
+        let (before, after) = changed.split_at(place);
+        let (_, rest) = after.split_once("ParameterValue=").expect("a value");
+        let rest = rest.split_once('\n').map_or("", |(_, rest)| rest);
+        let head = after.split("ParameterValue=").next().expect("a head");
+        std::fs::write(bench.path("y.dcf"), format!("{before}{head}ParameterValue=0x1F4\r\n{rest}")).expect("a file");
+        let done = bench.run("config diff 9 y.dcf").exit(1);
+        assert!(done.stdout.contains("node.heartbeat") && done.stdout.contains("500ms"), "{device}: {}", done.stdout);
+    }
+}
+
+#[test]
+fn what_a_device_lacks_of_a_dcf_is_reported() {
+    let bench = Bench::of("mh4@1,dps@127");
+    let mut dcf = bench.run("config dump 1 --dcf").exit(0).stdout;
+    dcf += "[2FF0]\nParameterName=Gain\nObjectType=7\nDataType=7\nAccessType=rw\nParameterValue=5\n\
+            [1000]\nParameterName=Device type\nObjectType=7\nDataType=7\nAccessType=ro\nParameterValue=0x123\n";
+    std::fs::write(bench.path("x.dcf"), &dcf).expect("a file");
+    let done = bench.run("config apply 1 x.dcf").exit(0);
+    assert!(done.stderr.contains("node 1: the device does not have: 0x2FF0:0 (gain)\n"), "{}", done.stderr);
+    let others = "node 1: not set, because they are read-only, commands or other PDOs: 0x1000:0 (device-type)\n";
+    assert!(done.stderr.contains(others), "{}", done.stderr);
+    let report = bench.run("config apply 1 x.dcf -f json").exit(0).json();
+    assert_eq!(report[0]["notes"][0]["code"], "not-on-device");
+    let done = bench.run("config apply 127 x.dcf").exit(1);
+    assert!(done.stderr.contains("another device: device.vendor is"), "{}", done.stderr);
+    assert_eq!(writes(&done), [""; 0]);
+    let eds = dcf.replace("ParameterValue", "DefaultValue");
+    std::fs::write(bench.path("x.eds"), eds).expect("a file");
+    let done = bench.run("config apply 1 x.eds -q").exit(2);
+    assert!(
+        done.stderr.contains("x.eds: it has no ParameterValue: it describes a device and sets nothing"),
+        "{done:?}"
+    );
+}
+
+#[test]
+fn a_dcf_of_another_tool_has_formulas_units_and_an_address() {
+    let bench = Bench::of("dps@127");
+    let dcf = "[DeviceComissioning]\nNodeID=0x21\nBaudrate=125\n[1017]\nParameterName=Heartbeat\nObjectType=7\nDataType=6\n\
+               AccessType=rw\nParameterValue=250\n[1800]\nParameterName=TPDO\nObjectType=9\nSubNumber=2\n[1800sub1]\n\
+               ParameterName=COB-ID\nDataType=7\nAccessType=rw\nParameterValue=0x180+$NodeID\n[1800sub5]\n\
+               ParameterName=Timer\nDataType=6\nAccessType=rw\nParameterValue=0x32\n[6131]\nParameterName=Unit\n\
+               ObjectType=8\nSubNumber=1\n[6131sub1]\nParameterName=Unit\nDataType=7\nAccessType=rw\n\
+               ParameterValue=0x004E0000\n";
+    std::fs::write(bench.path("x.dcf"), dcf).expect("a file");
+    let done = bench.run("config diff 127 x.dcf").exit(1);
+    let rows: Vec<&str> = done.stdout.lines().skip(1).map(|line| line.split(' ').next().expect("a key")).collect();
+    assert_eq!(rows, ["node.heartbeat", "signal.pressure.unit", "tpdo.1.event-timer"], "{}", done.stdout);
+    let done = bench.run("config apply 127 x.dcf").exit(0);
+    assert!(
+        done.stderr.contains("not set: address.node-id, address.bit-rate (--address sets them)"),
+        "{}",
+        done.stderr
+    );
+    let done = bench.run("config apply 127 x.dcf --address --dry-run").exit(0);
+    assert!(done.stdout.contains("lss set-id 127 33"), "{}", done.stdout);
+}
+
+#[test]
+fn an_eds_or_a_description_of_the_user_is_enough() {
+    let bench = Bench::of("mh4@1");
+    let mut eds = "[DeviceInfo]\nVendorName=Maker\n".to_owned();
+    for (index, name, data_type) in [(0x1015, "Inhibit time EMCY", 6), (0x1017, "Heartbeat", 6)] {
+        eds += &format!("[{index:04X}]\nParameterName={name}\nObjectType=7\nDataType={data_type}\nAccessType=rw\n");
+    }
+    let text = bench.run("devices show mh4").exit(0).stdout;
+    std::fs::write(bench.path("mine.toml"), text.replacen("name = \"mh4\"", "name = \"mine\"", 1)).expect("a file");
+    std::fs::write(bench.path("x.eds"), eds).expect("a file");
+    for (option, lines) in [("--eds x.eds", 2), ("--device mine.toml", 20)] {
+        let dump = bench.run(&format!("config dump 1 {option}")).exit(0).stdout;
+        let count = dump.lines().filter(|line| line.contains(" = ")).count();
+        assert!(count >= lines && dump.contains("heartbeat = \"0ms\""), "{option}: {dump}");
+        std::fs::write(bench.path("x.toml"), &dump).expect("a file");
+        let done = bench.run(&format!("config apply 1 x.toml {option}")).exit(0);
+        assert!(done.stderr.ends_with("node 1: 0 changes\n"), "{option}: {}", done.stderr);
+        std::fs::write(bench.path("x.toml"), dump.replace("heartbeat = \"0ms\"", "heartbeat = \"500ms\""))
+            .expect("a file");
+        let done = bench.run(&format!("config apply 1 x.toml {option}")).exit(0);
+        assert_eq!(writes(&done), ["601#2B171000F4010000"], "{option}");
+    }
+}
+
+#[test]
+fn a_failed_apply_is_rolled_back_from_its_journal() {
+    let bench = Bench::of("mh4@1");
+    let text = bench.run("devices show mh4").exit(0).stdout.replace("allow = [\"0-240\", \"254\", \"255\"]\n", "");
+    std::fs::write(bench.path("mine.toml"), text.replacen("name = \"mh4\"", "name = \"mine\"", 1)).expect("a file");
+    // The device rejects this transmission type.
+    let file = "[node]\nheartbeat = \"500ms\"\nemcy-inhibit-time = \"10ms\"\n[tpdo.1]\ntransmission = 245\n";
+    std::fs::write(bench.path("f.toml"), file).expect("a file");
+    let run = |line: &str| {
+        let words: Vec<&str> = line.split_whitespace().chain(["--device", "mine.toml"]).collect();
+        bench.finish(bench.traced(&words).env("XDG_STATE_HOME", bench.folder.path()))
+    };
+    let failed = run("config apply 1 f.toml").exit(4);
+    assert!(failed.stderr.contains("written: node.heartbeat, node.emcy-inhibit-time"), "{}", failed.stderr);
+    assert!(failed.stderr.contains("go back: cangauge config apply 1 --rollback"), "{}", failed.stderr);
+    // The simulated device forgets what was written: it starts with it.
+    let set =
+        "clock = \"virtual\"\n[[device]]\nkind = \"mh4\"\nnode = 1\nset = { \"0x1017\" = 500, \"0x1015\" = 100 }\n";
+    std::fs::write(bench.path("bench.toml"), set).expect("a file");
+    let done = run("config apply 1 --rollback").exit(0);
+    assert_eq!(writes(&done), ["601#2B15100000000000", "601#2B17100000000000"]);
+    let done = run("config apply 1 --rollback").exit(1);
+    assert_eq!(writes(&done), [""; 0]);
+}
+
+/// The blocks between .EX and .EE in the recipes of the manual page.
+fn recipe_blocks() -> Vec<String> {
+    let page = include_str!("../../src/cli/man/cangauge-config.1").replace("\\-", "-");
+    let blocks = page.split(".EX\n").skip(1).map(|rest| rest.split(".EE").next().unwrap_or_default().to_owned());
+    blocks.collect()
+}
+
+#[test]
+fn the_recipes_of_the_manual_page_work() {
+    let blocks = recipe_blocks();
+    let [dump, replace, file, table, series] = &blocks[..] else { panic!("{blocks:?}") };
+    let run = |bench: &Bench, line: &str| bench.run(line.strip_prefix("cangauge ").expect(line)).exit(0);
+    let old = Bench::described(
+        "[[device]]\nkind = \"mh4\"\nnode = 5\nset = { \"0x1017\" = 500, \"0x6127:1\" = 0.25, \"0x1800:5\" = 20 }\n",
+    );
+    let (line, name) = dump.trim().split_once(" > ").expect("a redirection");
+    let settings = run(&old, line).stdout;
+    let new = Bench::described("[[device]]\nkind = \"mh4\"\nnode = 1\nserial = 777\n");
+    std::fs::write(new.path(name), settings).expect("a file");
+    let mut lines = replace.lines();
+    let shown = run(&new, lines.next().expect("a dry run"));
+    assert!(shown.stdout.contains("0x1017:0 500") && writes(&shown).is_empty(), "{}", shown.stdout);
+    assert!(!shown.stdout.contains("0x6127"), "the offset belongs to the old sensor: {}", shown.stdout);
+    let done = run(&new, lines.next().expect("the writes"));
+    assert!(done.stdout.contains("address.node-id"), "{}", done.stdout);
+    let bench = Bench::described(
+        &[51, 52, 53]
+            .map(|at| format!("[[device]]\nkind = \"mh4\"\nnode = {}\nserial = {}\n", at - 40, at + 950))
+            .concat(),
+    );
+    std::fs::write(bench.path("line.toml"), file).expect("a file");
+    std::fs::write(bench.path("forty.csv"), table).expect("a file");
+    for line in series.lines() {
+        let done = run(&bench, line);
+        let is_third = |frame: &&&str| frame.starts_with("60D#2");
+        assert_eq!(writes(&done).iter().filter(is_third).count(), 0, "{line}: node 13 is not in the table");
+    }
+    assert!(bench.text("forty.html").contains("1002"));
+}

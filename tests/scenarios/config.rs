@@ -12,7 +12,7 @@ use cangauge::node::Overrides;
 use cangauge::output::config::write_toml;
 use cangauge::output::failure::ErrorMessage;
 use cangauge::sim::{Device, Setup};
-use cangauge::tasks::config::{Applied, Journal, Options, Sections, Snapshot, apply, read};
+use cangauge::tasks::config::{Applied, File, Journal, Options, Sections, Snapshot, apply, read};
 use cangauge::tasks::restore::restore;
 use cangauge::tasks::store::Group;
 use cangauge::tasks::{Failure, Kind};
@@ -95,7 +95,7 @@ fn dump(bus: &mut dyn Bus, number: u8) -> String {
 fn set(bus: &mut dyn Bus, number: u8, file: &str, options: &Options) -> Result<Applied, Failure> {
     let document = Document::parse(file).expect("TOML");
     let mut master = Master::new(bus, Timing { timeout: Duration::from_millis(100), retries: 1 });
-    let now = read(&mut master, node(number), &Overrides::new(), Some(&document))?;
+    let now = read(&mut master, node(number), &Overrides::new(), Some(&File::Settings(document.clone())))?;
     let file = now.check(&document).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
     apply(&mut master, now, &file, options, &Overrides::new(), &mut NoJournal)
 }

@@ -1,7 +1,7 @@
 //! `cangauge config apply`.
 
 use super::journal::{FileJournal, latest};
-use super::{Failures, described, document, mistakes, nodes_and_file, parse};
+use super::{Failures, described, file, mistakes, nodes_and_file, parse};
 use crate::bus::Wall;
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
@@ -19,7 +19,7 @@ use crate::output::failure::ErrorMessage;
 use crate::output::notes;
 use crate::tasks::config::diff::check_offline;
 use crate::tasks::config::{
-    Applied, ConfigFailure, FileSettings, Line, Options, Sections, Snapshot, apply, lines, read,
+    Applied, ConfigFailure, File, FileSettings, Line, Options, Sections, Snapshot, apply, check_device, lines, read,
 };
 use crate::tasks::{Failure, Kind, Note};
 use clap::Args;
@@ -74,13 +74,22 @@ pub(super) struct Apply {
 struct Job {
     node: NodeId,
     /// `None`: the journal.
-    document: Option<Document>,
+    file: Option<File>,
     /// The file, for messages.
     label: String,
 }
 
 /// The results, and the failures of each device.
 type Results = (Vec<Outcome>, Failures);
+
+/// Compares vendor and product before the values: those of a DCF for another device have no meaning here.
+fn check_conditions(document: &Document, snapshot: &Snapshot) -> Result<(), Failure> {
+    let conditions = document.entries.iter().filter(|entry| entry.key.starts_with("device."));
+    match snapshot.check(&Document { entries: conditions.cloned().collect() }) {
+        Ok(conditions) => check_device(&conditions, snapshot, false),
+        Err(_) => Ok(()),
+    }
+}
 
 /// Checks a file against the description of the device that it names. Needs no bus.
 fn check_before(document: &Document, file: &str) -> anyhow::Result<()> {
@@ -141,11 +150,11 @@ impl Apply {
     fn by_nodes(&self, global: &Global) -> anyhow::Result<(usize, (String, Wall), Results)> {
         let Some(nodes) = self.nodes() else { return Err(self.usage().into()) };
         let label = self.words.last().cloned().unwrap_or_default();
-        let document = match nodes_and_file(&self.words).filter(|_| !self.rollback) {
-            Some((_, file)) => Some(document(file)?),
-            None => None,
-        };
-        document.as_ref().map_or(Ok(()), |document| check_before(document, &label))?;
+        let given = nodes_and_file(&self.words).filter(|_| !self.rollback);
+        let file = given.map(|(_, name)| file(name, global)).transpose()?;
+        if let Some(File::Settings(document)) = &file {
+            check_before(document, &label)?;
+        }
         let is_one = matches!(&nodes, Nodes::These(nodes) if nodes.len() == 1);
         if self.address && !is_one {
             let message = "--address is for one node, or for a --table: two nodes cannot have the same node-ID";
@@ -154,7 +163,7 @@ impl Apply {
         global.with_master(|master| {
             let nodes = open::nodes(master, global, &nodes)?;
             let overrides = descriptions::overrides_on(master, global, &nodes)?;
-            let job = |node: &NodeId| Job { node: *node, document: document.clone(), label: label.clone() };
+            let job = |node: &NodeId| Job { node: *node, file: file.clone(), label: label.clone() };
             let results = self.work(global, master, nodes.iter().map(job).collect(), &overrides);
             Ok((nodes.len(), ended(master), results))
         })
@@ -184,7 +193,7 @@ impl Apply {
                 };
                 let own: Vec<NodeId> = found.iter().filter(is_this).map(|node| node.id).collect();
                 match own[..] {
-                    [node] => jobs.push(Job { node, document: Some(row.document), label: row.label }),
+                    [node] => jobs.push(Job { node, file: Some(File::Settings(row.document)), label: row.label }),
                     _ => {
                         let cause = ConfigFailure::NotOneDevice { serial: row.identity[2], nodes: own };
                         failures.push(vec![Failure::general(cause)]);
@@ -254,26 +263,30 @@ impl Apply {
         let one = |failure: Failure| vec![failure];
         let node = job.node;
         master.listen_to(&[node]).map_err(|error| one(error.into()))?;
-        let snapshot = read(master, node, overrides, job.document.as_ref()).map_err(one)?;
+        let snapshot = read(master, node, overrides, job.file.as_ref()).map_err(one)?;
         let mut journal = FileJournal::new(master.bus().name(), &snapshot, global);
-        let (file, document) = match &job.document {
-            Some(document) => (job.label.clone(), document.clone()),
+        let (file, (document, found)) = match &job.file {
+            Some(file) => (job.label.clone(), file.document(&snapshot)),
             None => {
                 let (file, text) = latest(master.bus().name(), &snapshot).map_err(one)?;
                 let unreadable = || Failure::at(node, ConfigFailure::Journal { reason: file.clone() });
                 let document = parse(&file, &text).map_err(|_| one(unreadable()))?;
-                (file, document)
+                (file, (document, Vec::new()))
             }
         };
+        if let Some(File::Dcf(_)) = &job.file {
+            check_conditions(&document, &snapshot).map_err(one)?;
+        }
         let settings: Result<FileSettings, _> = snapshot.check(&document);
         let settings = settings.map_err(|found| ConfigFailure::of_mistakes(&file, Some(node), found))?;
         let options = self.options();
         if self.dry_run {
-            crate::tasks::config::check_device(&settings, &snapshot, self.with_calibration).map_err(one)?;
+            check_device(&settings, &snapshot, self.with_calibration).map_err(one)?;
             let (lines, notes) = lines(&settings, &snapshot, &options);
-            return Ok(Outcome::Lines(lines, notes));
+            return Ok(Outcome::Lines(lines, found.into_iter().chain(notes).collect()));
         }
-        let applied = apply(master, snapshot, &settings, &options, overrides, &mut journal).map_err(one)?;
+        let mut applied = apply(master, snapshot, &settings, &options, overrides, &mut journal).map_err(one)?;
+        applied.notes.splice(..0, found);
         Ok(Outcome::Applied(Box::new(applied)))
     }
 

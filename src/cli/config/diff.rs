@@ -1,6 +1,6 @@
 //! `cangauge config diff`.
 
-use super::{described, document, mistakes};
+use super::{described, document, file, mistakes};
 use crate::bus::claim::Claim;
 use crate::canopen::id::NodeId;
 use crate::cli::{Global, descriptions};
@@ -8,9 +8,10 @@ use crate::master::Master;
 use crate::node::Overrides;
 use crate::output::config::ChangedSetting;
 use crate::output::failure::ErrorMessage;
+use crate::output::notes;
 use crate::tasks::Kind;
 use crate::tasks::config::diff::{Difference, check_offline, of_devices, of_files, with_file};
-use crate::tasks::config::{Sections, read};
+use crate::tasks::config::{File, Sections, read};
 use clap::Args;
 
 /// Compare a device with a file, two devices, or two files; exit 1 if anything differs
@@ -84,18 +85,23 @@ impl Diff {
         report(global, &difference)
     }
 
-    fn with_file(&self, global: &Global, node: NodeId, file: &str, sections: Sections) -> anyhow::Result<Difference> {
-        let document = document(file)?;
-        if let Some(described) = described(&document) {
-            check_offline(&document, &described).map_err(|found| mistakes(file, found))?;
+    fn with_file(&self, global: &Global, node: NodeId, name: &str, sections: Sections) -> anyhow::Result<Difference> {
+        let file = file(name, global)?;
+        if let File::Settings(document) = &file
+            && let Some(described) = described(document)
+        {
+            check_offline(document, &described).map_err(|found| mistakes(name, found))?;
         }
         let overrides = descriptions::overrides(global, &[node])?;
         let compare = |master: &mut Master<'_>, overrides: &Overrides| {
-            let snapshot = read(master, node, overrides, Some(&document))?;
-            let settings = snapshot.check(&document).map_err(|found| mistakes(file, found))?;
-            Ok(with_file(&snapshot, &settings, sections))
+            let snapshot = read(master, node, overrides, Some(&file))?;
+            let (document, notes) = file.document(&snapshot);
+            let settings = snapshot.check(&document).map_err(|found| mistakes(name, found))?;
+            Ok((with_file(&snapshot, &settings, sections), notes))
         };
-        global.with_master(|master| compare(master, &overrides))
+        let (difference, notes) = global.with_master(|master| compare(master, &overrides))?;
+        notes.iter().for_each(|note| notes::print(&global.console(), note));
+        Ok(difference)
     }
 }
 

@@ -36,6 +36,8 @@ pub struct Eds {
     pub commissioning: Option<Commissioning>,
     /// The values of one device that replace the defaults; only a DCF has them.
     pub parameter_values: BTreeMap<ObjectId, Scalar>,
+    /// The line of each of these values.
+    pub value_lines: BTreeMap<ObjectId, usize>,
     /// Objects that tools must skip when they read or write the whole dictionary.
     pub flags: BTreeMap<ObjectId, ObjectFlags>,
     /// The objects whose data type is missing or unknown. Their entries have the type DOMAIN: they are read by name, as
@@ -161,6 +163,7 @@ pub fn read(bytes: &[u8]) -> Result<Eds, EdsError> {
         info,
         commissioning,
         parameter_values: objects.parameter_values,
+        value_lines: objects.value_lines,
         flags: objects.flags,
         untyped: objects.untyped,
         warnings,

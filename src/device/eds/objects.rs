@@ -20,6 +20,8 @@ pub(super) struct Objects {
     pub(super) described: Vec<Described>,
     /// `ParameterValue` and `[…Value]`.
     pub(super) parameter_values: BTreeMap<ObjectId, Scalar>,
+    /// The lines of these values.
+    pub(super) value_lines: BTreeMap<ObjectId, usize>,
     /// `ObjFlags`.
     pub(super) flags: BTreeMap<ObjectId, ObjectFlags>,
     /// The entries whose data type is unknown.
@@ -177,6 +179,8 @@ impl Reader<'_> {
         self.room = room;
         if let Some(value) = &content.parameter_value {
             self.objects.parameter_values.insert(object, value.clone());
+            let line = section.get("parametervalue").map_or(section.line, |item| item.line);
+            self.objects.value_lines.insert(object, line);
         }
         if content.flags != ObjectFlags::default() {
             self.objects.flags.insert(object, content.flags);
@@ -216,6 +220,7 @@ impl Reader<'_> {
             let place = format!("[{:04X}Value] {}", object.index, object.sub);
             if let Some(value) = self.scalar(&place, item.line, &item.value, data_type) {
                 self.objects.parameter_values.insert(object, value);
+                self.objects.value_lines.insert(object, item.line);
             }
         }
         let lists = [(parts.values, values), (parts.denotations, denotations)];

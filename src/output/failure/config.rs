@@ -139,6 +139,13 @@ pub(in crate::output) fn fact(fact: &ConfigFact) -> NoteText {
                 keys.join(", ")
             ),
         ),
+        ConfigFact::NotOnDevice { objects } => {
+            NoteText::new("not-on-device", format!("the device does not have: {}", objects.join(", ")))
+        }
+        ConfigFact::NotSettings { objects } => NoteText::new(
+            "not-settings",
+            format!("not set, because they are read-only, commands or other PDOs: {}", objects.join(", ")),
+        ),
         ConfigFact::RateAfterRestart { rate } => NoteText::new(
             "rate-after-restart",
             format!("{} kbit/s is stored, and takes effect when the device starts again", rate / 1000),

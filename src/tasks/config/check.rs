@@ -413,22 +413,27 @@ pub(super) fn named_objects(document: &Document, node: &Node, settings: &[Settin
         let Some(object) = object_of(node, &entry.key) else { continue };
         let Some(known) = node.entry(object) else { continue };
         let is_known = settings.iter().chain(&extra).any(|setting| setting.object == object);
-        let is_plain = known.access.is_readable() && known.access.is_writable() && known.data_type != DataType::Domain;
-        let is_command = matches!(object.index, 0x1003 | 0x1010 | 0x1011 | 0x1400..=0x1bff);
-        let acts = node.described(object).is_some_and(|described| described.signature.is_some());
-        if is_known || !is_plain || is_command || acts {
-            continue;
-        }
-        let name =
-            if dictionary::spellings(&known.full_name()).is_empty() { object.to_string() } else { known.full_name() };
-        extra.push(Setting {
-            key: format!("object.{name}"),
-            object,
-            data_type: node.known_type(object).unwrap_or(DataType::OctetString),
-            form: Form::Plain,
-            stage: Stage::Object,
-            is_writable: true,
-        });
+        extra.extend(named_object(node, &known).filter(|_| !is_known));
     }
     extra
+}
+
+/// An object that can be set like a setting: it can be read and written, and is no command and no PDO parameter.
+pub(super) fn named_object(node: &Node, known: &dictionary::Entry) -> Option<Setting> {
+    let object = known.object;
+    let is_plain = known.access.is_readable() && known.access.is_writable() && known.data_type != DataType::Domain;
+    let is_command = matches!(object.index, 0x1003 | 0x1010 | 0x1011 | 0x1400..=0x1bff);
+    let acts = node.described(object).is_some_and(|described| described.signature.is_some());
+    if !is_plain || is_command || acts {
+        return None;
+    }
+    let name = Some(known.full_name()).filter(|name| !dictionary::spellings(name).is_empty());
+    Some(Setting {
+        key: format!("object.{}", name.unwrap_or_else(|| object.to_string())),
+        object,
+        data_type: node.known_type(object).unwrap_or(DataType::OctetString),
+        form: Form::Plain,
+        stage: Stage::Object,
+        is_writable: true,
+    })
 }

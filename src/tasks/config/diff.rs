@@ -95,6 +95,6 @@ fn compare(
 /// Every mistake.
 pub fn check_offline(document: &Document, node: &Node) -> Result<(), Vec<super::Mistake>> {
     let mut catalog = settings(node);
-    catalog.extend(super::named_objects(document, node, &catalog));
+    catalog.extend(super::check::named_objects(document, node, &catalog));
     check(document, node, &catalog, None).map(drop)
 }

@@ -88,6 +88,16 @@ pub enum ConfigFact {
         /// The keys.
         keys: Vec<String>,
     },
+    /// Objects of a DCF that the device does not have.
+    NotOnDevice {
+        /// The addresses and names.
+        objects: Vec<String>,
+    },
+    /// Objects of a DCF that are no settings: read-only, commands, received PDOs.
+    NotSettings {
+        /// The addresses and names.
+        objects: Vec<String>,
+    },
     /// A new bit rate takes effect when the device starts again.
     RateAfterRestart {
         /// The bit rate in bit/s.
@@ -123,7 +133,7 @@ impl ConfigFailure {
 impl ConfigFact {
     /// Whether the user should act on it.
     pub fn is_warning(&self) -> bool {
-        matches!(self, ConfigFact::NotInFile { .. } | ConfigFact::RateAfterRestart { .. })
+        !matches!(self, ConfigFact::Ignored { .. } | ConfigFact::NotSettings { .. })
     }
 }
 

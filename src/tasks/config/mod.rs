@@ -6,6 +6,7 @@
 mod apply;
 mod check;
 mod conditions;
+mod dcf;
 pub mod diff;
 mod dump;
 mod failure;
@@ -18,7 +19,6 @@ mod snapshot;
 pub mod value;
 
 pub use apply::{Applied, Journal, Options, Row as ChangedRow, apply, targets};
-use check::named_objects;
 pub use check::{FileSettings, Sections, Wanted, check};
 pub use conditions::check_device;
 pub use dump::{Dump, Row, SECTIONS};
@@ -30,10 +30,30 @@ pub use snapshot::Snapshot;
 
 use crate::canopen::id::NodeId;
 use crate::device::config_file::Document;
+use crate::device::eds::Eds;
 use crate::master::Master;
 use crate::node::Overrides;
-use crate::tasks::Failure;
 use crate::tasks::settings::open;
+use crate::tasks::{Failure, Note};
+
+/// A file with settings.
+#[derive(Clone, Debug)]
+pub enum File {
+    /// As `config dump` writes it.
+    Settings(Document),
+    /// A DCF. What its values mean as settings depends on the device.
+    Dcf(Box<Eds>),
+}
+
+impl File {
+    /// The contents for one device, and what of them the device does not have.
+    pub fn document(&self, snapshot: &Snapshot) -> (Document, Vec<Note>) {
+        match self {
+            File::Settings(document) => (document.clone(), Vec::new()),
+            File::Dcf(dcf) => snapshot.document_of(dcf),
+        }
+    }
+}
 
 /// Reads all settings of a node, and the objects that a file names besides.
 ///
@@ -43,13 +63,16 @@ pub fn read(
     master: &mut Master<'_>,
     node: NodeId,
     overrides: &Overrides,
-    document: Option<&Document>,
+    file: Option<&File>,
 ) -> Result<Snapshot, Failure> {
     let node = open(master, node, overrides)?;
     let mut settings = setting::settings(&node);
-    if let Some(document) = document {
-        settings.extend(named_objects(document, &node, &settings));
-    }
+    let named = match file {
+        None => Vec::new(),
+        Some(File::Settings(document)) => check::named_objects(document, &node, &settings),
+        Some(File::Dcf(dcf)) => dcf::named_objects(dcf, &node, &settings),
+    };
+    settings.extend(named);
     Snapshot::read(master, node, settings)
 }
 

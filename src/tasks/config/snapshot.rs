@@ -24,7 +24,7 @@ pub struct Snapshot {
     pub scales: Scales,
     /// The TPDOs.
     pub tpdos: Vec<pdo::Settings>,
-    values: BTreeMap<ObjectId, Vec<u8>>,
+    pub(super) values: BTreeMap<ObjectId, Vec<u8>>,
     bit_rate: Option<u32>,
     /// Objects that the device has, but does not allow to read.
     pub unreadable: Vec<(ObjectId, AbortCode)>,
@@ -75,6 +75,11 @@ impl Snapshot {
                 },
             },
         }
+    }
+
+    /// The bit rate in bit/s, if it is known.
+    pub fn bit_rate(&self) -> Option<u32> {
+        self.bit_rate
     }
 
     /// The settings of a TPDO.
@@ -208,7 +213,7 @@ fn bit_rate(node: &Node, values: &BTreeMap<ObjectId, Vec<u8>>) -> Option<u32> {
 }
 
 /// Units and digits as they are now.
-fn renew_signals(node: &mut Node, values: &BTreeMap<ObjectId, Vec<u8>>) {
+pub(super) fn renew_signals(node: &mut Node, values: &BTreeMap<ObjectId, Vec<u8>>) {
     for signal in &mut node.signals {
         let bytes = |index: u16| values.get(&ObjectId::new(index, signal.channel));
         let unit = bytes(0x6131).and_then(|bytes| bytes.as_slice().try_into().ok()).map(u32::from_le_bytes);
@@ -219,7 +224,7 @@ fn renew_signals(node: &mut Node, values: &BTreeMap<ObjectId, Vec<u8>>) {
 }
 
 /// TPDOs as they are now: checks of identifiers use them.
-fn renew_tpdos(node: &mut Node, tpdos: &[pdo::Settings]) {
+pub(super) fn renew_tpdos(node: &mut Node, tpdos: &[pdo::Settings]) {
     for tpdo in &mut node.tpdos {
         if let Some(now) = tpdos.iter().find(|now| now.number == tpdo.number) {
             (tpdo.cob_id, tpdo.mapping) = (now.cob_id, now.mapping.clone());
