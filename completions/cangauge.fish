@@ -27,14 +27,14 @@ end
 complete -c cangauge -n "__fish_cangauge_needs_command" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_needs_command" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_needs_command" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_needs_command" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_needs_command" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_needs_command" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_needs_command" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_needs_command" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -81,14 +81,14 @@ complete -c cangauge -n "__fish_cangauge_needs_command" -f -a "help" -d 'Print t
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -106,14 +106,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand scan" -s V -l version 
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand ls" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -132,14 +132,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l in -d 'Conver
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand read" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -156,14 +156,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand read" -s V -l version 
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_seen_subcommand_from start stop preop reset reset-comm state watch startup help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -189,14 +189,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from start" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -215,14 +215,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from stop" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -241,14 +241,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from preop" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -267,14 +267,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -293,14 +293,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from reset-comm" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -319,14 +319,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from state" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -344,14 +344,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from watch" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -369,14 +369,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_subcommand_from startup" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -402,14 +402,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand nmt; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_seen_subcommand_from read write help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -429,14 +429,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from read" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -461,14 +461,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -476,7 +476,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_s
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l type -d 'Encode the value as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l sdo-size -d 'Whether the request contains the size: auto follows the description, and retries with the other form if the device rejects it' -r -f -a "indicated\t'With the size: 2Fh, 2Bh, 27h, 23h'
+complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l sdo-size -d 'Whether the request contains the size. auto follows the description; if the device rejects this form, the other one is sent' -r -f -a "indicated\t'With the size: 2Fh, 2Bh, 27h, 23h'
 omit\t'Without the size: 22h'
 auto\t'As in the description of the device'"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sdo; and __fish_seen_subcommand_from write" -l input -d 'Write the bytes of a file; - for stdin' -r -F
@@ -498,7 +498,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s d -l duration 
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s n -l count -d 'End after this many rows' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sync -d 'Send SYNC at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l poll -d 'Read by SDO at this interval' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l request -d 'Request TPDOs by remote frames (RTR) at this interval; whether the values are new is not proven, prefer --poll' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l request -d 'Request TPDOs by remote frames (RTR) at this interval. The values may be old; prefer --poll' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l max-gap -d 'Report longer intervals as gaps [default: 3 times the usual interval]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l expect -d 'Exit with 1 at the end if this expression failed: \'pressure in 9..11 bar\' (see cangauge check --help)' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s o -l output -d 'Write to a file instead of stdout' -r -F
@@ -515,14 +515,14 @@ excel\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -541,21 +541,21 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s q -l quiet -d 
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand log" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l for -d 'Check all samples of this time' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l for -d 'Check all samples during this time' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sync -d 'Send SYNC at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l poll -d 'Read by SDO at this interval' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l junit -d 'Write the verdicts as JUnit XML for CI servers, one test case per expression and node. An existing file is replaced' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand check" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -572,14 +572,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand check" -s V -l version
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_seen_subcommand_from scan inquire set-id set-bitrate set activate store identify help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -605,14 +605,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from scan" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -629,14 +629,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -650,20 +650,20 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s h -l help -d 'Print help'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from inquire" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l via -d 'Method: LSS, objects of the device (sdo), or what its description prefers (auto)' -r -f -a "auto\t''
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l via -d 'Method: lss, sdo (objects of the device), or auto (the preferred method in its description)' -r -f -a "auto\t''
 lss\t''
 sdo\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -680,20 +680,20 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-id" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l table-index -d 'Index of the bit rate in the table of the device; --retime needs RATE as well' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l via -d 'Method: LSS, objects of the device (sdo), or what its description prefers (auto)' -r -f -a "auto\t''
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l via -d 'Method: lss, sdo (objects of the device), or auto (the preferred method in its description)' -r -f -a "auto\t''
 lss\t''
 sdo\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set-bitrate" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -713,20 +713,20 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l id -d 'New node-ID' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l bitrate -d '250k, 1M, 125000; auto if the device supports it' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l table-index -d 'Index of the bit rate in the table of the device; --retime needs RATE as well' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l via -d 'Method: LSS, objects of the device (sdo), or what its description prefers (auto)' -r -f -a "auto\t''
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l via -d 'Method: lss, sdo (objects of the device), or auto (the preferred method in its description)' -r -f -a "auto\t''
 lss\t''
 sdo\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from set" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -746,14 +746,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from activate" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -771,14 +771,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from store" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -796,14 +796,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_subcommand_from identify" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -829,14 +829,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand lss; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand info" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -853,14 +853,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand info" -s V -l version 
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand status" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -877,14 +877,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand status" -s V -l versio
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand unit" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -906,14 +906,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l damping -d 
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand filter" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -934,14 +934,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l hysteresis 
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -958,14 +958,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand limits" -s V -l versio
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -983,14 +983,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand minmax" -s V -l versio
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1008,14 +1008,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand errors" -s V -l versio
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_seen_subcommand_from list up down detect help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1037,14 +1037,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from list" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1061,21 +1061,21 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l listen-only -d 'Listen only: send no frame, no acknowledge and no error flag'
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l listen-only -d 'Listen only: send no frame, no acknowledgement and no error flag'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from up" -l ignore-lock -d 'Continue although another program uses the same nodes'
@@ -1086,14 +1086,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from down" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1111,14 +1111,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_subcommand_from detect" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1141,14 +1141,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand bus; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_seen_subcommand_from show map watch help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1169,14 +1169,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and not __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from show" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1193,14 +1193,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from map" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1222,14 +1222,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_subcommand_from watch" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1251,14 +1251,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand pdo; and __fish_seen_s
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1274,20 +1274,20 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -f -a "dump" -d 'Print all settings of a device as a file for config apply'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -f -a "diff" -d 'Compare a device with a file, two devices, or two files; exit 1 if anything differs'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -f -a "apply" -d 'Set a device from a file: check the file, write the differences, read everything back'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -f -a "apply" -d 'Configure a device from a file: check the file, write the differences, read everything back'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -f -a "schema" -d 'Print the JSON Schema of the file, for editors'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and not __fish_seen_subcommand_from dump diff apply schema help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from dump" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1306,14 +1306,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from diff" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1332,22 +1332,22 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l color -d 'Use colour on stderr; auto: only on a terminal without NO_COLOR' -r -f -a "auto\t''
 always\t''
 never\t''"
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l table -d 'Set many devices, one row each: vendor, product, serial, node (with --address), and a column for each "{column}" in the file. A device that is not in the table is not changed' -r -F
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l record -d 'Write a record with time, devices, old and new values and verification; HTML if the name ends with .html, else JSON' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l table -d 'Configure many devices, one per row. Columns: vendor, product, serial, node (with --address), and one for each {NAME} in the file. A device that is not in the table is not changed' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l record -d 'Write a record: time, devices, old and new values, verification. HTML if the name ends with .html, else JSON' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l accept-mismatch -d 'Use a description or EDS of another device (its vendor or product differs)'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l pace -d 'Play a recording (replay:) in real time'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l ignore-lock -d 'Continue although another program uses the same nodes'
@@ -1359,20 +1359,20 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l exact -d 'Set settings that are not in the file to their factory defaults'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l address -d 'Set [address], too: node-ID, bit rate, explicit COB-IDs, SYNC producer. For one node only'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l with-calibration -d 'Set [calibration], too. The serial number must be equal'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l rollback -d 'Restore the settings from before the last apply that failed or was killed'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -l rollback -d 'Restore the settings saved before the last failed or interrupted apply'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from apply" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1388,23 +1388,23 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from schema" -s V -l version -d 'Print version'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from help" -f -a "dump" -d 'Print all settings of a device as a file for config apply'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from help" -f -a "diff" -d 'Compare a device with a file, two devices, or two files; exit 1 if anything differs'
-complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from help" -f -a "apply" -d 'Set a device from a file: check the file, write the differences, read everything back'
+complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from help" -f -a "apply" -d 'Configure a device from a file: check the file, write the differences, read everything back'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from help" -f -a "schema" -d 'Print the JSON Schema of the file, for editors'
 complete -c cangauge -n "__fish_cangauge_using_subcommand config; and __fish_seen_subcommand_from help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l channel -d 'Channel [default: the only one with a zero]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l channel -d 'Channel [default: the only channel that can be set to zero]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l limit -d 'Largest accepted reading: 0.1 (in the present unit), 100mbar, 2% (of the measuring range) [default: 1%]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l samples -d 'Number of readings before and after, 100 ms apart' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1421,20 +1421,20 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s q -l quie
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s v -l verbose -d 'Print more on stderr'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c cangauge -n "__fish_cangauge_using_subcommand autozero" -s V -l version -d 'Print version'
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l channel -d 'Channel [default: the only one with a zero]' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l channel -d 'Channel [default: the only channel that can be set to zero]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l limit -d 'Largest accepted reading: 0.1 (in the present unit), 100mbar, 2% (of the measuring range) [default: 1%]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l samples -d 'Number of readings before and after, 100 ms apart' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand zero" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1455,14 +1455,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l channel -d 'C
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand tare" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1483,14 +1483,14 @@ app\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand store" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1511,14 +1511,14 @@ app\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1536,14 +1536,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand restore" -s V -l versi
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1560,14 +1560,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand sim" -s V -l version -
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1585,14 +1585,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand doctor" -s V -l versio
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1609,14 +1609,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand objects" -s V -l versi
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish_seen_subcommand_from dbc help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1635,14 +1635,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand export; and not __fish
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_seen_subcommand_from dbc" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1661,14 +1661,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand export; and __fish_see
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fish_seen_subcommand_from show new check help" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1689,14 +1689,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and not __fis
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from show" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1713,14 +1713,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from new" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1737,14 +1737,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_seen_subcommand_from check" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1765,14 +1765,14 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand devices; and __fish_se
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s b -l bus -d 'Bus: can0 (SocketCAN), sim, sim:mh4@5:pressure=0bar,dps@127, sim:FILE.toml, replay:FILE (a recording of candump, Vector ASC, PEAK TRC or python-can CSV; receive only), replay:FILE:can1 (one of its channels) [default: the only CAN interface that is up]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s t -l timeout -d 'Longest wait for one answer [default: 500ms; scan: 200ms]' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l retries -d 'Number of times to repeat a request without an answer [default: 1]' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several nodes' -r
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l device -d 'Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes: NODE=NAME' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l eds -d 'Use objects, names and types from an EDS or DCF file; NODE=FILE for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l sdo -d 'The COB-IDs of requests and answers if a node has another SDO channel: 0x645:0x5C5; NODE=TX:RX for one of several nodes' -r
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -s f -l format -d 'Output format: text, JSON Lines or CSV; for log, text means csv' -r -f -a "text\t''
 json\t''
 csv\t''"
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l wait -d 'Wait up to DUR if the CAN interface is missing or down' -r
-complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l trace -d 'Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for stderr' -r -F
+complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l trace -d 'Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)' -r -F
 complete -c cangauge -n "__fish_cangauge_using_subcommand completions" -l progress -d 'Show live values and progress on stderr; auto: only on a terminal' -r -f -a "auto\t''
 always\t''
 never\t''"
@@ -1840,7 +1840,7 @@ complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from pdo" -f -a "watch" -d 'Show received TPDOs, decoded, until Ctrl-C'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "dump" -d 'Print all settings of a device as a file for config apply'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "diff" -d 'Compare a device with a file, two devices, or two files; exit 1 if anything differs'
-complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "apply" -d 'Set a device from a file: check the file, write the differences, read everything back'
+complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "apply" -d 'Configure a device from a file: check the file, write the differences, read everything back'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from config" -f -a "schema" -d 'Print the JSON Schema of the file, for editors'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from export" -f -a "dbc" -d 'Print a DBC of the TPDOs as they are mapped now'
 complete -c cangauge -n "__fish_cangauge_using_subcommand help; and __fish_seen_subcommand_from devices" -f -a "show" -d 'Print a description as TOML'

@@ -20,10 +20,10 @@ use clap::Args;
 /// The command measures, writes the signature once, and measures again. If the reading is then not zero, it exits
 /// with 6. It prints the shift, and on stderr the command to undo it.
 ///
-/// Before the write it checks the readings. In these cases it changes nothing and exits with 1: a reading is invalid;
-/// the sensor measures absolute pressure; the mean exceeds the limit; the readings vary by more than 0.5 % of the
-/// measuring range (half of the limit if the range is unknown); the total offset would exceed 5 % of the range (or a
-/// larger --limit).
+/// Before the write it checks these conditions. If one of them is not met, it changes nothing and exits with 1. Each
+/// reading must be valid. The sensor must not measure absolute pressure. The mean must be within the limit. The
+/// readings may vary by at most 0.5 % of the measuring range (half of the limit if the range is unknown). The total
+/// offset may be at most 5 % of the range (or a larger --limit).
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim autozero 1 --limit 2bar --samples 2 --dry-run\n  cangauge -b sim autozero 1 --limit 2bar --samples 2 --store\n  cangauge -b sim autozero 127 --limit 25% --samples 2 --format json"
@@ -31,7 +31,7 @@ use clap::Args;
 pub(crate) struct Autozero {
     /// Nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
-    /// Channel [default: the only one with a zero]
+    /// Channel [default: the only channel that can be set to zero]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=199))]
     channel: Option<u8>,
     /// Largest accepted reading: 0.1 (in the present unit), 100mbar, 2% (of the measuring range) [default: 1%]

@@ -38,8 +38,8 @@ enum Action {
     /// Find the bit rate of a running bus by listening; print it in bit/s
     ///
     /// Tries the usual bit rates one after the other, the present one first, until it receives valid frames. It
-    /// sends no frame and no acknowledge. At the end, and on Ctrl-C, the interface is set back. A device that is alone
-    /// on the bus cannot be heard, because no node acknowledges its frames.
+    /// sends no frames and no acknowledgements. At the end, and on Ctrl-C, the interface is restored. A single device
+    /// on the bus cannot be detected, because no node acknowledges its frames.
     Detect(Detect),
 }
 
@@ -49,7 +49,7 @@ struct Up {
     interface: InterfaceName,
     /// Bit rate: 250k, 1M, 125000 [default: the present one; a virtual interface has none]
     rate: Option<BitRate>,
-    /// Listen only: send no frame, no acknowledge and no error flag
+    /// Listen only: send no frame, no acknowledgement and no error flag
     #[arg(long, requires = "rate")]
     listen_only: bool,
 }

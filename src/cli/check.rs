@@ -52,7 +52,7 @@ pub(crate) struct Check {
     /// Expression to check (see below)
     #[arg(required = true, value_name = "EXPR")]
     expressions: Vec<Expression>,
-    /// Check all samples of this time
+    /// Check all samples during this time
     #[arg(long = "for", value_name = "DUR")]
     duration: Option<Duration>,
     /// Send SYNC at this interval

@@ -45,7 +45,7 @@ enum Action {
     Dump(Dump),
     /// Compare a device with a file, two devices, or two files; exit 1 if anything differs
     Diff(diff::Diff),
-    /// Set a device from a file: check the file, write the differences, read everything back
+    /// Configure a device from a file: check the file, write the differences, read everything back
     Apply(apply::Apply),
     /// Print the JSON Schema of the file, for editors
     Schema,

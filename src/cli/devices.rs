@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// List device descriptions; show one as TOML, check a file, or describe a new device
 ///
 /// A description is a TOML file with the objects, signals and behaviour of one kind of device. To describe
-/// another device, edit a copy of one.
+/// another device, edit a copy of a description.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge devices\n  cangauge devices show mh4 > mine.toml\n  cangauge devices check mine.toml\n  cangauge -b sim devices new 1"
@@ -35,7 +35,7 @@ enum Action {
     },
     /// Print a first description of a device, made from the device and its EDS (--eds); comments show what to complete
     New {
-        /// Which node: 5, 0x7f
+        /// Node-ID: 5, 0x7f
         node: NodeId,
     },
     /// Report each mistake in a description file with its line

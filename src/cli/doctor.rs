@@ -14,15 +14,16 @@ use clap::Args;
 
 /// Find out why a node or the whole bus is silent
 ///
-/// Looks for nodes, observes their TPDOs for up to 5 s, and reads the objects that explain a silence, the status of the
-/// values and the error registers. Nothing is changed. Each finding is followed by the command to type. Exit code 0: all is
-/// well, 1: something was found.
+/// Looks for nodes and observes their TPDOs for up to 5 s. Then reads the status of the values, the error registers,
+/// and the objects that explain a silence. Nothing is changed. Each finding is followed by the command to type. Exit
+/// code 0: all is well, 1: something was found.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge doctor 5\n  cangauge doctor --passive\n  cangauge doctor all --format json"
 )]
 pub(crate) struct Doctor {
-    /// Node-ID: 5, 0x7f; all: every node, and by LSS devices without a node-ID if no node answers [default: every node]
+    /// Node-ID: 5, 0x7f, or all. If no node answers, all also looks for devices without a node-ID (LSS)
+    /// [default: every node]
     node: Option<Nodes>,
     /// Send nothing
     #[arg(long)]

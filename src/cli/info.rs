@@ -9,9 +9,9 @@ use clap::Args;
 
 /// Show everything about a device on one page
 ///
-/// The page shows identity, versions, bit rate, NMT state (if the node sends a heartbeat), monitoring and errors; then
-/// signals with unit, range, status and settings, TPDOs and manufacturer-specific objects; last, the settings that
-/// 1010h stores. Missing objects are omitted.
+/// The page shows identity, versions, bit rate, NMT state (if the node sends a heartbeat), monitoring and errors. Then
+/// it shows signals with unit, range, status and settings, TPDOs and manufacturer-specific objects. Last, it shows the
+/// settings that 1010h stores. Missing objects are omitted.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  cangauge -b sim info 1\n  cangauge -b sim info 127 --format json")]
 pub(crate) struct Info {

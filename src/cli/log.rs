@@ -66,7 +66,7 @@ pub(crate) struct Log {
     /// Read by SDO at this interval
     #[arg(long, value_name = "DUR", conflicts_with = "passive", value_parser = poll_interval)]
     poll: Option<Duration>,
-    /// Request TPDOs by remote frames (RTR) at this interval; whether the values are new is not proven, prefer --poll
+    /// Request TPDOs by remote frames (RTR) at this interval. The values may be old; prefer --poll
     #[arg(long, value_name = "DUR", conflicts_with_all = ["sync", "poll", "passive"], value_parser = request_interval)]
     request: Option<Duration>,
     /// Send nothing at all

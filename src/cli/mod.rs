@@ -109,8 +109,8 @@ pub struct Global {
     #[arg(long, global = true, value_name = "N")]
     pub(crate) retries: Option<u32>,
 
-    /// Use this device description instead of the recognised one: a name or a TOML file; NODE=NAME for one of several
-    /// nodes
+    /// Use this device description instead of the recognised one: a name or a TOML file. For one of several nodes:
+    /// NODE=NAME
     #[arg(long, global = true, value_name = "[NODE=]NAME|FILE")]
     pub(crate) device: Vec<Override>,
 
@@ -139,8 +139,7 @@ pub struct Global {
     #[arg(long, global = true)]
     pub(crate) pace: bool,
 
-    /// Write every frame sent and received to FILE in candump -L format, or for Wireshark if FILE ends in .pcapng; - for
-    /// stderr
+    /// Write every frame to FILE (candump -L; for Wireshark if the name ends in .pcapng; - for stderr)
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) trace: Option<PathBuf>,
 

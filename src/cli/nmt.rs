@@ -20,9 +20,9 @@ use std::ops::ControlFlow;
 
 /// Send NMT commands and show NMT states
 ///
-/// After a command the state is confirmed by a heartbeat, a boot-up message or node guarding. After "stop", a node that
-/// no longer answers SDO is stopped. Node guarding is not used if it would start life guarding, or if another master
-/// uses it. Unconfirmed states are shown as "none".
+/// After a command the state is confirmed by a heartbeat, a boot-up message or node guarding. After "stop", the state
+/// is confirmed if the node no longer answers SDO. Node guarding is not used if it would start life guarding, or if
+/// another master uses it. Unconfirmed states are shown as "none".
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim nmt start 1\n  cangauge -b sim nmt reset 127\n  cangauge -b sim nmt state 1-3"
@@ -55,7 +55,7 @@ enum Action {
 
 #[derive(Debug, Args)]
 struct Targets {
-    /// Which nodes: 5, 0x7f, 1-16, 1,5; all is one broadcast
+    /// Nodes: 5, 0x7f, 1-16, 1,5; all is one broadcast
     nodes: Nodes,
     /// Exit with 3 if nothing confirms the state
     #[arg(long, conflicts_with = "no_wait")]
@@ -67,7 +67,7 @@ struct Targets {
 
 #[derive(Debug, Args)]
 struct StateArgs {
-    /// Which nodes: 5, 0x7f, 1-16, 1,5, all
+    /// Nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
     /// If the state is unknown, switch the heartbeat on for a moment (1017h)
     #[arg(long)]
@@ -86,7 +86,7 @@ struct WatchArgs {
 
 #[derive(Debug, Args)]
 struct StartupArgs {
-    /// Which node: 5, 0x7f
+    /// Node-ID: 5, 0x7f
     node: NodeId,
     /// wait or auto [default: show the setting]
     set: Option<StartupMode>,

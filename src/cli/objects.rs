@@ -15,9 +15,9 @@ use std::sync::Arc;
 
 /// Show what a description or an EDS states about a device's objects
 ///
-/// Prints name, type, access, range, default and unit of each object. OBJECT or WORD selects objects and adds their
-/// meaning, the page of the manual, and doubts. With DEVICE, --device or --eds no bus is used. With NODE only its identity
-/// is read.
+/// Prints name, type, access, range, default and unit of each object. OBJECT or WORD selects objects, and also shows
+/// their meaning, manual page and unclear points. With DEVICE, --device or --eds no bus is used. With NODE, only the
+/// identity of the node is read.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge objects mh4\n  cangauge objects mh4 0x1800 filter\n  cangauge objects --eds FILE.eds temperature\n  cangauge -b sim objects 127 6148h:1 --format json"

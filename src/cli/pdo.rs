@@ -18,8 +18,8 @@ use std::str::FromStr;
 
 /// Show, change and watch the transmit PDOs of nodes
 ///
-/// PDO 1 is TPDO1 (1800h, 1A00h). A mapping is changed as a transaction: either the new settings are written and read
-/// back, or the old settings are restored and the rejected write is named.
+/// PDO 1 is TPDO1 (1800h, 1A00h). A new mapping is written and read back. If this fails, the old settings are restored
+/// and the error shows the rejected write.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge -b sim pdo show 1\n  cangauge -b sim pdo map 1 1 pressure pressure.status --transmission timer --event-timer 100ms\n  cangauge -b sim pdo map 2 1 0x6130:1/32\n  cangauge pdo watch 127 --duration 10s"

@@ -23,7 +23,7 @@ use clap::Args;
     after_help = "Examples:\n  cangauge -b sim read 1\n  cangauge -b sim read 127 pressure --in bar\n  cangauge -b sim read 1,127 --format json"
 )]
 pub(crate) struct Read {
-    /// Which nodes: 5, 0x7f, 1-16, 1,5, all
+    /// Nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
     /// pressure, temperature, ch1 to ch16, pressure.status, or an object, unscaled: 0x6130:1, 0x6010:0/i16
     signals: Vec<SignalArg>,

@@ -48,7 +48,7 @@ enum Action {
 
 #[derive(Debug, Args)]
 struct ReadArgs {
-    /// Which node: 5, 0x7f
+    /// Node-ID: 5, 0x7f
     node: NodeId,
     /// Objects. A single object prints its value, several print lines "OBJECT VALUE"
     #[arg(required = true)]
@@ -75,7 +75,7 @@ struct ReadArgs {
 
 #[derive(Debug, Args)]
 struct WriteArgs {
-    /// Which node: 5, 0x7f
+    /// Node-ID: 5, 0x7f
     node: NodeId,
     /// OBJECT VALUE, or several OBJECT=VALUE: decimal, 0x1F, -5, 1.25e3, text, or a word (save, Pt100)
     #[arg(required = true, allow_negative_numbers = true, value_name = "OBJECT VALUE")]
@@ -83,8 +83,8 @@ struct WriteArgs {
     /// Encode the value as this type: b, u8 to u64, i8 to i64, r32, r64, vs, os, us, t, td, d, hex
     #[arg(long = "type", value_name = "TYPE")]
     data_type: Option<DataType>,
-    /// Whether the request contains the size: auto follows the description, and retries with the other form if the
-    /// device rejects it
+    /// Whether the request contains the size. auto follows the description; if the device rejects this form, the other
+    /// one is sent
     #[arg(long, value_name = "HOW", default_value = "auto")]
     sdo_size: SdoSize,
     /// Read back and compare

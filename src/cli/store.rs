@@ -21,7 +21,7 @@ use clap::{Args, ValueEnum};
     after_help = "Examples:\n  cangauge -b sim store 1\n  cangauge -b sim store 1 --group app --verify\n  cangauge -b sim store 1,127 --format json"
 )]
 pub(crate) struct Store {
-    /// Which nodes: 5, 0x7f, 1-16, 1,5, all
+    /// Nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
     /// Settings: all, communication (1000h to 1FFFh), or application (6000h to 9FFFh)
     #[arg(long, default_value = "all")]
@@ -40,7 +40,7 @@ pub(crate) struct Store {
     after_help = "Examples:\n  cangauge -b sim restore 1 --reset\n  cangauge -b sim restore 1 --group comm --reset\n  cangauge -b sim restore 127"
 )]
 pub(crate) struct Restore {
-    /// Which nodes: 5, 0x7f, 1-16, 1,5, all
+    /// Nodes: 5, 0x7f, 1-16, 1,5, all
     nodes: Nodes,
     /// Settings: all, communication (1000h to 1FFFh), or application (6000h to 9FFFh)
     #[arg(long, default_value = "all")]

@@ -12,8 +12,8 @@ use clap::Args;
 /// The net value is the process value minus the tare zero. The command measures, writes the signature once, and measures
 /// again. It prints the tare zero before and after, and on stderr the command to undo it. It never stores.
 ///
-/// A description (--device) or an EDS (--eds) must have the objects: 6139h and the net value (6140h, 7140h ...). If a
-/// reading is invalid or the readings vary by more than 0.5 % of the measuring range, nothing is changed (exit 1).
+/// A description (--device) or an EDS (--eds) must have the objects: 6139h and the net value (6140h, 7140h ...).
+/// Nothing is changed (exit 1) if a reading is invalid or the readings vary by more than 0.5 % of the measuring range.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge --eds scale.eds tare 5\n  cangauge --device scale.toml tare 5 --channel 2 --undo"

@@ -25,12 +25,12 @@ use crate::tasks::{Failure, Kind, Note};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Set a device from a file: check the file, write the differences, read everything back
+/// Configure a device from a file: check the file, write the differences, read everything back
 ///
-/// Order: sensor type, unit, digits, filter, limits, other objects, guarding and heartbeat, TPDOs, COB-IDs, store, and
-/// last node-ID and bit rate. A second run prints "0 changes". If a write fails, the error lists the written settings
-/// and the missing ones. Run the same command again to continue, or with --rollback to restore the old settings. They are
-/// kept in $XDG_STATE_HOME/cangauge (or ~/.local/state/cangauge) until the change is complete.
+/// Order: sensor type, unit, digits, filter, limits, other objects, guarding and heartbeat, TPDOs, COB-IDs, store;
+/// finally node-ID and bit rate. A second run prints "0 changes". If a write fails, the error lists the written
+/// settings and the missing ones. Run the same command again to continue, or with --rollback to restore the old
+/// settings. They are kept in $XDG_STATE_HOME/cangauge (or ~/.local/state/cangauge) until the change is complete.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  cangauge config apply 1 mh4.toml --dry-run\n  cangauge config apply 1 mh4.toml --store --reset\n  cangauge config apply 1-16 mh4.toml --store\n  cangauge config apply --table forty.csv mh4.toml --address --store --record forty.html\n  cangauge config apply 1 --rollback"
@@ -57,15 +57,14 @@ pub(super) struct Apply {
     /// Set [calibration], too. The serial number must be equal
     #[arg(long)]
     with_calibration: bool,
-    /// Restore the settings from before the last apply that failed or was killed
+    /// Restore the settings saved before the last failed or interrupted apply
     #[arg(long, conflicts_with_all = ["exact", "address", "with_calibration"])]
     rollback: bool,
-    /// Set many devices, one row each: vendor, product, serial, node (with --address), and a column for each
-    /// "{column}" in the file. A device that is not in the table is not changed
+    /// Configure many devices, one per row. Columns: vendor, product, serial, node (with --address), and one for each
+    /// {NAME} in the file. A device that is not in the table is not changed
     #[arg(long, value_name = "FILE.csv", conflicts_with = "rollback")]
     table: Option<PathBuf>,
-    /// Write a record with time, devices, old and new values and verification; HTML if the name ends with .html, else
-    /// JSON
+    /// Write a record: time, devices, old and new values, verification. HTML if the name ends with .html, else JSON
     #[arg(long, value_name = "FILE", conflicts_with = "dry_run")]
     record: Option<PathBuf>,
 }

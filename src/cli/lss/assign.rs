@@ -76,7 +76,7 @@ struct Options {
     /// Do not store: a power cycle restores the old values
     #[arg(long)]
     no_store: bool,
-    /// Method: LSS, objects of the device (sdo), or what its description prefers (auto)
+    /// Method: lss, sdo (objects of the device), or auto (the preferred method in its description)
     #[arg(long, value_name = "WAY", default_value = "auto")]
     via: ViaArg,
     /// Accept more than one device for "only": all of them change
