@@ -278,7 +278,7 @@ impl fmt::Display for TimestampSource {
 pub enum Filters {
     /// Every frame.
     All,
-    /// Data frames with exactly these identifiers.
+    /// Data frames and remote frames with exactly these identifiers.
     Only(Vec<CanId>),
 }
 
@@ -287,7 +287,7 @@ impl Filters {
     pub fn wants(&self, frame: &Frame) -> bool {
         match self {
             Filters::All => true,
-            Filters::Only(ids) => !frame.is_remote() && ids.contains(&frame.id()),
+            Filters::Only(ids) => ids.contains(&frame.id()),
         }
     }
 }

@@ -30,8 +30,9 @@ struct SyncedTpdo {
     number: TpdoNumber,
     sync: CanId,
     every: u64,
-    /// SYNC messages, and the TPDOs after the first SYNC.
+    /// SYNC messages, remote requests, and the TPDOs after the first SYNC.
     syncs: u64,
+    requests: u64,
     received: u64,
     last: Option<Frame>,
     is_repeated: bool,
@@ -44,12 +45,14 @@ pub(super) struct SyncedTpdos {
     tpdos: BTreeMap<CanId, SyncedTpdo>,
     /// Whether this program sends SYNC: then every SYNC is counted.
     is_producer: bool,
+    /// Whether this program sends remote requests, which it does not receive.
+    is_requesting: bool,
 }
 
 impl SyncedTpdos {
     /// Watches no TPDO yet.
-    pub(super) fn new(is_producer: bool) -> SyncedTpdos {
-        SyncedTpdos { is_producer, ..SyncedTpdos::default() }
+    pub(super) fn new(is_producer: bool, is_requesting: bool) -> SyncedTpdos {
+        SyncedTpdos { is_producer, is_requesting, ..SyncedTpdos::default() }
     }
 
     /// Takes the present setup of a node.
@@ -58,8 +61,9 @@ impl SyncedTpdos {
         let (mut own, others): (BTreeMap<_, _>, _) =
             before.into_iter().partition(|(_, tpdo): &(CanId, SyncedTpdo)| tpdo.node == node.id);
         self.tpdos = others;
-        // A node answers remote requests as well, and these are not received.
-        let is_watched = |tpdo: &&Tpdo| tpdo.cob_id.is_valid() && !tpdo.cob_id.allows_rtr();
+        // A node answers remote requests as well.
+        let is_requesting = self.is_requesting;
+        let is_watched = |tpdo: &&Tpdo| tpdo.cob_id.is_valid() && !(is_requesting && tpdo.cob_id.allows_rtr());
         for tpdo in node.tpdos.iter().filter(is_watched) {
             let Some(Transmission::Sync(every)) = tpdo.transmission else { continue };
             let id = tpdo.cob_id.can_id();
@@ -71,6 +75,7 @@ impl SyncedTpdos {
                 sync: node.sync,
                 every,
                 syncs: 0,
+                requests: 0,
                 received: 0,
                 last: None,
                 is_repeated: false,
@@ -87,22 +92,28 @@ impl SyncedTpdos {
 
     /// Frames were lost, perhaps SYNC messages.
     pub(super) fn on_lost_frames(&mut self) {
-        self.tpdos.values_mut().for_each(|tpdo| (tpdo.syncs, tpdo.received) = (0, 0));
+        self.tpdos.values_mut().for_each(|tpdo| (tpdo.syncs, tpdo.requests, tpdo.received) = (0, 0, 0));
     }
 
     /// Takes a frame. Returns whether it is a TPDO in excess, which must not be used.
     pub(super) fn take(&mut self, frame: &Frame) -> Option<Surplus> {
         let is_producer = self.is_producer;
-        let Some(tpdo) = self.tpdos.get_mut(&frame.id()).filter(|_| !frame.is_remote()) else {
+        let Some(tpdo) = self.tpdos.get_mut(&frame.id()) else {
             if !is_producer && !frame.is_remote() {
                 self.on_sync(frame.id());
             }
             return None;
         };
-        let due = match is_producer {
-            true => tpdo.syncs.div_ceil(tpdo.every),
-            false => tpdo.syncs / tpdo.every + FOREIGN_TOLERANCE,
-        };
+        if frame.is_remote() {
+            // The answer to a request before the first SYNC may arrive after it.
+            tpdo.requests = if tpdo.syncs > 0 { tpdo.requests + 1 } else { 1 };
+            return None;
+        }
+        let due = tpdo.requests
+            + match is_producer {
+                true => tpdo.syncs.div_ceil(tpdo.every),
+                false => tpdo.syncs / tpdo.every + FOREIGN_TOLERANCE,
+            };
         let previous = tpdo.last.replace(*frame);
         if tpdo.syncs == 0 || tpdo.received < due && !tpdo.is_shared {
             tpdo.received += u64::from(tpdo.syncs > 0);
@@ -130,7 +141,7 @@ mod tests {
             event_timer_ms: None,
             mapping: Vec::new(),
         });
-        let mut synced = SyncedTpdos::new(is_producer);
+        let mut synced = SyncedTpdos::new(is_producer, false);
         synced.set_up(&node);
         let mut found = Vec::new();
         for (at, letter) in frames.bytes().enumerate() {
@@ -140,6 +151,7 @@ mod tests {
             }
             let text = match letter {
                 b'S' => "080#".to_owned(),
+                b'R' => "185#R1".to_owned(),
                 _ => format!("185#{letter:02X}"),
             };
             let surplus = synced.take(&text.parse().expect("a frame"));
@@ -158,6 +170,9 @@ mod tests {
         assert_eq!(found(true, 1, "SaaSbbSbc"), [(2, false), (8, true)]);
         assert_eq!(found(true, 3, "SSSaSSSb"), []);
         assert_eq!(found(true, 3, "SSSabSSSab"), [(4, true)]);
+        assert_eq!(found(true, 1, "SaRbSRcd"), [], "answers to remote requests");
+        assert_eq!(found(true, 1, "SaRbc"), [(4, true)], "one answer too many");
+        assert_eq!(found(true, 1, "RaRSbc"), [], "an answer after the first SYNC");
     }
 
     #[test]

@@ -82,13 +82,13 @@ fn only_frames_that_match_the_filters_arrive() {
         heard
     };
     let (standard, extended) = (CanId::Standard(0x181), CanId::Extended(0x181));
-    assert_eq!(heard(&Filters::Only(vec![standard])), ["181#01"]);
+    assert_eq!(heard(&Filters::Only(vec![standard])), ["181#01", "181#R1"]);
     assert_eq!(heard(&Filters::Only(vec![extended, extended])), ["00000181#02"]);
-    assert_eq!(heard(&Filters::Only(vec![CanId::Standard(0x182), standard])), ["181#01", "182#03"]);
+    assert_eq!(heard(&Filters::Only(vec![CanId::Standard(0x182), standard])), ["181#01", "181#R1", "182#03"]);
     assert_eq!(heard(&Filters::Only(vec![])), [""; 0]);
     // More filters than the kernel accepts.
     let many = (0x181..=0x181 + 1200u16).step_by(2).map(CanId::Standard).chain([extended]).collect();
-    assert_eq!(heard(&Filters::Only(many)), ["181#01", "00000181#02"]);
+    assert_eq!(heard(&Filters::Only(many)), ["181#01", "00000181#02", "181#R1"]);
     assert_eq!(heard(&Filters::All).len(), 6);
 }
 

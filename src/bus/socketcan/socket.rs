@@ -83,12 +83,11 @@ pub(super) fn set_filters(socket: &CanSocket, filters: &Filters) -> io::Result<O
     socket.set_filters(&filters).map(|()| None)
 }
 
-/// The filter for data frames with exactly this identifier.
+/// The filter for data frames and remote frames with exactly this identifier.
 fn filter(id: CanId) -> (u32, u32) {
-    const EXACT: u32 = libc::CAN_EFF_FLAG | libc::CAN_RTR_FLAG;
     match id {
-        CanId::Standard(id) => (u32::from(id), libc::CAN_SFF_MASK | EXACT),
-        CanId::Extended(id) => (id | libc::CAN_EFF_FLAG, libc::CAN_EFF_MASK | EXACT),
+        CanId::Standard(id) => (u32::from(id), libc::CAN_SFF_MASK | libc::CAN_EFF_FLAG),
+        CanId::Extended(id) => (id | libc::CAN_EFF_FLAG, libc::CAN_EFF_MASK | libc::CAN_EFF_FLAG),
     }
 }
 

@@ -97,7 +97,7 @@ impl<'o> Recording<'o> {
             liveness: Liveness::new(expected.into_iter()),
             emergencies,
             due: DueTpdos::default(),
-            synced: SyncedTpdos::new(matches!(options.mode, Mode::Sync(_))),
+            synced: SyncedTpdos::new(matches!(options.mode, Mode::Sync(_)), matches!(options.mode, Mode::Request(_))),
             two_senders: BTreeMap::new(),
             early: Vec::new(),
             early_until: None,
