@@ -64,6 +64,17 @@ enum Line<'a> {
     Unknown,
 }
 
+impl<'a> Line<'a> {
+    /// A line with a time: `None` if the rest is not understood, `Some(None)` if it is nothing for CANopen.
+    fn at(wall: Wall, channel: &'a str, event: Option<Option<FrameOrFault>>) -> Line<'a> {
+        match event {
+            Some(Some(event)) => Line::Event(wall, channel, event),
+            Some(None) => Line::Ignored,
+            None => Line::Unknown,
+        }
+    }
+}
+
 /// Something to know about a recording that is replayed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReplayNote {

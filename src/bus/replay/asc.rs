@@ -155,11 +155,7 @@ impl Parser for Asc {
             [_, ..] => return Line::Ignored,
             [] => return Line::Unknown,
         };
-        match event {
-            Some(Some(event)) => Line::Event(wall, channel, event),
-            Some(None) => Line::Ignored,
-            None => Line::Unknown,
-        }
+        Line::at(wall, channel, event)
     }
 }
 

@@ -27,11 +27,8 @@ impl Parser for Candump {
         let Some(wall) = seconds(time).or_else(|| date(time, self.zone)) else { return Line::Unknown };
         let mut words = rest.split_ascii_whitespace();
         let (Some(interface), Some(frame)) = (words.next(), words.next()) else { return Line::Unknown };
-        match if frame.contains('#') { log_frame(frame) } else { screen_frame(rest) } {
-            Some(Some(event)) => Line::Event(wall, interface, event),
-            Some(None) => Line::Ignored,
-            None => Line::Unknown,
-        }
+        let event = if frame.contains('#') { log_frame(frame) } else { screen_frame(rest) };
+        Line::at(wall, interface, event)
     }
 }
 

@@ -73,11 +73,8 @@ impl Parser for Csv {
             return Line::Ignored;
         }
         let fields: Vec<&str> = text.split(',').collect();
-        match (fields.first().and_then(|field| time(field)), event(&fields[1..])) {
-            (Some(wall), Some(Some(event))) => Line::Event(wall, "", event),
-            (Some(_), Some(None)) => Line::Ignored,
-            _ => Line::Unknown,
-        }
+        let Some(wall) = fields.first().and_then(|field| time(field)) else { return Line::Unknown };
+        Line::at(wall, "", event(&fields[1..]))
     }
 }
 

@@ -132,11 +132,7 @@ impl Parser for Trc {
             return Line::Unknown;
         };
         let channel = self.columns.find('B').and_then(|at| words.get(at)).copied().unwrap_or_default();
-        match self.event(&words) {
-            Some(Some(event)) => Line::Event(wall, channel, event),
-            Some(None) => Line::Ignored,
-            None => Line::Unknown,
-        }
+        Line::at(wall, channel, self.event(&words))
     }
 }
 
