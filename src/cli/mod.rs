@@ -179,10 +179,6 @@ pub struct Global {
     #[arg(skip)]
     pub(crate) shows_states: bool,
 
-    /// Whether the command changes something in devices that lasts.
-    #[arg(skip)]
-    pub(crate) changes_devices: bool,
-
     /// Descriptions that are yet to be compared with the devices of these nodes.
     #[arg(skip)]
     pub(crate) pending: RefCell<Option<(Vec<Named>, Vec<NodeId>)>>,
@@ -413,9 +409,6 @@ impl Global {
         for (node, length) in master.odd_heartbeats().filter(|_| self.shows_states) {
             self.console().warn(&output::events::heartbeat_text(node, length));
         }
-        if self.changes_devices && result.is_ok() && matches!(&spec, BusSpec::Sim(bench) if !is_bench_file(bench)) {
-            self.console().note("the simulated devices start afresh with every command: they do not keep this change");
-        }
         let finished = bus.finish().or_fail();
         let result = result?;
         finished?;
@@ -460,14 +453,17 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         only_reads: cli.command.only_reads(),
         on_two_devices: cli.command.on_two_devices(),
         shows_states: matches!(cli.command, Command::Scan(_) | Command::Nmt(_)),
-        changes_devices: cli.command.changes_devices(),
         ..cli.global.clone()
     };
     let broken = own::load()?;
     if !matches!(cli.command, Command::Completions(_)) {
         own::report(&broken, &global);
     }
-    cli.command.run(&global)
+    cli.command.run(&global)?;
+    if cli.command.changes_devices() && matches!(&global.bus, Some(BusSpec::Sim(bench)) if !is_bench_file(bench)) {
+        global.console().note("the simulated devices start afresh with every command: they do not keep this change");
+    }
+    Ok(())
 }
 
 /// The program with its commands. The global options are described only in the help of the program itself; the other

@@ -144,7 +144,10 @@ fn transmission(text: &str) -> Result<Trigger, String> {
 
 /// A duration as a number of `unit`s that fits 16 bits.
 fn units(text: &str, unit: std::time::Duration, form: &str) -> Result<u16, String> {
-    let wrong = || format!("\"{text}\" is not {form}");
+    let wrong = || match text.parse::<f64>() {
+        Ok(_) => format!("\"{text}\" has no unit ({text}ms): it must be {form}"),
+        Err(_) => format!("\"{text}\" is not {form}"),
+    };
     let duration = match text {
         "0" => std::time::Duration::ZERO,
         _ => humantime::parse_duration(text).map_err(|_| wrong())?,

@@ -179,6 +179,9 @@ impl Report for AppliedReport {
     fn text(reports: &[AppliedReport], out: &mut dyn Write) -> io::Result<()> {
         let shown =
             |item: &Option<Item>| item.as_ref().map_or_else(|| "-".to_owned(), |item| text::safe(&item.to_string()));
+        if reports.is_empty() {
+            return Ok(());
+        }
         let mut rows = Vec::new();
         if let [only] = reports {
             if only.0.rows.is_empty() {

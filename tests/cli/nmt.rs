@@ -150,6 +150,12 @@ fn a_change_of_the_built_in_bench_is_not_kept() {
         let done = Bench::real("mh4@1,dps@127").run(line).exit(0);
         assert_eq!(done.stderr.matches(note).count(), 1, "{line}: {}", done.stderr);
     }
+    // Nothing was changed.
+    Bench::real("mh4@1,dps@127").run("lss set-id 127 1").fails(
+        1,
+        "cangauge: node 127: node-ID 1 is taken (a node answers); nothing was changed\n\
+         hint: list the devices: cangauge lss scan\n",
+    );
     for line in ["nmt state 1", "unit 1", "sdo read 1 0x1017", "lss scan", "pdo show 1", "errors 127"] {
         assert!(!Bench::real("mh4@1,dps@127").run(line).stderr.contains(note), "{line}");
     }
@@ -161,5 +167,5 @@ fn startup_shows_and_sets_how_a_device_starts() {
     bench.run("nmt startup 5").prints("wait\n");
     let done = bench.run("nmt startup 5 auto").prints("auto\n");
     assert!(done.stderr.contains("to keep them: cangauge store"), "{}", done.stderr);
-    assert!(bench.run("nmt startup 6").exit(6).stderr.contains("1F80h"));
+    assert!(bench.run("nmt startup 6").exit(4).stderr.contains("1F80h"));
 }

@@ -236,6 +236,10 @@ fn wrong_requests_are_rejected_before_the_first_write() {
     }
     refuses("pdo map 1 1 --event-timer 66s", "\"66s\" is not a duration in whole milliseconds (0ms to 65535ms)");
     refuses("pdo map 1 1 --event-timer 1500us", "\"1500us\" is not a duration in whole milliseconds (0ms to 65535ms)");
+    refuses(
+        "pdo map 1 1 --event-timer 100",
+        "\"100\" has no unit (100ms): it must be a duration in whole milliseconds (0ms to 65535ms)",
+    );
     refuses("pdo map 1 1 --inhibit 50us", "\"50us\" is not a duration in steps of 100us (0us to 6553500us)");
     for restricted in ["0", "0x7f", "0x101", "0x180", "0x581", "0x601", "0x6e0", "0x701", "0x7ff"] {
         let done = bench.run(&format!("pdo map 1 1 --cob-id {restricted}")).exit(2);

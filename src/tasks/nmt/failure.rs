@@ -32,7 +32,8 @@ impl NmtFailure {
     /// The kind, which decides the exit code.
     pub fn kind(&self) -> Kind {
         match self {
-            NmtFailure::OtherState { .. } | NmtFailure::NoStartupObject => Kind::Unexpected,
+            NmtFailure::OtherState { .. } => Kind::Unexpected,
+            NmtFailure::NoStartupObject => Kind::Refused,
             NmtFailure::NotRecorded(_) => Kind::Io,
             NmtFailure::NoSign | NmtFailure::NoBootUp | NmtFailure::NotConfirmed | NmtFailure::Absent => Kind::NoAnswer,
         }
