@@ -130,7 +130,7 @@ fn bus_words(cause: &FindingCause, interface: &str) -> Words {
             let message = format!(
                 "no frame was received in {time}, and no node answers: no power, no cable, or another bit rate"
             );
-            ("no-frame", message, Some(detect))
+            ("no-frame", message, Some(format!("check the power and the cable; {detect}")))
         }
         FindingCause::Unconfigured => {
             let message = "no node answers, and a device without a node-ID is on the bus".to_owned();

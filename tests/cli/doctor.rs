@@ -33,3 +33,33 @@ fn missing_bus_is_a_finding() {
     assert!(done.status.code() == Some(1) && text.contains("CAN") || text.contains("can47"), "{done:?}");
     bench.run("doctor 5,6").exit(2);
 }
+
+/// On a bus where no node answers, and for an absent node.
+#[test]
+fn no_hint_leads_to_another_exit_3() {
+    let commands = [
+        "read 9",
+        "sdo read 9 0x1000",
+        "sdo write 9 0x1017 100",
+        "nmt state 9",
+        "nmt start 9 --confirm",
+        "nmt reset 9",
+        "store 9",
+        "lss set-id 9 12",
+        "lss scan",
+        "scan --passive",
+        "log 9 pressure --device mh4 --count 1",
+    ];
+    for bench in ["dps@unconfigured", "mh4@5"].map(Bench::of) {
+        for command in commands {
+            let done = bench.run(command);
+            let Some(3) = done.code else { continue };
+            let hint = done.stderr.lines().find_map(|line| line.strip_prefix("hint: ")).unwrap_or_default();
+            let next: Vec<&str> = hint.split("cangauge ").skip(1).collect();
+            for next in next.iter().map(|text| text.split([';', ',', '(']).next().unwrap_or_default().trim()) {
+                assert_ne!(bench.run(next).code, Some(3), "{command}: {next}");
+            }
+            assert!(!hint.is_empty(), "{command}: {}", done.stderr);
+        }
+    }
+}

@@ -153,8 +153,15 @@ fn silence_advice(node: NodeId, waited: Duration, started: bool, clue: Clue) -> 
             )
         }
         Some(_) => "if its SDO channel is another one, state it: --sdo 0xTX:0xRX".to_owned(),
-        None => "check its node-ID, power and cable; list the nodes that answer: cangauge scan".to_owned(),
+        None => check_node(Some(node)),
     })
+}
+
+/// What to do about a node that shows no sign of life; `None`: its node-ID is unknown. `doctor` finds a cause on a dead
+/// bus too, where `scan` fails as well.
+pub(super) fn check_node(node: Option<NodeId>) -> String {
+    let node = node.map_or_else(|| "all".to_owned(), |node| node.to_string());
+    format!("check its node-ID, power and cable; find the cause: cangauge doctor {node}")
 }
 
 /// An LSS service failed.

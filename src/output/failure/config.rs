@@ -38,7 +38,8 @@ pub(super) fn words(cause: &ConfigFailure) -> Words {
                 .hint("a node-ID must be free, and a bit rate is only set on a bus with one node")
         }
         ConfigFailure::NotOneDevice { serial, nodes } if nodes.is_empty() => {
-            Words::new(format!("no device with the serial number {serial} answers")).hint("find it: cangauge scan")
+            Words::new(format!("no device with the serial number {serial} answers"))
+                .hint("check its power and cable; find the cause: cangauge doctor")
         }
         ConfigFailure::NotOneDevice { serial, nodes } => {
             let list: Vec<String> = nodes.iter().map(ToString::to_string).collect();

@@ -34,7 +34,7 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
         }
         LssCause::DuplicateNodeId(sign) => duplicate_node_id(*sign),
         LssCause::NoAnswer(waited) => Words::new(format!("no answer within {}", format_duration(*waited)))
-            .hint("check its node-ID, power and cable; list the devices: cangauge lss scan"),
+            .hint(below::check_node(cause.device.node)),
         LssCause::OtherNodeIdByLss(found) => other_node_id(*found),
         LssCause::SameIdentity(other) => Words::new(format!("node {other} has the same identity")).hint(CONNECT_ALONE),
         LssCause::SeveralWithIdentity => Words::new("more than one device answers to its identity").hint(CONNECT_ALONE),
@@ -44,9 +44,9 @@ fn cause_words(failure: &Failure, cause: &LssFailure) -> Words {
                 .hint(format!("name one device by its {names} or its identity; list them: cangauge lss scan"))
         }
         LssCause::NoDevice => Words::new("no device answers, neither by SDO nor by LSS")
-            .hint("check power, wiring and bit rate; then: cangauge scan"),
+            .hint("check power, wiring and bit rate; find the cause: cangauge doctor all"),
         LssCause::NoUnconfigured => Words::new("no device without a node-ID answers")
-            .hint("fastscan finds only devices without a node-ID; list all: cangauge lss scan"),
+            .hint("fastscan finds only devices without a node-ID; find the others: cangauge doctor all"),
         LssCause::NoneInRange(range) => Words::new(format!("no LSS slave within {range} answers")),
         LssCause::NoInquiry => Words::new("it does not support the LSS inquiries (5Ah to 5Eh)")
             .hint("read its identity by SDO: cangauge scan"),

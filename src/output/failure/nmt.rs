@@ -1,25 +1,22 @@
 //! Text for causes: an NMT state was not reached or not confirmed.
 
-use super::Words;
+use super::{Words, below};
 use crate::tasks::Failure;
 use crate::tasks::nmt::NmtFailure;
-
-/// What to do about a node that shows no sign of life.
-const CHECK_NODE: &str = "check its node-ID, power and cable; list the nodes that answer: cangauge scan";
 
 /// The message and the hint for a cause.
 pub(super) fn words(failure: &Failure, cause: &NmtFailure) -> Words {
     let node = failure.node.map_or_else(|| "NODE".to_owned(), |node| node.to_string());
     match cause {
         NmtFailure::OtherState { state, wanted } => Words::new(format!("the node is {state}, not {wanted}")),
-        NmtFailure::NoSign => {
-            Words::new("command sent, but no heartbeat, boot-up or SDO answer was received").hint(CHECK_NODE)
+        NmtFailure::NoSign => Words::new("command sent, but no heartbeat, boot-up or SDO answer was received")
+            .hint(below::check_node(failure.node)),
+        NmtFailure::NoBootUp => {
+            Words::new("command sent, but no boot-up message was received").hint(below::check_node(failure.node))
         }
-        NmtFailure::NoBootUp => Words::new("command sent, but no boot-up message was received")
-            .hint(format!("check whether the node answers: cangauge nmt state {node}")),
         NmtFailure::NotConfirmed => Words::new("command sent, not confirmed: the node sends no heartbeat (1017h is 0)")
             .hint(format!("set a heartbeat: cangauge sdo write {node} producer-heartbeat-time 1000")),
-        NmtFailure::Absent => Words::new("no heartbeat and no SDO answer").hint(CHECK_NODE),
+        NmtFailure::Absent => Words::new("no heartbeat and no SDO answer").hint(below::check_node(failure.node)),
         NmtFailure::NotRecorded(error) => {
             Words::new(format!("write the journal {}: {}; nothing was changed", error.file, error.reason))
                 .hint("name a folder that can be written: XDG_STATE_HOME=/tmp/state cangauge …")

@@ -1,6 +1,6 @@
 //! Text for causes: reading or writing a node failed.
 
-use super::Words;
+use super::{Words, below};
 use crate::canopen::value::Value;
 use crate::node::Error;
 use crate::output::text;
@@ -10,9 +10,9 @@ use crate::tasks::Failure;
 pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
     match cause {
         // These have causes of their own, see `From<node::Error> for Failure`.
-        Error::Bus(error) => super::below::bus(error),
+        Error::Bus(error) => below::bus(error),
         Error::Interrupted => Words::new("interrupted"),
-        Error::Sdo(error) | Error::Unknown(error) => super::below::sdo(error),
+        Error::Sdo(error) | Error::Unknown(error) => below::sdo(error),
         Error::NotKept { object, written, found, .. } => {
             let (found, written) = (shown(found), shown(written));
             Words::new(format!("the write of {object} was acknowledged, but it reads {found} instead of {written}"))
@@ -32,11 +32,7 @@ pub(super) fn words(failure: &Failure, cause: &Error) -> Words {
             }
         }
         Error::Restarted(_) => Words::new("the device restarted"),
-        Error::NoBootUp(_) => match failure.node {
-            Some(node) => Words::new("no boot-up message after the reset")
-                .hint(format!("check whether it answers: cangauge nmt state {node}; cangauge scan")),
-            None => Words::new("no boot-up message after the reset"),
-        },
+        Error::NoBootUp(_) => Words::new("no boot-up message after the reset").hint(below::check_node(failure.node)),
     }
 }
 

@@ -12,6 +12,6 @@ pub(super) fn words(_failure: &Failure, cause: &ScanFailure) -> Words {
              --bus sim",
         ),
         ScanFailure::NoFrame => Words::new("no node sent anything")
-            .hint("a node without heartbeat and TPDOs sends nothing; ask the nodes: cangauge scan"),
+            .hint("a node without heartbeat and TPDOs sends nothing; ask the nodes: cangauge doctor"),
     }
 }
